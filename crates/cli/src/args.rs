@@ -13,6 +13,7 @@ use crate::{
     filter::FilterCommand,
     lens_args::{BandArgs, FilmArgs, GlassCommand, LensArgs, LensCommand, LensStateArgs},
     measure_args::MeasureCommand,
+    picture_args::PictureArgs,
     ranges,
     render_args::{CompareArgs, LightFieldArgs, RenderArgs},
     show::ShowArgs,
@@ -322,56 +323,6 @@ pub(crate) struct FrameArgs {
     pub(crate) analog_gain: Option<f64>,
     #[command(flatten)]
     pub(crate) picture: PictureArgs,
-}
-
-/// From the raw frame to the picture.
-#[derive(Debug, Args)]
-pub(crate) struct PictureArgs {
-    /// What the picture makes white: scene (its light, or its mean where that is unknown), none, gray-world, white-patch,
-    /// shades-of-gray, gray-edge, patch:X,Y,W,H, or a light as --illuminant has it [default: scene]
-    #[arg(long, value_name = "WHITE", help_heading = heading::EXPOSURE)]
-    pub(crate) white: Option<String>,
-    /// How missing colors are found: nearest, bilinear, malvar, directional, directional-ratio
-    #[arg(long, value_name = "METHOD", help_heading = heading::EXPOSURE)]
-    pub(crate) demosaic: Option<String>,
-    /// How much noise is taken out: 0 none, 0.5 what noise may be, more what texture may be too [default: what the frame's own
-    /// noise asks for]
-    #[arg(long, value_name = "S", help_heading = heading::EXPOSURE)]
-    pub(crate) denoise: Option<f64>,
-    /// What becomes of light beyond saturation: clip (channel by channel), reconstruct [default: reconstruct]
-    #[arg(long, value_name = "KIND", help_heading = heading::EXPOSURE)]
-    pub(crate) highlights: Option<String>,
-    /// Aberrations of the simulated lens that are undone: all, none, or of distortion, lateral-color, vignetting [default: none]
-    #[arg(long, value_name = "LIST", help_heading = heading::EXPOSURE)]
-    pub(crate) lens_corrections: Option<String>,
-    /// How channels become colors: auto (a matrix fitted for sensor and light, with roots of their products where no matrix comes near), roots, none
-    /// [default: auto]
-    #[arg(long, value_name = "KIND", help_heading = heading::EXPOSURE)]
-    pub(crate) color: Option<String>,
-    /// Undoes a blur of this standard deviation, pixels, as far as noise allows; .5 to .8 for sharp lenses [default: 0]
-    #[arg(long, value_name = "S", help_heading = heading::EXPOSURE)]
-    pub(crate) sharpen_px: Option<f64>,
-    /// Factors on the contrast between parts of the picture and within them, RANGE or RANGE,DETAIL, as 0.6,1.2 [default: 1,1]
-    #[arg(long, value_name = "TONE", help_heading = heading::EXPOSURE)]
-    pub(crate) local_tone: Option<String>,
-    /// Stretches a part of the picture to the whole of it: its corners clockwise from the upper left one, shares of width and
-    /// height, as 0.1,0,0.9,0,1,1,0,1 for verticals that lean inwards [default: none]
-    #[arg(long, value_name = "LIST", help_heading = heading::EXPOSURE)]
-    pub(crate) perspective: Option<String>,
-    /// How bright the picture is made: as-exposed, a factor, or a percentile of its luminance and where it is put, as 99%:0.9
-    /// [default: as-exposed]
-    #[arg(long, value_name = "B", help_heading = heading::EXPOSURE)]
-    pub(crate) brightness: Option<String>,
-    /// The curve from light to codes: linear, srgb, gamma:EXPONENT, filmic:CONTRAST [default: srgb]
-    #[arg(long, value_name = "CURVE", help_heading = heading::EXPOSURE)]
-    pub(crate) curve: Option<String>,
-    /// The primaries of the picture: srgb, display-p3 [default: srgb]
-    #[arg(long, value_name = "NAME", help_heading = heading::EXPOSURE)]
-    pub(crate) space: Option<String>,
-    /// Replaces pixels further than this above or below all their neighbors of the same filter, a share of saturation
-    /// [default: none]
-    #[arg(long, value_name = "F", help_heading = heading::EXPOSURE)]
-    pub(crate) defect_threshold: Option<f64>,
 }
 
 /// A raw file to be developed.

@@ -8,7 +8,6 @@ use dioptric_pipeline::{Camera, DevelopedFile, FrameFile, Staged, write_json};
 use crate::{
     args::{Common, DevelopArgs},
     lens::tell,
-    run::picture_options,
     terminal::{print, print_json},
 };
 
@@ -17,7 +16,7 @@ pub(crate) fn run(arguments: &DevelopArgs, common: &Common) -> anyhow::Result<()
         Some(camera) => Camera::read(camera)?.processing,
         None => Default::default(),
     };
-    picture_options(&arguments.picture).apply(&mut processing)?;
+    arguments.picture.0.apply(&mut processing)?;
     let also = arguments.also.as_deref().map_or(Ok(Vec::new()), FrameFile::parse_list)?;
     let staged = Staged::folder(&arguments.out)?;
     let developed = DevelopedFile::read(&arguments.raw, processing)?;

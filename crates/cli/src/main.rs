@@ -20,6 +20,7 @@ mod measure_args;
 mod memory;
 mod movement_args;
 mod paintings;
+mod picture_args;
 mod psf;
 mod ranges;
 mod render;

@@ -9,9 +9,9 @@ use std::{
 use anyhow::{Context, bail};
 use dioptric_analysis::{Run, RunReport};
 use dioptric_pipeline::{
-    Camera, Crop, FilmSpec, KeptCamera, LensReadOptions, LensSpec, LightPaths, PictureOptions, PipelineError, Progress,
-    RenderEffort, RenderMethod, Rendering, RenderingSummary, SceneSource, SceneSpec, SensorSpec, Silent, Stage, Staged,
-    StopSpec, WavelengthSpec, WorldRender, WorldSpec, with_exposure_s, write_json, write_scene, write_seen_png,
+    Camera, Crop, FilmSpec, KeptCamera, LensReadOptions, LensSpec, LightPaths, PipelineError, Progress, RenderEffort,
+    RenderMethod, Rendering, RenderingSummary, SceneSource, SceneSpec, SensorSpec, Silent, Stage, Staged, StopSpec,
+    WavelengthSpec, WorldRender, WorldSpec, parse_white, with_exposure_s, write_json, write_scene, write_seen_png,
 };
 use dioptric_report::write_run;
 use dioptric_spectrum::{Cancel, WavelengthGrid};
@@ -157,7 +157,9 @@ fn camera_of(arguments: &RenderArgs, common: &Common) -> anyhow::Result<Camera> 
     if let Some(time_s) = arguments.exposure_s {
         camera.exposure = with_exposure_s(camera.exposure, time_s);
     }
-    PictureOptions { white: arguments.white.clone(), ..PictureOptions::default() }.apply(&mut camera.processing)?;
+    if let Some(white) = &arguments.white {
+        camera.processing.white = parse_white(white)?;
+    }
     Ok(camera)
 }
 

@@ -14,15 +14,15 @@ use dioptric_analysis::{Run, RunReport, RunTimes};
 use dioptric_files::memory;
 use dioptric_pipeline::{
     BlurSpec, Camera, Clock as PartClock, Diffraction, FilmSpec, FlatSize, FocusSpec, FrameFile, FramesSpec,
-    ImagingTimes, KeptCamera, LensReadOptions, LensSpec, PictureOptions, Progress, Quality, RetiredBank, SceneSpec,
-    SensorOptions, SensorSpec, Silent, Stage, Staged, StopSpec, WavelengthSpec, display, parse_illuminant,
-    parse_numbers, with_exposure_s,
+    ImagingTimes, KeptCamera, LensReadOptions, LensSpec, Progress, Quality, RetiredBank, SceneSpec, SensorOptions,
+    SensorSpec, Silent, Stage, Staged, StopSpec, WavelengthSpec, display, parse_illuminant, parse_numbers,
+    with_exposure_s,
 };
 use dioptric_report::write_run;
 use dioptric_spectrum::Cancel;
 
 use crate::{
-    args::{Common, DiffractionKind, DualPixelArg, FilmKind, FrameArgs, PictureArgs, QualityKind, RunArgs},
+    args::{Common, DiffractionKind, DualPixelArg, FilmKind, FrameArgs, QualityKind, RunArgs},
     lens::tell,
     memory::{give_back_at_once, give_back_freed},
     paintings::{build, painting_folder},
@@ -293,26 +293,7 @@ pub(crate) fn sensor_options(arguments: &FrameArgs) -> SensorOptions {
     SensorOptions {
         noise: arguments.noise.clone(),
         analog_gain: arguments.analog_gain,
-        picture: picture_options(&arguments.picture),
-    }
-}
-
-/// Returns what the command line changes of the way from the raw frame to the picture.
-pub(crate) fn picture_options(arguments: &PictureArgs) -> PictureOptions {
-    PictureOptions {
-        white: arguments.white.clone(),
-        demosaic: arguments.demosaic.clone(),
-        denoise: arguments.denoise,
-        highlights: arguments.highlights.clone(),
-        lens_corrections: arguments.lens_corrections.clone(),
-        color: arguments.color.clone(),
-        sharpen_px: arguments.sharpen_px,
-        local_tone: arguments.local_tone.clone(),
-        perspective: arguments.perspective.clone(),
-        brightness: arguments.brightness.clone(),
-        curve: arguments.curve.clone(),
-        space: arguments.space.clone(),
-        defect_threshold: arguments.defect_threshold,
+        picture: arguments.picture.0.clone(),
     }
 }
 

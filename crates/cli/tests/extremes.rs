@@ -142,6 +142,8 @@ fn fault(folder: &Path, number: u64) -> Option<String> {
 fn pairs_of_extreme_numbers_end_in_a_picture_or_a_sentence() {
     let folder = tempfile::tempdir().unwrap();
     let small = CAMERA.replace("columns: 48, rows: 32, pitch_um: 200.0", "columns: 12, rows: 8, pitch_um: 800.0");
+    // Rays alone: how long diffraction takes at f/90 is the business of its own tests.
+    let small = small.replace("name: \"small\",", "name: \"small\",\n    diffraction: None,");
     fs::write(folder.path().join("camera.ron"), small).unwrap();
     let asked = env::var("DIOPTRIC_EXTREMES").ok().and_then(|n| n.parse().ok());
     let faults: Vec<String> = (0..asked.unwrap_or(24)).filter_map(|number| fault(folder.path(), number)).collect();

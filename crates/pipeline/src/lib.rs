@@ -16,6 +16,7 @@ mod error;
 pub mod figures;
 mod frame_files;
 mod json;
+mod keys;
 mod light_field;
 mod numbers;
 mod paintings;
@@ -39,7 +40,7 @@ pub use dioptric_scene::{ExrSamples, FillDepth};
 
 pub use camera::{
     BlurSpec, BorderSpec, Camera, CameraTurn, Crop, DualPixelSpec, Exposed, FilmSpec, FilterSpec, FlatSize, FocusSpec,
-    FramesSpec, LensReadOptions, LensSpec, LightFieldSpec, Movements, PhotodiodeReads, Photodiodes, PictureOptions,
+    FramesSpec, LensReadOptions, LensSpec, LightFieldSpec, Movements, PhotodiodeReads, Photodiodes,
     REFERENCE_WAVELENGTH_NM, RenderEffort, RenderMethod, RetiredBank, SceneSource, SceneSpec, SensorOptions,
     SensorSpec, StopSpec, TurnPath, VideoSpec, WavelengthSpec, WorldSpec, nearest_to_reference_nm,
 };
@@ -49,6 +50,7 @@ pub use dioptric_files::Staged;
 pub use error::{PipelineError, SceneLack};
 pub use frame_files::{FrameFile, Frames, LensFacts, Outputs, picture_png, write_frames};
 pub use json::{write_file, write_json};
+pub use keys::{Key, PICTURE, PictureOptions, light_word, white_word};
 pub use light_field::{DepthEstimate, DepthSearch, LightField, ViewGeometry};
 pub use numbers::{number, parse_bytes, parse_numbers, parse_pairs};
 pub use paintings::{PaintingFolder, program_build};

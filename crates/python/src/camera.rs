@@ -9,7 +9,7 @@ use pyo3::{
 };
 
 use crate::{
-    changes::{ALL, changed},
+    changes::{all, changed},
     errors::{exception, guarded, wrong},
     lens::Lens,
     options::word,
@@ -161,7 +161,7 @@ impl Camera {
     /// name : str
     #[pyo3(signature = (**changes))]
     fn with_(&self, changes: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
-        guarded(|| Ok(Self::new(changed("with_", &self.kept, changes, ALL)?)))
+        guarded(|| Ok(Self::new(changed("with_", &self.kept, changes, &all())?)))
     }
 
     /// Takes the picture. Other Python threads run meanwhile; Ctrl-C ends it.

@@ -2,7 +2,7 @@
 
 use dioptric_optics::Lens as OpticsLens;
 use dioptric_pipeline::{
-    Camera, Crop, FilmSpec, FocusSpec, FramesSpec, GivenParts, KeptCamera, LensReadOptions, LensSpec, PictureOptions,
+    Camera, Crop, FilmSpec, FocusSpec, FramesSpec, GivenParts, KeptCamera, LensReadOptions, LensSpec, PICTURE,
     RetiredBank, SceneSpec, SensorOptions, SensorSpec, StopSpec, WavelengthSpec, with_auto_exposure, with_exposure_s,
 };
 use dioptric_sensor::Processing;
@@ -21,7 +21,7 @@ use crate::{
 };
 
 /// What changes the frames and what comes after, but not the light on the sensor.
-pub(crate) const OF_EXPOSURE: &[&str] = &[
+const OF_EXPOSURE: &[&str] = &[
     "seed",
     "exposure_s",
     "analog_gain",
@@ -30,38 +30,9 @@ pub(crate) const OF_EXPOSURE: &[&str] = &[
     "bracket_stops",
     "interleaved_ratio",
     "interleaved_gain_ratio",
-    "white",
-    "demosaic",
-    "denoise",
-    "highlights",
-    "lens_corrections",
-    "color",
-    "sharpen_px",
-    "local_tone",
-    "perspective",
-    "brightness",
-    "curve",
-    "space",
-    "defect_threshold",
-];
-/// What changes the picture alone.
-pub(crate) const OF_PICTURE: &[&str] = &[
-    "white",
-    "demosaic",
-    "denoise",
-    "highlights",
-    "lens_corrections",
-    "color",
-    "sharpen_px",
-    "local_tone",
-    "perspective",
-    "brightness",
-    "curve",
-    "space",
-    "defect_threshold",
 ];
 /// All changes, in the order in which they are made.
-pub(crate) const ALL: &[&str] = &[
+const ALL: &[&str] = &[
     "name",
     "lens",
     "f_number",
@@ -105,21 +76,23 @@ pub(crate) const ALL: &[&str] = &[
     "bracket_stops",
     "interleaved_ratio",
     "interleaved_gain_ratio",
-    "white",
-    "demosaic",
-    "denoise",
-    "highlights",
-    "lens_corrections",
-    "color",
-    "sharpen_px",
-    "local_tone",
-    "perspective",
-    "brightness",
-    "curve",
-    "space",
-    "defect_threshold",
     "seed",
 ];
+
+/// Returns the names of what changes the picture alone.
+pub(crate) fn of_picture() -> Vec<&'static str> {
+    PICTURE.iter().map(|key| key.name).collect()
+}
+
+/// Returns the names of what changes the frames and what comes after, but not the light on the sensor.
+pub(crate) fn of_exposure() -> Vec<&'static str> {
+    [OF_EXPOSURE, &of_picture()].concat()
+}
+
+/// Returns the names of all changes, in the order in which they are made.
+pub(crate) fn all() -> Vec<&'static str> {
+    [ALL, &of_picture()].concat()
+}
 
 /// Returns the camera with changes made, checked.
 pub(crate) fn changed(
@@ -356,38 +329,22 @@ fn set_sensor_option(camera: &mut Camera, key: &str, value: &Bound<'_, PyAny>) -
     match key {
         "analog_gain" => options.analog_gain = Some(number(key, value)?),
         "noise" => options.noise = Some(word(key, value)?),
-        _ => options.picture = picture_option(key, value)?,
+        _ => return set_picture_option(&mut camera.processing, key, value),
     }
     options.apply(&mut camera.noise, &mut camera.exposure, &mut camera.processing).map_err(exception)
 }
 
-/// Returns one option of [`OF_PICTURE`].
-fn picture_option(key: &str, value: &Bound<'_, PyAny>) -> PyResult<PictureOptions> {
-    let mut options = PictureOptions::default();
-    match key {
-        "white" => options.white = Some(word(key, value)?),
-        "demosaic" => options.demosaic = Some(word(key, value)?),
-        "denoise" => options.denoise = Some(number(key, value)?),
-        "lens_corrections" => options.lens_corrections = Some(word(key, value)?),
-        "color" => options.color = Some(word(key, value)?),
-        "sharpen_px" => options.sharpen_px = Some(number(key, value)?),
-        "local_tone" => options.local_tone = Some(word(key, value)?),
-        "perspective" => options.perspective = Some(word(key, value)?),
-        "brightness" => options.brightness = Some(word(key, value)?),
-        "curve" => options.curve = Some(word(key, value)?),
-        "space" => options.space = Some(word(key, value)?),
-        "defect_threshold" => options.defect_threshold = Some(number(key, value)?),
-        _ => options.highlights = Some(word(key, value)?),
-    }
-    Ok(options)
+/// Makes one of the choices of [`PICTURE`].
+fn set_picture_option(processing: &mut Processing, name: &str, value: &Bound<'_, PyAny>) -> PyResult<()> {
+    let key = PICTURE.iter().find(|key| key.name == name).expect("names were compared with those of the table");
+    let text = if key.is_number() { number(name, value)?.to_string() } else { word(name, value)? };
+    key.set(processing, &text).map_err(exception)
 }
 
 /// Returns the usual processing with changes made.
 pub(crate) fn changed_processing(function: &str, options: Option<&Bound<'_, PyDict>>) -> PyResult<Processing> {
     let mut processing = Processing::default();
-    each_option(function, options, OF_PICTURE, |key, value| {
-        picture_option(key, value)?.apply(&mut processing).map_err(exception)
-    })?;
+    each_option(function, options, &of_picture(), |key, value| set_picture_option(&mut processing, key, value))?;
     Ok(processing)
 }
 

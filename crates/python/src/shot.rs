@@ -21,7 +21,7 @@ use pyo3::{
 
 use crate::{
     camera::Camera,
-    changes::{OF_EXPOSURE, OF_PICTURE, changed},
+    changes::{changed, of_exposure, of_picture},
     save::{is_picture, write_picture},
     serial::to_python,
     view::{plane_or_planes, raw_planes, rgb8, view},
@@ -239,7 +239,7 @@ impl Shot {
     /// Shot
     #[pyo3(signature = (**changes))]
     fn expose(&self, py: Python<'_>, changes: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
-        self.again(py, "expose", changes, OF_EXPOSURE)
+        self.again(py, "expose", changes, &of_exposure())
     }
 
     /// Develops the same frames otherwise.
@@ -255,7 +255,7 @@ impl Shot {
     /// Shot
     #[pyo3(signature = (**changes))]
     fn develop(&self, py: Python<'_>, changes: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
-        self.again(py, "develop", changes, OF_PICTURE)
+        self.again(py, "develop", changes, &of_picture())
     }
 
     /// Returns the picture as the bytes of a PNG file, equal to the ``picture.png`` of ``dioptric run``.

@@ -12,7 +12,6 @@ mod lens;
 mod light_field;
 mod movements;
 mod photodiodes;
-mod picture_options;
 mod scene;
 mod sensor_options;
 mod video;
@@ -42,7 +41,6 @@ pub use lens::{LensReadOptions, REFERENCE_WAVELENGTH_NM, nearest_to_reference_nm
 pub use light_field::LightFieldSpec;
 pub use movements::Movements;
 pub use photodiodes::Photodiodes;
-pub use picture_options::PictureOptions;
 pub(crate) use scene::bands_or_own;
 pub use scene::{FlatSize, SceneSource, SceneSpec};
 pub use sensor_options::SensorOptions;

@@ -2,11 +2,10 @@
 
 use dioptric_sensor::{ExposureControl, NoiseSources, Processing};
 
-use super::PictureOptions;
-use crate::{PipelineError, with_analog_gain};
+use crate::{PictureOptions, PipelineError, with_analog_gain};
 
 /// Changes to noise, gain and processing as words; what is `None` stays.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default)]
 pub struct SensorOptions {
     /// Sources of noise, as [`NoiseSources::parse`] has them.
     pub noise: Option<String>,

@@ -1,11 +1,10 @@
 //! A camera in words for elsewhere: a camera file, a command line, Python.
 
 use dioptric_pipeline::{
-    Camera, Diffraction, FilmSpec, FocusSpec, FramesSpec, LensReadOptions, LensSpec, SensorSpec, StopSpec,
-    parse_illuminant, parse_white, with_analog_gain, with_exposure_s,
+    Camera, Diffraction, FilmSpec, FocusSpec, FramesSpec, LensReadOptions, LensSpec, PICTURE, SensorSpec, StopSpec,
+    light_word, with_analog_gain, with_exposure_s,
 };
-use dioptric_sensor::{Demosaic, ExposureControl, Highlights, NoiseSource, NoiseSources, WhiteBalance};
-use dioptric_spectrum::Illuminant;
+use dioptric_sensor::{ExposureControl, NoiseSource, NoiseSources};
 
 use super::Session;
 
@@ -264,27 +263,16 @@ impl Telling {
     }
 
     fn processing(&mut self, camera: &Camera) {
-        let (new, old) = (&camera.processing, self.made.processing.clone());
-        if new.demosaic != old.demosaic
-            && let Some((name, _)) = Demosaic::NAMES.iter().find(|(_, method)| *method == new.demosaic)
-        {
-            self.text("demosaic", name);
-            self.made.processing.demosaic = new.demosaic;
-        }
-        if new.highlights != old.highlights {
-            self.text("highlights", if new.highlights == Highlights::Clip { "clip" } else { "reconstruct" });
-            self.made.processing.highlights = new.highlights;
-        }
-        // Python has no word for it.
-        if let Some(strength) = new.denoise.filter(|_| new.denoise != old.denoise && self.tongue == Tongue::Shell) {
-            self.number("denoise", strength);
-            self.made.processing.denoise = new.denoise;
-        }
-        if new.white != old.white
-            && let Some(word) = white_word(&new.white)
-        {
-            self.text("white", &word);
-            self.made.processing.white = new.white.clone();
+        for key in &PICTURE {
+            let Some(word) = key.word(&camera.processing) else { continue };
+            if key.word(&self.made.processing).as_ref() == Some(&word) {
+                continue;
+            }
+            let mut changed = self.made.processing.clone();
+            if key.set(&mut changed, &word).is_ok() {
+                self.made.processing = changed;
+                if key.is_number() { self.word(key.option, word) } else { self.text(key.option, &word) }
+            }
         }
     }
 }
@@ -300,27 +288,6 @@ fn noise_words(noise: NoiseSources) -> String {
     }
 }
 
-/// Returns the word of a light on the command line, where it has one.
-pub(crate) fn light_word(light: &Illuminant) -> Option<String> {
-    let names = Illuminant::NAMES.iter().map(|name| (*name).to_owned());
-    let numbers = match light {
-        Illuminant::Blackbody(kelvin) | Illuminant::Daylight(kelvin) => Some(format!("{kelvin}K")),
-        Illuminant::Chromaticity { x, y } => Some(format!("{x},{y}")),
-        _ => None,
-    };
-    names.chain(numbers).find(|word| parse_illuminant(word).is_ok_and(|parsed| parsed == *light))
-}
-
-/// Returns the word of a white on the command line, where it has one.
-pub(crate) fn white_word(white: &WhiteBalance) -> Option<String> {
-    let words = ["scene", "none", "gray-world", "white-patch", "shades-of-gray", "gray-edge"].map(str::to_owned);
-    let light = match white {
-        WhiteBalance::Light(light) => light_word(light),
-        _ => None,
-    };
-    words.into_iter().chain(light).find(|word| parse_white(word).is_ok_and(|parsed| parsed == *white))
-}
-
 /// Returns a word for a shell.
 fn quoted(word: &str) -> String {
     let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./,:+=%@".contains(c);
@@ -334,6 +301,8 @@ fn quoted(word: &str) -> String {
 #[cfg(test)]
 mod tests {
     use std::path::Path;
+
+    use dioptric_spectrum::Illuminant;
 
     use super::*;
 
@@ -366,7 +335,8 @@ mod tests {
 
     #[test]
     fn a_camera_that_has_no_words_is_written_out() {
-        let session = changed(|camera| camera.processing.brightness = dioptric_sensor::Brightness::Factor(2.0));
+        let session =
+            changed(|camera| camera.processing.white = dioptric_sensor::WhiteBalance::Gains(vec![2.0, 1.0, 1.5]));
         let text = as_command(&session);
         let ron = text.strip_prefix("cat > camera.ron <<'END'\n").unwrap().split("END\n").next().unwrap();
         assert_eq!(Camera::parse(ron, Path::new("/camera.ron")).unwrap(), *session.camera());

@@ -12,7 +12,6 @@ use dioptric_pipeline::{Camera, PipelineError};
 
 pub use autosave::Autosave;
 pub use copy::{as_command, as_python, as_ron};
-pub(crate) use copy::{light_word, white_word};
 pub use history::History;
 pub use prescription::Prescription;
 pub use presets::{Preset, presets};

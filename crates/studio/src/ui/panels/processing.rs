@@ -1,6 +1,6 @@
 //! From the raw frame to the picture.
 
-use dioptric_pipeline::{Camera, parse_illuminant, parse_white};
+use dioptric_pipeline::{Camera, light_word, parse_illuminant, parse_white, white_word};
 use dioptric_sensor::{
     Brightness, ColorCorrection, ColorSpace, Demosaic, Highlights, LensShading, LocalTone, Processing, ToneCurve,
 };
@@ -11,10 +11,7 @@ use super::{
     super::fields::{NumberField, choice, meaning, optional, tick, variant},
     Desk,
 };
-use crate::{
-    engine::Field,
-    session::{light_word, white_word},
-};
+use crate::engine::Field;
 
 pub(super) fn show(ui: &mut Ui, camera: &mut Camera, desk: &Desk<'_>) {
     let processing = &mut camera.processing;

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use dioptric_pipeline::{Camera, FillDepth, FlatSize, SceneSource, SceneSpec, WorldSpec, parse_illuminant};
+use dioptric_pipeline::{Camera, FillDepth, FlatSize, SceneSource, SceneSpec, WorldSpec, light_word, parse_illuminant};
 use dioptric_scene::Pattern;
 use dioptric_spectrum::Illuminant;
 use egui::{CollapsingHeader, Ui};
@@ -11,7 +11,7 @@ use super::{
     super::fields::{NumberField, choice, count, meaning, optional, text, tick, variant},
     Desk, path, world,
 };
-use crate::{engine::Field, session::light_word};
+use crate::engine::Field;
 
 /// The kinds of a scene.
 #[derive(Clone, Copy, PartialEq, Eq)]
