@@ -80,7 +80,8 @@ impl Imaging {
 
         // Look which layers lie where.
         let wavelengths_nm = grid.centers_nm();
-        let middle_nm = wavelengths_nm[grid.len() / 2];
+        let middle = scene.kernel_bands[scene.kernel_bands.len() / 2];
+        let middle_nm = wavelengths_nm[middle];
         let wavelengths_nm = [wavelengths_nm[0], middle_nm, wavelengths_nm[grid.len() - 1]];
         let maps: Vec<Arc<FilmMap>> = wavelengths_nm.par_iter().map(|&nm| lens.film_map(nm, reach_mm)).collect();
         let maps: Vec<&FilmMap> = maps.iter().map(Arc::as_ref).collect();
@@ -94,30 +95,29 @@ impl Imaging {
         let stopwatch = Stopwatch::default();
         let layered = LayeredLens { image: lens, film, layers, stopwatch: &stopwatch };
         let rule = Rule { lens: layered, settings, blocks: &blocks, middle_nm, wavelengths_nm: &wavelengths_nm };
-        let tiling = Tiling::new(&rule, work)?;
+        let mut tiling = Tiling::new(&rule, work)?;
+        let unobserved = Work::unobserved(work.cancel());
+        let kernels = BandKernels { by_layer: Arc::new(tiling.middle_kernels(&layered, middle_nm, &unobserved)?) };
         let looked_up = few_of(&scene.kernel_bands).map(|band| (band, grid.centers_nm()[band]));
         let halos =
             Halos::of((lens, layers), (film, settings.widest_blur_px), &looked_up.collect::<Vec<_>>(), grid.len());
-        let kept = Mutex::new(Kept { budget_bytes: KEPT_BUDGET_BYTES, ..Kept::default() });
-        let mut imaging = Self {
+        let mut kept = Kept { budget_bytes: KEPT_BUDGET_BYTES, ..Kept::default() };
+        kept.keep(middle, &kernels);
+        Ok(Self {
             scene,
             raster,
             tiling,
             blocks,
             reach_mm,
             chief: Arc::new(chief),
-            kept,
+            kept: Mutex::new(kept),
             halos,
-            kernel_bytes: 0,
+            // Those of the middle band tell how much memory kernels take.
+            kernel_bytes: kernels.size_bytes() + kernels.size_bytes() / 4,
             stopwatch,
             in_flight_bytes: None,
             spec,
-        };
-        // Those of the middle band tell how much memory kernels take.
-        let middle = imaging.scene.kernel_bands[imaging.scene.kernel_bands.len() / 2];
-        let kernels = imaging.computed_kernels(lens, middle, &Work::unobserved(work.cancel()))?;
-        imaging.kernel_bytes = kernels.size_bytes() + kernels.size_bytes() / 4;
-        Ok(imaging)
+        })
     }
 
     /// The bytes of memory that it takes, what it shares with other parts of a pupil left out.

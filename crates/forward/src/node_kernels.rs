@@ -1,6 +1,6 @@
 //! The kernels of a lens at points of the film.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use dioptric_psf::Kernel;
 
@@ -187,6 +187,16 @@ impl LayerKernels {
             (*node, NodeKernel::sum_of(&terms))
         };
         Self { symmetry: self.symmetry, by_node: self.by_node.iter().map(mix).collect() }
+    }
+
+    /// Drops the kernels of other nodes than these.
+    pub(crate) fn retain(&mut self, nodes: &BTreeSet<NodeAt>) {
+        self.by_node.retain(|node, _| nodes.contains(node));
+    }
+
+    /// Returns the kernels by their canonical nodes.
+    pub(crate) fn into_kernels(self) -> BTreeMap<NodeAt, NodeKernel> {
+        self.by_node
     }
 
     /// Adds kernels of canonical nodes.

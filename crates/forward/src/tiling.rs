@@ -76,6 +76,8 @@ pub(crate) struct LayerTiles {
     pub(crate) groups: Vec<TileGroup>,
     /// Canonical nodes, each with the width of the samples that its kernel is on.
     nodes: BTreeSet<NodeAt>,
+    /// Kernels of the middle band by which they were cut.
+    known: BTreeMap<NodeAt, NodeKernel>,
 }
 
 /// The tiles of every layer.
@@ -123,6 +125,18 @@ impl Tiling {
         members.sum::<usize>() * size_of::<(Tile, Mirror)>() + self.n_nodes() * size_of::<NodeAt>()
     }
 
+    /// Computes the kernels of all layers in the band by which they were cut, of which some are known.
+    pub(crate) fn middle_kernels(
+        &mut self,
+        lens: &LayeredLens<'_>,
+        wavelength_nm: f64,
+        work: &Work<'_>,
+    ) -> Result<Vec<LayerKernels>, Cancelled> {
+        let kernels = self.kernels_at(lens, wavelength_nm, work)?;
+        self.layers.iter_mut().for_each(|tiles| tiles.known.clear());
+        Ok(kernels)
+    }
+
     /// Computes the kernels of all layers at a wavelength.
     pub(crate) fn kernels_at(
         &self,
@@ -133,7 +147,9 @@ impl Tiling {
         let of_layer = |(layer, tiles): (usize, &LayerTiles)| {
             let kernel = |&node: &NodeAt| {
                 work.check()?;
-                let kernel = lens.kernel(layer, node, wavelength_nm).for_means_of(points_of(self.density, node.1));
+                let known = tiles.known.get(&node).cloned();
+                let kernel = known.unwrap_or_else(|| lens.kernel(layer, node, wavelength_nm));
+                let kernel = kernel.for_means_of(points_of(self.density, node.1));
                 work.advance(1);
                 Ok((node, kernel))
             };
@@ -191,6 +207,8 @@ impl Rule<'_> {
                 }
             }
         }
+        known.retain(&made.nodes);
+        made.known = known.into_kernels();
         Ok(made)
     }
 
