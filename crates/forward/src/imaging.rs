@@ -325,7 +325,8 @@ fn chief_layers(
         places.find(raster, map, columns, (first_mm, step_mm, pixels.y_mm((first_row + row as i64) as f64)));
         let (beside, below) = raster.steps();
         let nearest = |k: usize| {
-            let corner = if places.across[k] >= 0.5 { beside } else { 0 } + if places.down[k] >= 0.5 { below } else { 0 };
+            let corner =
+                if places.across[k] >= 0.5 { beside } else { 0 } + if places.down[k] >= 0.5 { below } else { 0 };
             let coordinate = scene.coordinates.samples()[places.first[k] as usize + corner];
             coordinate.round() as u16
         };
@@ -333,7 +334,10 @@ fn chief_layers(
     };
     let first: Vec<Vec<u16>> = (0..rows).into_par_iter().map_init(Places::default, of_row).collect();
     let is_beyond_focus = |&dioptres: &f64| lens.blur_radius_mm(DVec2::ZERO, dioptres, wavelength_nm) < 0.0;
-    ChiefLayers { first: first.concat(), is_beyond_focus: scene.layers.dioptres().iter().map(is_beyond_focus).collect() }
+    ChiefLayers {
+        first: first.concat(),
+        is_beyond_focus: scene.layers.dioptres().iter().map(is_beyond_focus).collect(),
+    }
 }
 
 /// Returns the first, the middle and the last of some bands.
