@@ -144,19 +144,30 @@ impl Tiling {
         wavelength_nm: f64,
         work: &Work<'_>,
     ) -> Result<Vec<LayerKernels>, Cancelled> {
-        let of_layer = |(layer, tiles): (usize, &LayerTiles)| {
-            let kernel = |&node: &NodeAt| {
+        // Node by node, so that the rays of each serve all layers.
+        let mut layers_of: BTreeMap<NodeAt, Vec<usize>> = BTreeMap::new();
+        for (layer, tiles) in self.layers.iter().enumerate() {
+            tiles.nodes.iter().for_each(|node| layers_of.entry(*node).or_default().push(layer));
+        }
+        let layers_of: Vec<(NodeAt, Vec<usize>)> = layers_of.into_iter().collect();
+        let of_node = |(node, layers): &(NodeAt, Vec<usize>)| {
+            let kernel = |&layer: &usize| {
                 work.check()?;
-                let known = tiles.known.get(&node).cloned();
-                let kernel = known.unwrap_or_else(|| lens.kernel(layer, node, wavelength_nm));
-                let kernel = kernel.for_means_of(points_of(self.density, node.1));
+                let known = self.layers[layer].known.get(node).cloned();
+                let kernel = known.unwrap_or_else(|| lens.kernel(layer, *node, wavelength_nm));
                 work.advance(1);
-                Ok((node, kernel))
+                Ok(kernel.for_means_of(points_of(self.density, node.1)))
             };
-            let kernels = tiles.nodes.par_iter().map(kernel).collect::<Result<BTreeMap<_, _>, Cancelled>>()?;
-            Ok(LayerKernels::new(self.symmetry, kernels))
+            layers.iter().map(kernel).collect::<Result<Vec<NodeKernel>, Cancelled>>()
         };
-        self.layers.par_iter().enumerate().map(of_layer).collect()
+        let kernels: Vec<Vec<NodeKernel>> = layers_of.par_iter().map(of_node).collect::<Result<_, Cancelled>>()?;
+        let mut by_layer: Vec<BTreeMap<NodeAt, NodeKernel>> = vec![BTreeMap::new(); self.layers.len()];
+        for ((node, layers), kernels) in layers_of.iter().zip(kernels) {
+            for (&layer, kernel) in layers.iter().zip(kernels) {
+                by_layer[layer].insert(*node, kernel);
+            }
+        }
+        Ok(by_layer.into_iter().map(|kernels| LayerKernels::new(self.symmetry, kernels)).collect())
     }
 }
 

@@ -22,9 +22,11 @@ use crate::{
 };
 
 /// Bytes of bundles that are kept for each wavelength.
-const MOST_KEPT_BYTES: usize = 48 << 20;
+const MOST_KEPT_BYTES: usize = 2 << 20;
 /// Steps per doubling in which the reach of a survey grows.
 const REACH_STEPS: f64 = 4.0;
+/// How far beyond the film that was surveyed kernels go by its survey, as a multiple of its reach.
+const FAR_BEYOND: f64 = 1.5;
 /// Radii, over the film's distance, at which light is looked for before anything else is done.
 const PROBED_RADII: [f64; 6] = [0.0, 0.05, 0.12, 0.25, 0.5, 1.0];
 
@@ -187,7 +189,7 @@ impl LensImage for LensImageModel {
     }
 
     fn film_map(&self, wavelength_nm: f64, reach_mm: f64) -> Arc<FilmMap> {
-        self.shared.survey(&self.shared.color(wavelength_nm), reach_mm).map.clone()
+        self.shared.survey_of_film(&self.shared.color(wavelength_nm), reach_mm).map.clone()
     }
 
     fn kernel(&self, query: FilmQuery) -> Kernel {
@@ -284,14 +286,24 @@ impl Shared {
         }
     }
 
-    /// Returns the survey of the film up to `reach_mm` from its middle, or farther.
-    pub(crate) fn survey(&self, color: &Color, reach_mm: f64) -> Arc<Survey> {
-        let reach_mm = {
-            let mut known_mm = locked(&self.reach_mm);
-            *known_mm = known_mm.max(reach_mm);
-            // Of a lens moved sideways, as far from its axis.
-            *known_mm + self.decenter.mm().length()
-        };
+    /// Returns the survey of the film up to `reach_mm` from its middle, or farther; kernels of all wavelengths use one as wide from now on.
+    pub(crate) fn survey_of_film(&self, color: &Color, reach_mm: f64) -> Arc<Survey> {
+        let mut known_mm = locked(&self.reach_mm);
+        *known_mm = known_mm.max(reach_mm);
+        let reach_mm = *known_mm;
+        drop(known_mm);
+        self.survey(color, reach_mm)
+    }
+
+    /// Returns the survey that the kernel of a point goes by: that of the film, whose directions go on beyond it.
+    fn survey_about(&self, color: &Color, place_mm: DVec2) -> Arc<Survey> {
+        let known_mm = *locked(&self.reach_mm);
+        self.survey(color, known_mm.max(place_mm.length() / FAR_BEYOND))
+    }
+
+    fn survey(&self, color: &Color, reach_mm: f64) -> Arc<Survey> {
+        // Of a lens moved sideways, as far from its axis.
+        let reach_mm = reach_mm + self.decenter.mm().length();
         let reach_mm = ((REACH_STEPS * reach_mm.max(1e-3).log2()).ceil() / REACH_STEPS).exp2();
         let known = |surveys: &[Arc<Survey>]| surveys.iter().find(|survey| survey.reach_mm == reach_mm).cloned();
         if let Some(survey) = known(&locked(&color.surveys)) {
@@ -308,7 +320,7 @@ impl Shared {
 
     /// Returns the bundle of a point of the film, the map that goes with it and the frame that it was traced in; `None` in darkness.
     pub(crate) fn bundle(&self, color: &Color, place_mm: DVec2) -> Option<(Arc<Bundle>, Arc<FilmMap>, Frame)> {
-        let survey = self.survey(color, place_mm.length());
+        let survey = self.survey_about(color, place_mm);
         let from_axis_mm = place_mm - self.decenter.axis_mm();
         // Of a lens with an axis, bundles are traced along +x and turned.
         let (traced_mm, turn) = match self.is_rotational {
@@ -337,11 +349,11 @@ impl Shared {
         if let Some((division, number)) = part {
             let shares = division.cell_shares(number, spots.mesh, frame.turn * bundle.pupil_sign);
             spots.energies.iter_mut().zip(shares).for_each(|(energy, share)| *energy *= share);
-            let sum: f64 = spots.energies.iter().sum();
-            if sum <= 0.0 {
+            let share: f64 = spots.energies.iter().sum();
+            if share <= 0.0 {
                 return Kernel::identity(pitch_um);
             }
-            spots.energies.iter_mut().for_each(|energy| *energy /= sum);
+            spots.energies.iter_mut().for_each(|energy| *energy /= share);
         }
         let layout = Layout::new(&spots, bending(&color.lens, self.settings.diffraction), pitch_um);
         let waves = |side, middle_px| self.waves(&color, &map, &query, side, middle_px);
@@ -370,7 +382,7 @@ impl Shared {
 
     fn moments(&self, place_mm: DVec2, wavelength_nm: f64) -> Moments {
         let color = self.color(wavelength_nm);
-        let survey = self.survey(&color, place_mm.length());
+        let survey = self.survey_about(&color, place_mm);
         survey.moments(place_mm - self.decenter.axis_mm())
     }
 

@@ -44,7 +44,7 @@ impl LensImage for PartImage {
     }
 
     fn film_map(&self, wavelength_nm: f64, reach_mm: f64) -> Arc<FilmMap> {
-        let survey = self.shared.survey(&self.shared.color(wavelength_nm), reach_mm);
+        let survey = self.shared.survey_of_film(&self.shared.color(wavelength_nm), reach_mm);
         let mut maps = self.maps.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some((_, map)) = maps.iter().find(|(known, _)| Arc::ptr_eq(known, &survey)) {
             return map.clone();

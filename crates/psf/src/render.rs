@@ -55,7 +55,10 @@ impl<'a> Layout<'a> {
     /// Lays out spots on pixels of which one has its middle where places count from, in a window about the middle of the light.
     pub(crate) fn new(spots: &'a Spots, bending: Option<StopHurb>, pitch_um: f64) -> Self {
         let (low, high) = spots.bounds_mm();
-        let middle = (0.5 * (low + high) * per_mm(pitch_um)).round();
+        let is_held = ((high - low) * per_mm(pitch_um)).abs().max_element() <= 2.0 * MOST_PIXELS;
+        // Of rays that go anywhere, where most of the light is.
+        let middle_mm = if is_held { 0.5 * (low + high) } else { spots.median_mm() };
+        let middle = (middle_mm * per_mm(pitch_um)).round();
         Self::about(if middle.is_finite() { middle.as_ivec2() } else { IVec2::ZERO }, spots, bending, pitch_um)
     }
 

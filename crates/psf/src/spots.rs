@@ -66,6 +66,26 @@ impl Spots {
         corners.fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(low, high), at| (low.min(at), high.max(at)))
     }
 
+    /// Returns the place, mm, with half the energy to its left and half below, cells taken at the means of their corners.
+    pub(crate) fn median_mm(&self) -> DVec2 {
+        let middle = |(ring, j): (usize, usize)| {
+            self.mesh.corners(ring, j).map(|node| self.nodes[node].at_mm).into_iter().sum::<DVec2>() / 4.0
+        };
+        let median = |along: fn(DVec2) -> f64| {
+            let cells = self.mesh.cells().map(|cell| along(middle(cell)));
+            let mut cells: Vec<(f64, f64)> = cells.zip(self.energies.iter().copied()).collect();
+            cells.sort_by(|a, b| a.0.total_cmp(&b.0));
+            let half = 0.5 * self.energies.iter().sum::<f64>();
+            let mut held = 0.0;
+            let found = cells.iter().find(|(_, energy)| {
+                held += energy;
+                held >= half
+            });
+            found.map_or(0.0, |(at, _)| *at)
+        };
+        DVec2::new(median(|at| at.x), median(|at| at.y))
+    }
+
     /// Returns how far from the point that places count from the farthest spot lies, mm.
     pub(crate) fn extent_mm(&self) -> f64 {
         self.nodes.iter().map(|node| node.at_mm.length()).fold(0.0, f64::max)
