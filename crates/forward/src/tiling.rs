@@ -31,8 +31,9 @@ const LEAST_OF_BLUR: f64 = 0.25;
 const LARGEST_TILE_PX: i32 = 2048;
 /// How far kernels reach beyond the radius that holds 95 % of a blur: twice as far, and some pixels.
 const REACH: (f64, f64) = (2.0, 8.0);
-/// Standard deviations of kernels, pixels, between which detail below a pixel is imaged as such: below, points stay points; above, none of it is left.
-const FINE_BLUR_PX: Range<f64> = 0.05..1.2;
+/// Standard deviations of kernels, pixels, between which detail below a pixel is imaged as such: below, points stay points; above, none of it is left, nor of what it is
+/// folded to on pixels.
+const FINE_BLUR_PX: Range<f64> = 0.05..4.0;
 
 /// A lens before a film, whose layers of depth are imaged.
 #[derive(Clone, Copy)]

@@ -53,3 +53,54 @@ fn planes_are_exact() {
         assert!(worst < 1e-5, "{lens} f/{f_number}, {plane_m} m, {diffraction:?}: {worst}");
     }
 }
+
+/// Returns the contrast, beside what a picture has of it by itself, of a grating of so many cycles per pixel through an ideal lens with waves, on pixels of 5 µm.
+fn contrast(f_number: f64, cycles_per_px: f64) -> f64 {
+    const FINE: usize = 8;
+    let lens = Lens::thin(50.0, 50.0 / f_number).unwrap();
+    let film_distance_mm = lens.at(550.0).unwrap().film_distance_mm_for(2000.0).unwrap();
+    let (film, grid) = (Film::centered(16, 200, 5.0), WavelengthGrid::new(vec![550.0]).unwrap());
+    let model = LensImageModel::new(&lens, &[550.0], &ImageSettings::new(film_distance_mm, Diffraction::Wave)).unwrap();
+    let (rows, columns) = (FINE * 60, FINE * 260);
+    let grating = |(_, column): (usize, usize)| {
+        let px = (column as f64 + 0.5) / FINE as f64;
+        (1.0 + (std::f64::consts::TAU * cycles_per_px * px).cos()) as f32
+    };
+    let planes = vec![Array2::from_shape_fn((rows, columns), grating)];
+    let radiance = SpectralImage::new(Quantity::Radiance, grid, planes).unwrap();
+    let depth = DepthMap::new(Array2::from_elem((rows, columns), 2.0)).unwrap();
+    let (center_x_px, center_y_px) = (0.5 * (columns as f64 - 1.0), 0.5 * (rows as f64 - 1.0));
+    // As the lens sees from its middle.
+    let view = View { focal_px: film_distance_mm / 5e-3 * FINE as f64, center_x_px, center_y_px };
+    let source = Source { radiance: &radiance, depth: &depth, view, occluded: None };
+    let mut picture = Array2::zeros((0, 0));
+    let mut sink = |_: usize, band: Array2<f32>| {
+        picture = band;
+        Ok(())
+    };
+    render(&source, &model, &film, &Settings::default(), &|_| {}, &mut sink).unwrap();
+    // The amplitude of the frequency that pixels make of it.
+    let line: Vec<f64> = picture.row(8).iter().map(|light| f64::from(*light)).collect();
+    let line = &line[40..160];
+    let mean = line.iter().sum::<f64>() / line.len() as f64;
+    let along = |of: fn(f64) -> f64| {
+        let terms = line.iter().enumerate();
+        terms.map(|(i, light)| light * of(std::f64::consts::TAU * cycles_per_px * i as f64)).sum::<f64>()
+    };
+    2.0 * along(f64::cos).hypot(along(f64::sin)) / (line.len() as f64 * mean)
+}
+
+/// What the optics leave of a grating, times the pixel, and not what would be left of pixels before the optics.
+#[test]
+fn gratings_are_blurred_before_they_are_sampled() {
+    for (f_number, cycles_per_px) in [(22.0_f64, 0.8_f64), (22.0, 0.3), (8.0, 0.8), (8.0, 0.4)] {
+        // The diffraction MTF of a circle, and the pixel.
+        let working = f_number * (1.0 + 50.0 / 1950.0);
+        let s = (cycles_per_px / 5e-3 * 550e-6 * working).min(1.0);
+        let optics = 2.0 / std::f64::consts::PI * (s.acos() - s * (1.0 - s * s).sqrt());
+        let pixel = (std::f64::consts::PI * cycles_per_px).sin() / (std::f64::consts::PI * cycles_per_px);
+        let (found, expected) = (contrast(f_number, cycles_per_px), optics * pixel.abs());
+        println!("f/{f_number}, {cycles_per_px} cycles per pixel: {found:.4}, expected {expected:.4}");
+        assert!((found - expected).abs() < 0.01, "f/{f_number}, {cycles_per_px}: {found}, {expected}");
+    }
+}
