@@ -182,7 +182,19 @@ impl LitPoints {
         reach: PupilReach,
     ) -> Option<Self> {
         let film_point_mm = lens.forward().film_site(on_film_mm, film_distance_mm)?.point_mm;
-        let (low_mm, high_mm) = narrowed_box_mm(lens, plane, film_point_mm, reach, |_| ())?;
+        let (mut low_mm, mut high_mm) = rim_box_mm(lens.forward(), plane.surface_from_lens(film_point_mm))?;
+        // Narrow the box to the points that are lit, or may have a lit one between them and the next.
+        for _ in 0..N_NARROWINGS {
+            let grid = Clearances::trace(lens, plane, film_point_mm, (low_mm, high_mm), SEEK, reach);
+            let (first, last) = grid.extent(|i| grid.may_be_lit(i))?;
+            let (old_mm, step_mm) = (high_mm - low_mm, grid.step_mm);
+            let begin_mm = low_mm;
+            low_mm = begin_mm + step_mm * (first.as_dvec2() - DVec2::ONE);
+            high_mm = begin_mm + step_mm * (last.as_dvec2() + DVec2::ONE);
+            if ((high_mm - low_mm) / old_mm).max_element() > 0.85 {
+                break;
+            }
+        }
         let grid = Clearances::trace(lens, plane, film_point_mm, (low_mm, high_mm), GRID, reach);
         let row = |y: usize| {
             let is_lit = |&x: &usize| grid.mm[y * GRID + x] > 0.0;
@@ -223,47 +235,6 @@ fn union(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
     [a[0].min(b[0]), a[1].max(b[1])]
 }
 
-/// Returns the box of the plane that holds the points that are lit from a film point, or may be; `look` is shown each grid of points that is looked at.
-fn narrowed_box_mm(
-    lens: &ReversedLens,
-    plane: &Placement,
-    film_point_mm: DVec3,
-    reach: PupilReach,
-    mut look: impl FnMut(&Clearances),
-) -> Option<(DVec2, DVec2)> {
-    let (mut low_mm, mut high_mm) = rim_box_mm(lens.forward(), plane.surface_from_lens(film_point_mm))?;
-    // Narrow the box to the points that are lit, or may have a lit one between them and the next.
-    for _ in 0..N_NARROWINGS {
-        let grid = Clearances::trace(lens, plane, film_point_mm, (low_mm, high_mm), SEEK, reach);
-        look(&grid);
-        let (first, last) = grid.extent(|i| grid.may_be_lit(i))?;
-        let (old_mm, step_mm) = (high_mm - low_mm, grid.step_mm);
-        let begin_mm = low_mm;
-        low_mm = begin_mm + step_mm * (first.as_dvec2() - DVec2::ONE);
-        high_mm = begin_mm + step_mm * (last.as_dvec2() + DVec2::ONE);
-        if ((high_mm - low_mm) / old_mm).max_element() > 0.85 {
-            break;
-        }
-    }
-    Some((low_mm, high_mm))
-}
-
-/// Returns the point of most clearance of those of the plane through which light reaches a film point, in the lens frame; `None` where
-/// none is found.
-pub(crate) fn lit_point_mm(lens: &ReversedLens, plane: &Placement, film_point_mm: DVec3) -> Option<DVec3> {
-    let mut best: Option<(f64, DVec2)> = None;
-    let note = |grid: &Clearances| {
-        for (i, &clearance_mm) in grid.mm.iter().enumerate() {
-            if clearance_mm > best.map_or(0.0, |(most_mm, _)| most_mm) {
-                let place = DVec2::new((i % grid.n) as f64, (i / grid.n) as f64);
-                best = Some((clearance_mm, grid.low_mm + grid.step_mm * place));
-            }
-        }
-    };
-    narrowed_box_mm(lens, plane, film_point_mm, PupilReach::WholeLens, note);
-    best.map(|(_, place_mm)| plane.lens_from_surface(place_mm.extend(0.0)))
-}
-
 /// Returns the box of the plane through which lines from a film point (in the plane's frame) meet the last surface inside
 /// its rim.
 fn rim_box_mm(lens: &MonoLens, film_point_mm: DVec3) -> Option<(DVec2, DVec2)> {
@@ -296,7 +267,6 @@ const RIM_DIRECTIONS: usize = 16;
 /// The clearances of rays from one film point through a grid of points of the plane.
 struct Clearances {
     n: usize,
-    low_mm: DVec2,
     step_mm: DVec2,
     mm: Vec<f64>,
 }
@@ -318,7 +288,7 @@ impl Clearances {
             rays.push(point_mm, (point_mm - film_point_mm).normalize(), 0.0);
         }
         let mm = lens.clearances_mm(&mut rays, reach == PupilReach::Stop);
-        Self { n, low_mm, step_mm, mm }
+        Self { n, step_mm, mm }
     }
 
     /// Whether a point is lit, or the clearance changes so much from it to its neighbors that a place between may be.

@@ -244,3 +244,25 @@ fn threads_do_not_change_kernels() {
     };
     assert_eq!(kernels(1), kernels(4));
 }
+
+/// Lenses of the examples, among them a phone's, whose film lies closer to its last surface than that is deep.
+#[test]
+fn lenses_of_files_are_lit_to_the_corner() {
+    for (name, film_distance_mm, nm, reach_mm) in [("phone", 0.63, 460.0, 3.0), ("phone", 0.63, 620.0, 3.0)] {
+        let path: std::path::PathBuf =
+            [env!("CARGO_MANIFEST_DIR"), "../../examples/lenses", &format!("{name}.ron")].iter().collect();
+        let lens = Lens::read(&path).unwrap();
+        let settings = ImageSettings::new(film_distance_mm, Diffraction::None);
+        let model = LensImageModel::new(&lens, &[nm], &settings).unwrap();
+        let map = model.film_map(nm, reach_mm);
+        let mono = lens.at(nm).unwrap();
+        let brightest = map.irradiance_sr(DVec2::ZERO);
+        for share in [0.0, 0.4, 0.8, 1.0] {
+            let place_mm = share * reach_mm * DVec2::new(0.8, 0.6);
+            let counted = Counted::at(&mono, film_distance_mm, place_mm, 280).irradiance_sr;
+            let off = (map.irradiance_sr(place_mm) - counted) / brightest;
+            println!("{name} {place_mm}: {counted:.4} sr, off by {off:.1e}");
+            assert!(off.abs() < 1.5e-3 && counted > 0.0, "{name} at {place_mm}: {off}");
+        }
+    }
+}

@@ -3,7 +3,13 @@
 use glam::{DMat3, DQuat, DVec2, DVec3};
 
 use super::{EDGE_MM, PupilBoundary, edge::EdgeSearch};
-use crate::{Placement, RayBatch, ReversedLens, exit_pupil};
+use crate::{Placement, RayBatch, ReversedLens};
+
+/// Directions across in a first look, and in a second where that finds no light.
+const LOOKS: [usize; 2] = [32, 96];
+/// How many of the directions that come nearest to the light lead to finer ones, and how often.
+const N_LEADERS: usize = 24;
+const FINER_ROUNDS: usize = 16;
 
 /// A point of the film that looks back into the lens, whose rays are named by their direction cosines.
 ///
@@ -74,24 +80,49 @@ impl<'a> FilmCone<'a> {
 
     /// Whether light is found to come from anywhere.
     pub fn is_lit(&self) -> bool {
-        exit_pupil::lit_point_mm(self.lens, &self.plane, self.point_mm).is_some()
+        self.lit().is_some()
     }
 
     /// Finds the region of cosines from which light comes: its center and its edge at `n_azimuths` from +x on, as
     /// [`PupilBoundary`] has them; `None` where no light gets through.
-    ///
-    /// It is looked for over the rim of the last surface.
     pub fn edge(&self, n_azimuths: usize) -> Option<(DVec2, Vec<f64>)> {
-        let lit_mm = exit_pupil::lit_point_mm(self.lens, &self.plane, self.point_mm)?;
-        let back = (lit_mm - self.point_mm).normalize();
-        let cosines = (self.axes.transpose() * back).truncate();
-        let clearance = self.clearances(&[cosines])[0];
-        if clearance <= 0.0 {
-            return None;
-        }
+        let lit = self.lit()?;
         let directions: Vec<DVec2> = PupilBoundary::azimuths(n_azimuths).collect();
-        let center = self.climbed((cosines, clearance));
+        let center = self.climbed(lit);
         Some((center, self.edge_mm(center, &directions, EDGE_MM)?))
+    }
+
+    /// Finds cosines from which light comes, and their clearance: over all directions, then about those that come nearest to the light.
+    fn lit(&self) -> Option<(DVec2, f64)> {
+        LOOKS.into_iter().find_map(|n_across| {
+            let mut step = 2.0 / n_across as f64;
+            let middle = |i: usize| (i as f64 + 0.5) * step - 1.0;
+            let all = (0..n_across * n_across).map(|i| DVec2::new(middle(i % n_across), middle(i / n_across)));
+            let mut leaders = self.best(all.filter(|cosines| cosines.length_squared() < 1.0).collect());
+            for _ in 0..FINER_ROUNDS {
+                let &(cosines, clearance) = leaders.first()?;
+                if clearance > 0.0 {
+                    return Some((cosines, clearance));
+                }
+                step *= 0.5;
+                let offsets = [-1.0, 0.0, 1.0].map(|y| [-1.0, 0.0, 1.0].map(|x| step * DVec2::new(x, y)));
+                let about = |leader: &(DVec2, f64)| {
+                    offsets.as_flattened().iter().map(|offset| leader.0 + *offset).collect::<Vec<_>>()
+                };
+                leaders = self.best(leaders.iter().flat_map(about).collect());
+            }
+            None
+        })
+    }
+
+    /// Returns the cosines of most clearance of these, the best first; none that do not get through whatever the rims.
+    fn best(&self, cosines: Vec<DVec2>) -> Vec<(DVec2, f64)> {
+        let clearances = self.clearances(&cosines);
+        let mut found: Vec<(DVec2, f64)> =
+            cosines.into_iter().zip(clearances).filter(|(_, clearance)| clearance.is_finite()).collect();
+        found.sort_by(|a, b| b.1.total_cmp(&a.1));
+        found.truncate(N_LEADERS);
+        found
     }
 }
 
