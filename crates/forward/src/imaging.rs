@@ -298,10 +298,16 @@ impl Imaging {
         rows.for_each_init(FieldsAlong::default, |seen, (row, line)| {
             map.along(&x_mm, raster.y_mm((first_row + row as i64) as f64), seen);
             for (i, sample) in line.iter_mut().enumerate() {
-                let is_beyond =
-                    is_masked && !self.raster.is_within(self.raster.position_of(seen.tan_x[i], seen.tan_y[i]));
                 let gain = seen.irradiance_sr[i];
-                *sample *= if is_beyond || gain.is_nan() { 0.0 } else { gain as f32 };
+                let seen_part = if is_masked {
+                    let position = self.raster.position_of(seen.tan_x[i], seen.tan_y[i]);
+                    let beside = if i > 0 { i - 1 } else { columns.min(2) - 1 };
+                    let step = DVec2::new(seen.tan_x[i] - seen.tan_x[beside], seen.tan_y[i] - seen.tan_y[beside]);
+                    self.raster.part_within(position, self.raster.view.focal_px * step.length())
+                } else {
+                    1.0
+                };
+                *sample *= if gain.is_nan() { 0.0 } else { gain as f32 * seen_part };
             }
         });
         picture

@@ -34,6 +34,19 @@ impl SceneRaster {
         [center_y_px - focal_px * tan_y, center_x_px + focal_px * tan_x]
     }
 
+    /// Returns how much of a pixel that is so many samples wide and has its middle at a row and column lies on samples.
+    pub(crate) fn part_within(&self, [row, column]: [f64; 2], width: f64) -> f32 {
+        let part = |position: f64, n: usize| {
+            let inside = (position + 0.5).min(n as f64 - 0.5 - position);
+            (0.5 + inside / width.max(1e-9)).clamp(0.0, 1.0)
+        };
+        if row.is_finite() && column.is_finite() {
+            (part(row, self.rows) * part(column, self.columns)) as f32
+        } else {
+            0.0
+        }
+    }
+
     /// Whether a row and column lie on a sample.
     pub(crate) fn is_within(&self, [row, column]: [f64; 2]) -> bool {
         is_within(row, self.rows) && is_within(column, self.columns)
