@@ -247,7 +247,11 @@ fn psf_tells_the_error_of_the_bank_that_it_draws_from() {
     assert!(within <= 0.01 && paper > 0.1, "{within} {paper}");
     let text = output(folder.path(), &[&common[..], &["--bank", "standard"]].concat());
     assert!(text.contains("rays interpolated between 9 fields") && text.contains("median"), "{text}");
-    common::check_error(folder.path(), &[&common[..], &["--bank-error", "0"]].concat(), &["bank_error", "above 0"]);
+    common::check_error(
+        folder.path(),
+        &[&common[..], &["--bank-error", "0"]].concat(),
+        &["--bank-error is 0", "expected"],
+    );
 }
 
 #[test]
@@ -541,7 +545,7 @@ fn hurb_widens_by_the_gamma_asked_for() {
     assert!((widths[1] / widths[0] - 2.0).abs() < 0.01 && widths[0] == widths[2], "{widths:?}");
     assert!((width_um(&["--diffraction", "hurb-scene3d", "--gamma", "1"]) - widths[0]).abs() < 1e-12);
     for (options, words) in [
-        (&["--diffraction", "hurb", "--gamma", "-1"][..], ["gamma is -1", "above 0"]),
+        (&["--diffraction", "hurb", "--gamma", "-1"][..], ["--gamma is -1", "expected"]),
         (&["--gamma", "1"], ["--gamma", "--diffraction hurb"]),
         (&["--diffraction", "wave", "--gamma", "1"], ["--gamma", "--diffraction hurb"]),
     ] {
