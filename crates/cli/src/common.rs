@@ -14,8 +14,8 @@ pub(crate) struct Common {
     #[arg(long, global = true, value_name = "BYTES", value_parser = parse_bytes)]
     pub(crate) memory: Option<u64>,
     /// Uses N threads, at most 4 per core [default: 1 per core]; results do not depend on it
-    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
-    pub(crate) threads: Option<u16>,
+    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub(crate) threads: Option<u32>,
     /// Draws all noise from this seed [default: the camera file's, or 1]
     #[arg(long, global = true, value_name = "N")]
     pub(crate) seed: Option<u64>,

@@ -102,7 +102,7 @@ fn dispatch(Cli { command, common }: Cli) -> anyhow::Result<()> {
 const THREADS_PER_CORE: usize = 4;
 
 fn use_threads(common: &Common) -> anyhow::Result<()> {
-    let Some(asked) = common.threads.map(usize::from) else { return Ok(()) };
+    let Some(asked) = common.threads.map(|n| n as usize) else { return Ok(()) };
     let most = THREADS_PER_CORE * std::thread::available_parallelism().map_or(1, usize::from);
     let n_threads = asked.min(most);
     if n_threads < asked {

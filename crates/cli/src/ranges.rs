@@ -2,7 +2,7 @@
 
 use anyhow::bail;
 use clap::{ArgMatches, Command};
-use dioptric_pipeline::{parse_pairs, range_of};
+use dioptric_pipeline::{parse_numbers, parse_pairs, range_of};
 
 /// Checks every number that was given, or each of a list, against the range of its option.
 ///
@@ -34,8 +34,8 @@ fn numbers(matches: &ArgMatches, id: &str) -> Vec<f64> {
         return values.map(|n| f64::from(*n)).collect();
     }
     let Ok(Some(lists)) = matches.try_get_many::<String>(id) else { return Vec::new() };
-    let of_list = |list: &String| parse_pairs("a list", list).unwrap_or_default();
-    lists.flat_map(of_list).flatten().collect()
+    let pairs = |list: &str| parse_pairs("a list", list).unwrap_or_default().into_flattened();
+    lists.flat_map(|list| parse_numbers("a list", list).unwrap_or_else(|_| pairs(list))).collect()
 }
 
 #[cfg(test)]
@@ -76,7 +76,10 @@ mod tests {
 
     #[test]
     fn what_is_beyond_a_range_is_named() {
-        assert_eq!(said("dioptric run --fov-deg 20 --noise all --bracket-stops -4,-2,0"), None);
+        assert_eq!(
+            said("dioptric run --fov-deg 20 --noise all --bracket-stops -4,-2,0 --wavelengths-nm 400:700:10"),
+            None
+        );
         assert_eq!(said("dioptric psf a.ron --distances-mm 2000,inf --fields-deg 0,5/10"), None);
         for (line, expected) in [
             ("dioptric run --fov-deg 1e-9", "--fov-deg is 0.000000001, expected 0.001 to 179 degrees"),

@@ -194,7 +194,7 @@ fn numbers_that_make_no_sense_are_named() {
         (vec!["psf", "dgauss-50mm", "--focus-mm", "2000", "--distances-mm", "-5"], "distances"),
         (vec!["psf", "dgauss-50mm", "--focus-mm", "1"], "1 mm"),
         (vec!["psf", "dgauss-50mm", "--focus-mm", "2000", "--stop-mm", "80"], "80"),
-        (vec!["run", "camera.ron", "--f-number", "-4"], "FNumber"),
+        (vec!["run", "camera.ron", "--f-number", "-4"], "--f-number is -4"),
         (vec!["lens", "info", "dgauss-50mm", "--wavelengths-nm", "blue"], "blue"),
     ] {
         let run = common::dioptric(folder.path(), &arguments);
@@ -277,7 +277,7 @@ fn flat_scenes_are_stated_once() {
     assert!(!alone.status.success() && String::from_utf8_lossy(&alone.stderr).contains("--distance-mm"));
     let both = flat(&["--width-mm", "30", "--distance-mm", "500", "--fov-deg", "3"]);
     assert!(!common::dioptric(folder.path(), &both).status.success());
-    check_error(folder.path(), &flat(&["--width-mm", "-3", "--distance-mm", "500"]), &["width_mm is -3"]);
+    check_error(folder.path(), &flat(&["--width-mm", "-3", "--distance-mm", "500"]), &["--width-mm is -3"]);
     let world = ["run", "--width-mm", "30", "--distance-mm", "500", "--out", "out"];
     check_error(folder.path(), &world, &["flat is the size of what has depths of its own"]);
 }

@@ -530,7 +530,7 @@ fn hurb_widens_by_the_gamma_asked_for() {
     assert!((widths[1] / widths[0] - 2.0).abs() < 0.01 && widths[0] == widths[2], "{widths:?}");
     assert!((width_um(&["--diffraction", "hurb-scene3d", "--gamma", "1"]) - widths[0]).abs() < 1e-12);
     for (options, words) in [
-        (&["--diffraction", "hurb", "--gamma", "-1"][..], ["gamma is -1", "above 0"]),
+        (&["--diffraction", "hurb", "--gamma", "-1"][..], ["--gamma is -1", "expected"]),
         (&["--gamma", "1"], ["--gamma", "--diffraction hurb"]),
         (&["--diffraction", "wave", "--gamma", "1"], ["--gamma", "--diffraction hurb"]),
     ] {

@@ -315,7 +315,7 @@ fn bad_input_ends_in_one_sentence() {
         (&["color", "chart.png", "--corners", "0,0,900,0,900,900,0,900"], &["within"]),
         (&["color", "chart.png", "--illuminant", "D66"], &["D66", "D65"]),
         (&["color", "chart.png", "--against", "even.png"], &["280", "64 × 64"]),
-        (&["color", "chart.png", "--against", "chart.png", "--pixels-per-degree", "0"], &["pixels_per_degree"]),
+        (&["color", "chart.png", "--against", "chart.png", "--pixels-per-degree", "0"], &["--pixels-per-degree is 0"]),
     ] {
         check_error(path, &[&["measure"], arguments].concat(), words);
     }

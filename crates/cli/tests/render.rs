@@ -215,7 +215,7 @@ fn light_field_ends_in_views_and_depth() {
     let plain = LIGHT_FIELD.replace("light_field: Array", "// Array");
     fs::write(folder.path().join("plain.ron"), plain).unwrap();
     check_error(folder.path(), &["lightfield", "plain.ron", "--quiet"], &["light_field", "the camera has none"]);
-    check_error(folder.path(), &["lightfield", "camera.ron", "--refocus-m", "0"], &["--refocus-m has 0"]);
+    check_error(folder.path(), &["lightfield", "camera.ron", "--refocus-m", "0"], &["--refocus-m is 0"]);
 }
 
 /// The demo's lens stands before it unless another is named; what it cannot have is refused by name.

@@ -145,7 +145,7 @@ fn what_cannot_be_asked_is_refused_in_one_sentence() {
     let folder = folder();
     for (options, words) in [
         (&["--also", "electrons,jpeg"][..], &["--also", "'jpeg'", "raw-dng"][..]),
-        (&["--burst", "0"], &["Burst", "0"]),
+        (&["--burst", "0"], &["--burst is 0"]),
         (&["--bracket-stops", "0,many"], &["--bracket-stops", "many"]),
         (&["--exit-pupil-mm", "0"], &["exit_pupil"]),
         (&["--noise", "hiss"], &["'hiss'", "dark-current"]),
@@ -153,7 +153,7 @@ fn what_cannot_be_asked_is_refused_in_one_sentence() {
         (&["--white", "patch:0,0,9000,2"], &["patch", "within"]),
         (&["--demosaic", "best"], &["'best'", "directional-ratio"]),
         (&["--highlights", "burn"], &["'burn'", "reconstruct"]),
-        (&["--analog-gain", "-1"], &["analog_gain"]),
+        (&["--analog-gain", "-1"], &["--analog-gain is -1"]),
         (&["--illuminant", "0.9,0.3"], &["chromaticity", "0.9"]),
     ] {
         let arguments = [&["sense", "light.exr", "--sensor", "small.ron", "--out", "out"], options].concat();

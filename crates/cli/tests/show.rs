@@ -99,8 +99,8 @@ fn what_cannot_be_shown_is_refused() {
     };
     refused(&["--display", "lcd"], &["lcd", "display-p3"]);
     refused(&["--display", "lcd.ron"], &["lcd.ron", "No such file"]);
-    refused(&["--distance-m", "0"], &["distance of the display", "above 0"]);
-    refused(&["--white-cd-m2", "-5"], &["white_cd_m2"]);
+    refused(&["--distance-m", "0"], &["--distance-m is 0", "expected"]);
+    refused(&["--white-cd-m2", "-5"], &["--white-cd-m2 is -5"]);
     refused(&["--wavelengths-nm", "500,600"], &["tell its three primaries apart"]);
     fs::write(folder.path().join("wrong.ron"), "(name: \"x\", brightness: 3)").unwrap();
     check_error(

@@ -8,7 +8,7 @@ import pytest
 @pytest.mark.parametrize(
     ("change", "error", "words"),
     [
-        ({"f_number": -4}, ValueError, "FNumber is -4, expected a finite number above 0"),
+        ({"f_number": -4}, ValueError, "FNumber is -4, expected 0.05 to 100000"),
         ({"f_number": 0.3}, ValueError, "opens to f/"),
         ({"f_number": "wide"}, TypeError, "f_number is str, expected a number"),
         ({"focus_mm": "far"}, ValueError, "focus_mm is 'far', expected a distance in mm"),
