@@ -211,7 +211,8 @@ pub(crate) struct RunArgs {
     /// Sensor, a file or the name of a built-in one
     #[arg(long, value_name = "SENSOR", help_heading = heading::FILM)]
     pub(crate) sensor: Option<String>,
-    /// Size of the film: that of the sensor, or what the scene covers, a pixel a sample
+    /// Size of the film: that of the sensor, or what the scene covers of it, or a pixel for each sample of the scene [default: with --sensor
+    /// 'field', and 'sensor' before the still life and worlds; else that of the camera]
     #[arg(long, value_name = "SIZE", value_enum, conflicts_with_all = ["pixels", "pixel_um"], help_heading = heading::FILM)]
     pub(crate) film: Option<FilmKind>,
     /// Pixels of the film, e.g. 640x480; without --pixel-um the film stays as large as it is [default: those of the camera]
@@ -274,6 +275,8 @@ fn parse_dual_pixel(text: &str) -> Result<DualPixelArg, PipelineError> {
 pub(crate) enum FilmKind {
     /// The pixels of the sensor
     Sensor,
+    /// The pixels of the sensor, as many as the scene's field covers
+    Field,
     /// As many pixels as the scene has samples, which see the scene's field
     Scene,
 }
@@ -327,6 +330,9 @@ pub(crate) struct FrameArgs {
 pub(crate) struct DevelopArgs {
     /// Raw frame, DNG: a mosaic or linear planes of 8 to 16 bits, plain or as lossless JPEG
     pub(crate) raw: PathBuf,
+    /// Takes the frame as the sensor gave it: without the corrections that the file asks for (opcodes: gains, bad pixels, distortion)
+    #[arg(long, help_heading = heading::EXPOSURE)]
+    pub(crate) ignore_opcodes: bool,
     /// Folder for the results
     #[arg(long, short, value_name = "DIR", help_heading = heading::RESULTS)]
     pub(crate) out: PathBuf,

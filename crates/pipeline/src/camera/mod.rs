@@ -196,6 +196,8 @@ pub enum FilmSpec {
     /// As many pixels as the scene has samples, of such a pitch that they see the scene's field. The sensor's
     /// pixels are taken to be of this size.
     Scene,
+    /// The pixels of the sensor, as many of them as the scene's field covers.
+    Field,
     /// Pixels of the user's choice. The sensor's pixels are taken to be of this size.
     Pixels {
         /// Columns.

@@ -130,6 +130,8 @@ pub(crate) enum Raster {
     Pixels(Film),
     /// As many as the scene has samples.
     Scene,
+    /// As many of these as the scene's field covers.
+    Field(Film),
 }
 
 /// The point spread functions of the lens.
@@ -324,8 +326,10 @@ impl SceneInputs {
 impl IrradianceInputs {
     pub(crate) fn of(camera: &Camera, given: &GivenParts, sensor: &Sensor, quality: Quality) -> Self {
         let mut scene = SceneInputs::of(camera, given, quality);
+        let of_sensor = Film::centered(sensor.rows, sensor.columns, sensor.pixel_pitch_um);
         let raster = match camera.film {
-            FilmSpec::Sensor => Raster::Pixels(Film::centered(sensor.rows, sensor.columns, sensor.pixel_pitch_um)),
+            FilmSpec::Sensor => Raster::Pixels(of_sensor),
+            FilmSpec::Field => Raster::Field(of_sensor),
             FilmSpec::Pixels { columns, rows, pitch_um } => Raster::Pixels(Film::centered(rows, columns, pitch_um)),
             FilmSpec::Scene => Raster::Scene,
         };
