@@ -334,7 +334,7 @@ impl IrradianceInputs {
             FilmSpec::Scene => Raster::Scene,
         };
         let lens = LensInputs::of(camera, given);
-        if let Raster::Pixels(film) = &raster {
+        if let Raster::Pixels(film) | Raster::Field(film) = &raster {
             let is_large = given.scene.is_none() && is_large_picture(&camera.scene);
             scene.geometry.seen_by = is_large.then(|| (Box::new(lens.clone()), film.pitch_um));
         }
