@@ -9,6 +9,7 @@ mod noise_charts;
 mod open;
 mod points;
 mod region;
+mod region_statistics;
 mod texture;
 
 use serde::Serialize;
@@ -20,6 +21,7 @@ pub use noise::{BenchRequest, NoiseData, NoiseDataSheet, NoisePoint, measure_ben
 pub use open::{CodeCurve, MeasuredPicture};
 pub use points::{PointRequest, PointRow, PointSet};
 pub use region::PixelRegion;
+pub use region_statistics::{BandMean, ColorDifference, RegionChannel, RegionColor, RegionMeasurement, RegionRequest};
 pub use texture::{TextureChannel, TextureCurve, TextureMeasurement, TextureNoiseRequest, TextureRequest};
 
 use crate::LineChart;
