@@ -321,6 +321,19 @@ pub(crate) struct FrameArgs {
     /// Factor on the voltage after the pixel [default: 1]
     #[arg(long, value_name = "G", help_heading = heading::EXPOSURE)]
     pub(crate) analog_gain: Option<f64>,
+    /// Readout of dual-gain pixels: low or high [default: low]
+    #[arg(long, value_name = "MODE", help_heading = heading::EXPOSURE)]
+    pub(crate) gain_mode: Option<String>,
+    /// Temperature of the chip, °C [default: 25]
+    #[arg(long, value_name = "C", help_heading = heading::EXPOSURE)]
+    pub(crate) temperature_c: Option<f64>,
+    /// What an automatic exposure looks at: mean, center, peak, percentile:99 (of all pixels) or filters:99 (of each filter's pixels, of which the
+    /// brightest counts) [default: percentile:99]
+    #[arg(long, value_name = "METERING", help_heading = heading::EXPOSURE)]
+    pub(crate) metering: Option<String>,
+    /// Which chip of its kind the sensor is, a seed: of PRNU, DSNU, columns and defects [default: 0]
+    #[arg(long, value_name = "N", help_heading = heading::EXPOSURE)]
+    pub(crate) chip_seed: Option<u64>,
     #[command(flatten)]
     pub(crate) picture: PictureArgs,
 }

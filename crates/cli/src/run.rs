@@ -292,6 +292,7 @@ fn change_sensor(camera: &mut Camera, arguments: &RunArgs) -> anyhow::Result<()>
     if let Some(time_s) = arguments.exposure_s {
         camera.exposure = with_exposure_s(camera.exposure, time_s);
     }
+    camera.chip_seed = arguments.frames.chip_seed.unwrap_or(camera.chip_seed);
     let options = sensor_options(&arguments.frames);
     Ok(options.apply(&mut camera.noise, &mut camera.exposure, &mut camera.processing)?)
 }
@@ -301,6 +302,9 @@ pub(crate) fn sensor_options(arguments: &FrameArgs) -> SensorOptions {
     SensorOptions {
         noise: arguments.noise.clone(),
         analog_gain: arguments.analog_gain,
+        gain_mode: arguments.gain_mode.clone(),
+        temperature_c: arguments.temperature_c,
+        metering: arguments.metering.clone(),
         picture: arguments.picture.0.clone(),
     }
 }

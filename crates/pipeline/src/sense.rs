@@ -41,6 +41,8 @@ pub struct SenseRequest {
     pub f_number: Option<f64>,
     /// The seed of all noise.
     pub seed: u64,
+    /// The seed of what stays with the chip.
+    pub chip_seed: u64,
     /// What is written besides the picture and the report; of irradiance and depth there is nothing to write.
     pub outputs: Outputs,
 }
@@ -142,7 +144,7 @@ impl SenseRequest {
         let shutter = ShutterInputs {
             exposure: self.exposure,
             frames: self.frames.clone(),
-            noise: Noise { sources: self.noise, ..Noise::all(self.seed) },
+            noise: Noise { sources: self.noise, fixed_pattern_seed: self.chip_seed, ..Noise::all(self.seed) },
         };
         let samples_per_px = light.pitch_um.map_or(1.0, |sample_um| sensor.pixel_pitch_um / sample_um);
         let frames = expose(&shutter, &exposed, &rate, Some(&MovedLight { light, samples_per_px }))?;

@@ -77,7 +77,7 @@ impl ItemKey {
             of(&(camera.blur, &camera.light_field)),
             of(&(&scene.illuminant, scene.illuminance_lux, &scene.light, scene.mean_luminance_cd_m2)),
             of(&(&camera.sensor, &camera.filters)),
-            of(&(camera.exposure, camera.noise, &camera.frames, camera.seed)),
+            of(&(camera.exposure, camera.noise, &camera.frames, camera.seed, camera.chip_seed)),
         ];
         let imaging = Camera {
             name: String::new(),

@@ -122,6 +122,9 @@ pub struct Camera {
     /// The seed of all noise.
     #[serde(default = "one")]
     pub seed: u64,
+    /// Which chip of its kind the sensor is: the seed of what stays with it, PRNU, DSNU, columns and defects.
+    #[serde(default)]
+    pub chip_seed: u64,
     /// What is written.
     #[serde(default)]
     pub outputs: Outputs,

@@ -428,7 +428,7 @@ impl PictureInputs {
             shutter: ShutterInputs {
                 exposure: camera.exposure,
                 frames: camera.frames.clone(),
-                noise: Noise { sources: camera.noise, ..Noise::all(camera.seed) },
+                noise: Noise { sources: camera.noise, fixed_pattern_seed: camera.chip_seed, ..Noise::all(camera.seed) },
             },
         };
         Ok(Self { frames, processing: camera.processing.clone() })
