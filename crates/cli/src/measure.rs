@@ -384,14 +384,25 @@ fn noise_table(data: &NoiseData) -> Result<String, std::fmt::Error> {
         writeln!(text, "The black level was raised by {dn} DN, since the sensor's own level clips the dark noise.\n")?;
     }
     let sheet = data.data_sheet.as_ref();
+    // Below a dark variance of 0.24 DN² rounding hides the noise: the most that it may be is stated.
+    let dark_noise = if data.dark_noise_is_limit { "dark noise σd, e, less than" } else { "dark noise σd, e" };
     writeln!(text, "{:<34} {:>12} {:>12}", "", "measured", "data sheet")?;
     for (name, measured, expected, digits) in [
         ("system gain K, DN/e", Some(data.gain_dn_per_e), sheet.map(|s| s.gain_dn_per_e), 5),
         ("quantum efficiency", data.quantum_efficiency, sheet.map(|s| s.quantum_efficiency), 4),
-        ("dark noise σd, e", Some(data.dark_noise_e), sheet.map(|s| s.dark_noise_e), 3),
+        (dark_noise, Some(data.dark_noise_e), sheet.map(|s| s.dark_noise_e), 3),
         ("saturation, e", Some(data.saturation_e), sheet.map(|s| s.saturation_e), 0),
         ("DSNU, e", data.dsnu_e, sheet.map(|s| s.dsnu_e), 3),
+        ("  of rows", data.dsnu_parts_e.map(|p| p.row), None, 3),
+        ("  of columns", data.dsnu_parts_e.map(|p| p.column), None, 3),
+        ("  of single pixels", data.dsnu_parts_e.map(|p| p.pixel), None, 3),
         ("PRNU, %", data.prnu_percent, sheet.map(|s| s.prnu_percent), 3),
+        ("  of rows", data.prnu_parts_percent.map(|p| p.row), None, 3),
+        ("  of columns", data.prnu_parts_percent.map(|p| p.column), None, 3),
+        ("  of single pixels", data.prnu_parts_percent.map(|p| p.pixel), None, 3),
+        ("nonwhiteness of DSNU along rows", data.patterns.as_ref().map(|p| p.dsnu_nonwhiteness[0]), None, 2),
+        ("nonwhiteness of DSNU along columns", data.patterns.as_ref().map(|p| p.dsnu_nonwhiteness[1]), None, 2),
+        ("linearity error, %", data.linearity_error_percent, None, 3),
         ("dark current by mean, e/s", data.dark_current_by_mean_e_per_s, sheet.map(|s| s.dark_current_e_per_s), 3),
         (
             "dark current by variance, e/s",

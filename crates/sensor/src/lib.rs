@@ -103,7 +103,7 @@ pub use motion::Moved;
 pub use noise::{Noise, NoiseSource, NoiseSources};
 pub use optical_filter::OpticalFilter;
 pub use perspective::Perspective;
-pub use photon_transfer::{DarkCurrentEstimate, FlatPoint, PhotonTransfer};
+pub use photon_transfer::{DarkCurrentEstimate, FlatPoint, Linearity, PhotonTransfer};
 pub use picture::Picture;
 pub use pixel_stack::{
     Interfaces, Microlens, MicrolensOutline, MicrolensPower, MicrolensShift, PixelStack, QuantumEfficiencyOf,
@@ -122,4 +122,4 @@ pub use similarity::{psnr_db, ssim};
 pub use space::ColorSpace;
 pub use texture::{TextureNoise, TextureResponse, TextureSpectra};
 pub use tone::{Brightness, ToneCurve};
-pub use uniformity::{FrameStack, NonUniformity};
+pub use uniformity::{FrameStack, NonUniformity, Parts, Spectrogram};

@@ -17,7 +17,7 @@ use serde::Serialize;
 pub use chart::{ChartMeasurement, ChartRequest, PatchRow};
 pub use compare::{CompareRequest, Comparison, DeltaESummary, PictureViewing};
 pub use edge::{EdgeChannel, EdgeMeasurement, EdgeRequest, UnmeasuredChannel};
-pub use noise::{BenchRequest, NoiseData, NoiseDataSheet, NoisePoint, measure_bench, measure_frames};
+pub use noise::{BenchRequest, NoiseData, NoiseDataSheet, NoisePoint, SpatialPatterns, measure_bench, measure_frames};
 pub use open::{CodeCurve, MeasuredPicture};
 pub use points::{PointRequest, PointRow, PointSet};
 pub use region::PixelRegion;
