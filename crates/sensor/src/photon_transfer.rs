@@ -6,7 +6,7 @@
 use ndarray::Array2;
 use rayon::prelude::*;
 
-use crate::{NonUniformity, SensorError};
+use crate::SensorError;
 
 /// The variance of rounding to whole numbers.
 const QUANTISATION_VARIANCE: f64 = 1.0 / 12.0;
@@ -181,17 +181,14 @@ impl PhotonTransfer {
         self.saturation_e.sqrt()
     }
 
-    /// Returns the signal-to-noise ratio of one frame with what differs from pixel to pixel, for a number of electrons (EMVA 1288, equation
-    /// 29).
-    pub fn total_snr(&self, electrons: f64, uniformity: &NonUniformity) -> f64 {
-        let temporal = electrons + self.dark_noise_e.powi(2) + QUANTISATION_VARIANCE / self.gain_dn_per_e.powi(2);
-        let spatial = uniformity.dsnu_e.powi(2) + (uniformity.prnu_fraction * electrons).powi(2);
-        electrons / (temporal + spatial).sqrt()
-    }
-
     /// Returns the signal-to-noise ratio that the linear model gives for a number of electrons.
     pub fn model_snr(&self, electrons: f64) -> f64 {
-        electrons / (electrons + self.dark_noise_e.powi(2) + QUANTISATION_VARIANCE / self.gain_dn_per_e.powi(2)).sqrt()
+        electrons / self.variance_e2(electrons).sqrt()
+    }
+
+    /// Returns the temporal variance that the linear model gives for a number of electrons.
+    pub(crate) fn variance_e2(&self, electrons: f64) -> f64 {
+        electrons + self.dark_noise_e.powi(2) + QUANTISATION_VARIANCE / self.gain_dn_per_e.powi(2)
     }
 }
 

@@ -4,7 +4,7 @@ use dioptric_fft::Planner;
 use ndarray::{Array2, Axis, Zip};
 use serde::Serialize;
 
-use crate::{SensorError, photon_transfer::check_size};
+use crate::{PhotonTransfer, SensorError, photon_transfer::check_size};
 
 /// Frames under equal light, added up one by one, so that no more than two are ever held.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -171,6 +171,13 @@ impl FrameStack {
 }
 
 impl NonUniformity {
+    /// Returns the signal-to-noise ratio of one frame, with what differs from pixel to pixel, for a number of electrons (EMVA 1288, equation
+    /// 29).
+    pub fn total_snr(&self, transfer: &PhotonTransfer, electrons: f64) -> f64 {
+        let spatial = self.dsnu_e.powi(2) + (self.prnu_fraction * electrons).powi(2);
+        electrons / (transfer.variance_e2(electrons) + spatial).sqrt()
+    }
+
     /// Returns the non-uniformities that stacks of dark frames and of frames at half saturation show.
     ///
     /// # Errors

@@ -501,7 +501,7 @@ fn noise_points(transfer: &PhotonTransfer, uniformity: Option<&NonUniformity>, a
                 electrons,
                 snr: is_lit.then(|| transfer.snr(point)),
                 model_snr: (index > 0).then(|| transfer.model_snr(electrons)),
-                total_snr: uniformity.filter(|_| index > 0).map(|u| transfer.total_snr(electrons, u)),
+                total_snr: uniformity.filter(|_| index > 0).map(|u| u.total_snr(transfer, electrons)),
             }
         })
         .collect()
