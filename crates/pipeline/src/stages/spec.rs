@@ -221,7 +221,7 @@ fn check_patch(camera: &Camera, sensor: &Sensor) -> Result<(), PipelineError> {
         (Some(crop), _) => (crop.columns, crop.rows),
         (None, FilmSpec::Sensor) => (sensor.columns, sensor.rows),
         (None, FilmSpec::Pixels { columns, rows, .. }) => (columns, rows),
-        (None, FilmSpec::Scene) => return Ok(()),
+        (None, FilmSpec::Scene | FilmSpec::Field) => return Ok(()),
     };
     let is_within = left.saturating_add(width) <= columns && top.saturating_add(height) <= rows && width * height > 0;
     if is_within {
