@@ -14,9 +14,9 @@ use dioptric_analysis::{Run, RunReport, RunTimes};
 use dioptric_files::memory;
 use dioptric_pipeline::{
     BankSpec, BlurSpec, Camera, Clock as PartClock, Diffraction, FilmSpec, FlatSize, FocusSpec, FrameFile, FramesSpec,
-    ImagingTimes, KeptCamera, LensReadOptions, LensSpec, Progress, Quality, SceneSource, SceneSpec,
-    SensorOptions, SensorSpec, Silent, Stage, Staged, StopSpec, WavelengthSpec, display, number, parse_illuminant,
-    parse_numbers, with_exposure_s,
+    ImagingTimes, KeptCamera, LensReadOptions, LensSpec, Progress, Quality, SceneSource, SceneSpec, SensorOptions,
+    SensorSpec, Silent, Stage, Staged, StopSpec, WavelengthSpec, display, number, parse_illuminant, parse_numbers,
+    with_exposure_s,
 };
 use dioptric_report::write_run;
 use dioptric_spectrum::Cancel;

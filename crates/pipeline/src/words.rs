@@ -33,7 +33,7 @@ pub fn with_analog_gain(control: ExposureControl, analog_gain: f64) -> ExposureC
 }
 
 /// Returns an exposure whose shot is changed; its time stays that of the hand or the longest.
-pub fn with_shot(control: ExposureControl, change: impl FnOnce(Exposure) -> Exposure) -> ExposureControl {
+pub(crate) fn with_shot(control: ExposureControl, change: impl FnOnce(Exposure) -> Exposure) -> ExposureControl {
     match control {
         ExposureControl::Manual(exposure) => ExposureControl::Manual(change(exposure)),
         ExposureControl::Auto(auto) => ExposureControl::Auto(AutoExposure { limit: change(auto.limit), ..auto }),

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use dioptric_scene::read_spectral_exr;
-use dioptric_spectrum::{Bands, ColorTemperature, Lab, Observer, Quantity, Xyz, delta_e_2000};
+use dioptric_spectrum::{ColorTemperature, Lab, Observer, Quantity, Xyz, delta_e_2000};
 use ndarray::{Array2, ArrayView2, Axis};
 use serde::Serialize;
 
@@ -247,12 +247,13 @@ impl RegionChannel {
         samples.sort_unstable_by(f64::total_cmp);
         let (least, most) = (samples.first().copied().unwrap_or(0.0), samples.last().copied().unwrap_or(0.0));
         let percentile = |percent: f64| (percent, samples[((n - 1) as f64 * percent / 100.0).round() as usize]);
-        let mut sums = [vec![(0.0, 0.0); n_rows], vec![(0.0, 0.0); n_columns]];
+        let mut row_sums = vec![(0.0, 0.0); n_rows];
+        let mut column_sums = vec![(0.0, 0.0); n_columns];
         let mut blocks = vec![(0.0, 0.0); BLOCKS * BLOCKS];
         let mut histogram = vec![0; N_BARS];
         for ((row, column), value) in own() {
             let block = (row * BLOCKS / n_rows) * BLOCKS + column * BLOCKS / n_columns;
-            for sum in [&mut sums[0][row], &mut sums[1][column], &mut blocks[block]] {
+            for sum in [&mut row_sums[row], &mut column_sums[column], &mut blocks[block]] {
                 *sum = (sum.0 + value, sum.1 + 1.0);
             }
             let share = if most > least { (value - least) / (most - least) } else { 0.0 };
@@ -261,7 +262,7 @@ impl RegionChannel {
         let lines = |sums: &[(f64, f64)]| -> Vec<f64> {
             sums.iter().filter(|(_, n)| *n > 0.0).map(|(sum, n)| sum / n).collect()
         };
-        let (rows, columns) = (lines(&sums[0]), lines(&sums[1]));
+        let (rows, columns) = (lines(&row_sums), lines(&column_sums));
         // Of independent samples the mean of a line scatters by their deviation over the root of its length.
         let beyond = |lines: &[f64]| {
             let of_samples = deviation * deviation * lines.len() as f64 / n.max(1) as f64;
