@@ -211,7 +211,8 @@ pub(crate) struct RunArgs {
     /// Sensor, a file or the name of a built-in one
     #[arg(long, value_name = "SENSOR", help_heading = heading::FILM)]
     pub(crate) sensor: Option<String>,
-    /// Size of the film: that of the sensor, or what the scene covers, a pixel a sample
+    /// Size of the film: that of the sensor, or what the scene covers of it, or a pixel for each sample of the scene [default: with --sensor
+    /// 'field', and 'sensor' before the still life and worlds; else that of the camera]
     #[arg(long, value_name = "SIZE", value_enum, conflicts_with_all = ["pixels", "pixel_um"], help_heading = heading::FILM)]
     pub(crate) film: Option<FilmKind>,
     /// Pixels of the film, e.g. 640x480; without --pixel-um the film stays as large as it is [default: those of the camera]
@@ -277,6 +278,8 @@ fn parse_dual_pixel(text: &str) -> Result<DualPixelArg, PipelineError> {
 pub(crate) enum FilmKind {
     /// The pixels of the sensor
     Sensor,
+    /// The pixels of the sensor, as many as the scene's field covers
+    Field,
     /// As many pixels as the scene has samples, which see the scene's field
     Scene,
 }
@@ -321,6 +324,19 @@ pub(crate) struct FrameArgs {
     /// Factor on the voltage after the pixel [default: 1]
     #[arg(long, value_name = "G", help_heading = heading::EXPOSURE)]
     pub(crate) analog_gain: Option<f64>,
+    /// Readout of dual-gain pixels: low or high [default: low]
+    #[arg(long, value_name = "MODE", help_heading = heading::EXPOSURE)]
+    pub(crate) gain_mode: Option<String>,
+    /// Temperature of the chip, °C [default: 25]
+    #[arg(long, value_name = "C", help_heading = heading::EXPOSURE)]
+    pub(crate) temperature_c: Option<f64>,
+    /// What an automatic exposure looks at: mean, center, peak, percentile:99 (of all pixels) or filters:99 (of each filter's pixels, of which the
+    /// brightest counts) [default: percentile:99]
+    #[arg(long, value_name = "METERING", help_heading = heading::EXPOSURE)]
+    pub(crate) metering: Option<String>,
+    /// Which chip of its kind the sensor is, a seed: of PRNU, DSNU, columns and defects [default: 0]
+    #[arg(long, value_name = "N", help_heading = heading::EXPOSURE)]
+    pub(crate) chip_seed: Option<u64>,
     #[command(flatten)]
     pub(crate) picture: PictureArgs,
 }
@@ -330,6 +346,9 @@ pub(crate) struct FrameArgs {
 pub(crate) struct DevelopArgs {
     /// Raw frame, DNG: a mosaic or linear planes of 8 to 16 bits, plain or as lossless JPEG
     pub(crate) raw: PathBuf,
+    /// Takes the frame as the sensor gave it: without the corrections that the file asks for (opcodes: gains, bad pixels, distortion)
+    #[arg(long, help_heading = heading::EXPOSURE)]
+    pub(crate) ignore_opcodes: bool,
     /// Folder for the results
     #[arg(long, short, value_name = "DIR", help_heading = heading::RESULTS)]
     pub(crate) out: PathBuf,

@@ -19,7 +19,10 @@ pub(crate) fn run(arguments: &DevelopArgs, common: &Common) -> anyhow::Result<()
     arguments.picture.0.apply(&mut processing)?;
     let also = arguments.also.as_deref().map_or(Ok(Vec::new()), FrameFile::parse_list)?;
     let staged = Staged::folder(&arguments.out)?;
-    let developed = DevelopedFile::read(&arguments.raw, processing)?;
+    let developed = match arguments.ignore_opcodes {
+        true => DevelopedFile::read_uncorrected(&arguments.raw, processing)?,
+        false => DevelopedFile::read(&arguments.raw, processing)?,
+    };
     let report = DngReport::new(&developed);
     developed.write_pictures(&also, staged.path())?;
     write_json(&staged.path().join("report.json"), &report)?;
@@ -58,6 +61,9 @@ fn table(report: &DngReport) -> Result<String, std::fmt::Error> {
     write!(text, "{}", number(report.shot.focal_length_mm, " mm"))?;
     write!(text, "{}", report.shot.f_number.map_or_else(String::new, |value| format!("  f/{value}")))?;
     writeln!(text, "{}", report.shot.iso_speed.map_or_else(String::new, |value| format!("  ISO {value}")))?;
+    if !report.opcodes.is_empty() {
+        writeln!(text, "corrected as the file asks: {}", report.opcodes.join(", "))?;
+    }
     let gains: Vec<String> = report.white_balance.iter().map(|gain| format!("{gain:.3}")).collect();
     write!(text, "white by {}", gains.join(" "))?;
     writeln!(text, "{}", report.white_kelvin.map_or_else(String::new, |kelvin| format!(", {kelvin:.0} K")))?;

@@ -55,6 +55,13 @@ const EXAMPLES: &[(&str, &[&str])] = &[
     ("sweep pack", &["dioptric sweep pack plan.ron --webdataset pictures.tar --items-per-tar 1000"]),
     ("measure mtf", &["dioptric measure mtf edge.png --region 20,20,120,120 --out edge/"]),
     ("measure spot", &["dioptric measure spot stars.png --pixel-um 3.45"]),
+    (
+        "measure region",
+        &[
+            "dioptric measure region shot/irradiance.exr --region 200,100,50,50",
+            "dioptric measure region picture.png --region 20,20,40,40 --reference 80,20,40,40 --json",
+        ],
+    ),
     ("measure noise", &["dioptric measure noise --sensor imx363 --out bench/"]),
     ("measure color", &["dioptric measure color picture.png --against reference.png"]),
     ("measure texture", &["dioptric measure texture leaves.png --reference ideal.png"]),

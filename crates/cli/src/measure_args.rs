@@ -13,6 +13,8 @@ pub(crate) enum MeasureCommand {
     Texture(TextureArgs),
     /// Pictures of points: centroid, second moments, encircled energy
     Spot(SpotArgs),
+    /// Numbers of a region: mean, noise, percentiles, uniformity, profiles, color
+    Region(RegionArgs),
     /// Photon transfer after EMVA 1288, of flat and dark frames or of a sensor on a simulated bench
     Noise(NoiseArgs),
     /// Colors of a 24-patch chart (ΔE00), or two pictures compared (S-CIELAB, VSNR, PSNR, SSIM)
@@ -34,7 +36,7 @@ pub(crate) struct PictureArgs {
 /// How samples stand for light.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum CurveKind {
-    /// Linear for 16-bit gray and EXR, sRGB for everything else
+    /// Linear for 16-bit gray, EXR and DNG, sRGB for everything else
     ByFile,
     /// Linear
     Linear,
@@ -45,7 +47,7 @@ pub(crate) enum CurveKind {
 /// A slanted edge.
 #[derive(Debug, Args)]
 pub(crate) struct MtfArgs {
-    /// Picture or raw frame: PNG, TIFF, JPEG, EXR
+    /// Picture or raw frame: PNG, TIFF, JPEG, EXR, or DNG, whose mosaic is its own
     pub(crate) picture: PathBuf,
     /// Where the edge is, pixels [default: the most edge-like square of the picture]
     #[arg(long, value_name = "x,y,w,h")]
@@ -111,10 +113,26 @@ pub(crate) struct SpotArgs {
     pub(crate) picture_args: PictureArgs,
 }
 
+/// A region.
+#[derive(Debug, Args)]
+pub(crate) struct RegionArgs {
+    /// Picture, raw frame, volts, spectral scene or irradiance: PNG, TIFF, JPEG, DNG, EXR
+    pub(crate) picture: PathBuf,
+    /// The region, pixels [default: all of the picture]
+    #[arg(long, value_name = "x,y,w,h")]
+    pub(crate) region: Option<String>,
+    /// A region of the same file whose color it is compared with; of a spectral file it is the white
+    #[arg(long, value_name = "x,y,w,h")]
+    pub(crate) reference: Option<String>,
+    /// The picture and the results
+    #[command(flatten)]
+    pub(crate) picture_args: PictureArgs,
+}
+
 /// Flat and dark frames, or a sensor.
 #[derive(Debug, Args)]
 pub(crate) struct NoiseArgs {
-    /// Flat and dark frames, 16-bit PNG or TIFF: an EMVA descriptor file, or a folder with descriptor.txt or with
+    /// Flat and dark frames, 16-bit PNG or TIFF, or DNG: an EMVA descriptor file, or a folder with descriptor.txt or with
     /// dark-0.png, dark-1.png, flat-01-0.png, flat-01-1.png …
     #[arg(required_unless_present = "sensor", conflicts_with = "sensor")]
     pub(crate) frames: Option<PathBuf>,

@@ -14,8 +14,8 @@ use dioptric_analysis::{Run, RunReport, RunTimes};
 use dioptric_files::memory;
 use dioptric_pipeline::{
     BlurSpec, Camera, Clock as PartClock, Diffraction, FilmSpec, FlatSize, FocusSpec, FrameFile, FramesSpec,
-    ImagingTimes, KeptCamera, LensReadOptions, LensSpec, Progress, Quality, RetiredBank, SceneSpec, SensorOptions,
-    SensorSpec, Silent, Stage, Staged, StopSpec, WavelengthSpec, display, parse_illuminant, parse_numbers,
+    ImagingTimes, KeptCamera, LensReadOptions, LensSpec, Progress, Quality, RetiredBank, SceneSource, SceneSpec, SensorOptions,
+    SensorSpec, Silent, Stage, Staged, StopSpec, WavelengthSpec, display, number, parse_illuminant, parse_numbers,
     with_exposure_s,
 };
 use dioptric_report::write_run;
@@ -145,6 +145,7 @@ fn film_of(kept: &KeptCamera, arguments: &RunArgs) -> anyhow::Result<FilmSpec> {
     Ok(match (size, arguments.pixel_um) {
         (None, None) if arguments.film.is_some() => match arguments.film {
             Some(FilmKind::Scene) => FilmSpec::Scene,
+            Some(FilmKind::Field) => FilmSpec::Field,
             _ => FilmSpec::Sensor,
         },
         (None, None) => kept.camera().film,
@@ -264,9 +265,11 @@ pub(crate) fn diffraction(kind: DiffractionKind) -> Diffraction {
 fn change_sensor(camera: &mut Camera, arguments: &RunArgs) -> anyhow::Result<()> {
     if let Some(sensor) = &arguments.sensor {
         camera.sensor = SensorSpec::named(sensor);
-        if arguments.scene.is_none() {
-            camera.film = FilmSpec::Sensor;
-        }
+        // Its pixels come with it: all of them where the scene has no end, else those that it covers.
+        camera.film = match camera.scene.source {
+            SceneSource::StillLife { .. } | SceneSource::World(_) => FilmSpec::Sensor,
+            SceneSource::File(_) | SceneSource::Target { .. } => FilmSpec::Field,
+        };
     }
     if !arguments.frames.filters.is_empty() {
         camera.filters.clone_from(&arguments.frames.filters);
@@ -284,6 +287,7 @@ fn change_sensor(camera: &mut Camera, arguments: &RunArgs) -> anyhow::Result<()>
     if let Some(time_s) = arguments.exposure_s {
         camera.exposure = with_exposure_s(camera.exposure, time_s);
     }
+    camera.chip_seed = arguments.frames.chip_seed.unwrap_or(camera.chip_seed);
     let options = sensor_options(&arguments.frames);
     Ok(options.apply(&mut camera.noise, &mut camera.exposure, &mut camera.processing)?)
 }
@@ -293,6 +297,9 @@ pub(crate) fn sensor_options(arguments: &FrameArgs) -> SensorOptions {
     SensorOptions {
         noise: arguments.noise.clone(),
         analog_gain: arguments.analog_gain,
+        gain_mode: arguments.gain_mode.clone(),
+        temperature_c: arguments.temperature_c,
+        metering: arguments.metering.clone(),
         picture: arguments.picture.0.clone(),
     }
 }
@@ -332,10 +339,12 @@ pub(crate) fn parse_size(text: &str) -> anyhow::Result<(usize, usize)> {
 
 pub(crate) fn summary(report: &RunReport, total_s: f64, out: &Path) -> String {
     format!(
-        "{}: {} × {} pixels, {} bands, {:.2} ms, {:.1} s\n{}\n",
+        "{}: {} × {} pixels of {} µm on {}, {} bands, {:.2} ms, {:.1} s\n{}{}\n",
         report.camera.name,
         report.film.columns,
         report.film.rows,
+        number(report.film.pitch_um),
+        report.sensor.sensor,
         report.irradiance.wavelengths_nm.len(),
         1e3 * report.sensor.exposure_time_s,
         total_s,
@@ -456,6 +465,57 @@ mod tests {
         check_film(&["--pixel-um", "66"], (480, 320), 66.0);
         check_film(&["--pixels", "100x50", "--pixel-um", "2"], (100, 50), 2.0);
         check_film(&["--sensor", "imx363", "--pixels", "403x302"], (403, 302), 1.4 * 4032.0 / 403.0);
+    }
+
+    /// A sensor that is named comes with its pixels and its film, unless others are asked for.
+    #[test]
+    fn a_named_sensor_brings_its_film() {
+        let folder = tempfile::tempdir().unwrap();
+        let before = |name: &str, scene: &str| {
+            let path = folder.path().join(name);
+            let film = "film: Pixels(columns: 48, rows: 32, pitch_um: 200.0)";
+            let text = format!(
+                "(name: \"own\", lens: BuiltIn(\"dgauss-50mm\"), stop: FNumber(4.0), focus: DistanceMm(2000.0), {film}, \
+                 sensor: BuiltIn(\"nikon-d5100\"), scene: ({scene}))"
+            );
+            std::fs::write(&path, text).unwrap();
+            path.to_str().unwrap().to_owned()
+        };
+        let target = "source: Target(pattern: Uniform, columns: 32, rows: 32), field_of_view_deg: 14.0, depth_m: 2.0";
+        let target = before("target.ron", target);
+        let life = before("life.ron", "source: StillLife(columns: 60, rows: 40)");
+        let film = |options: &[&str]| camera(options).film;
+        let own = FilmSpec::Pixels { columns: 48, rows: 32, pitch_um: 200.0 };
+        for (options, expected) in [
+            // Without a sensor the film is that of the file, the demo's or the scene's.
+            (&[target.as_str()][..], own),
+            (&["--scene", "photo.png"], FilmSpec::Scene),
+            // With one it is the sensor's, as far as the scene reaches.
+            (&[&target, "--sensor", "imx363"], FilmSpec::Field),
+            (&["--scene", "photo.png", "--sensor", "imx363"], FilmSpec::Field),
+            (&["--scene", "photo.png", "--lens", "tessar-50mm", "--sensor", "imx363"], FilmSpec::Field),
+            (&[&life, "--sensor", "imx363"], FilmSpec::Sensor),
+            (&["--sensor", "imx363"], FilmSpec::Sensor),
+            // What is asked for besides counts.
+            (&["--scene", "photo.png", "--sensor", "imx363", "--film", "scene"], FilmSpec::Scene),
+            (&["--scene", "photo.png", "--sensor", "imx363", "--film", "sensor"], FilmSpec::Sensor),
+            (&["--scene", "photo.png", "--film", "field"], FilmSpec::Field),
+            (
+                &["--scene", "photo.png", "--sensor", "imx363", "--pixels", "100x50", "--pixel-um", "2"],
+                FilmSpec::Pixels { columns: 100, rows: 50, pitch_um: 2.0 },
+            ),
+            (
+                &[&life, "--sensor", "imx363", "--pixels", "2016x1512"],
+                FilmSpec::Pixels { columns: 2016, rows: 1512, pitch_um: 2.8 },
+            ),
+        ] {
+            assert_eq!(film(options), expected, "{options:?}");
+        }
+        // The scene of 14° is 12 mm wide behind this lens; the sensor, of 5.6 mm, sees less of it.
+        let kept = KeptCamera::new(camera(&[&target, "--sensor", "imx363"]));
+        let [width_mm, height_mm] = kept.film_size_mm(&Silent, &Cancel::new()).unwrap();
+        assert_relative_eq!(width_mm, 4032.0 * 1.4e-3, max_relative = 1e-9);
+        assert_relative_eq!(height_mm, 3024.0 * 1.4e-3, max_relative = 1e-9);
     }
 
     #[test]

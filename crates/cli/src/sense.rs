@@ -34,6 +34,7 @@ pub(crate) fn run(arguments: &SenseArgs, common: &Common) -> anyhow::Result<()> 
         exit_pupil_mm: arguments.exit_pupil_mm,
         f_number: arguments.f_number,
         seed: common.seed.unwrap_or(demo.seed),
+        chip_seed: arguments.frames.chip_seed.unwrap_or(demo.chip_seed),
         outputs: Outputs {
             also: arguments.frames.also.as_deref().map_or(Ok(Vec::new()), FrameFile::parse_list)?,
             exr_samples: arguments.frames.exr_samples.unwrap_or_default(),

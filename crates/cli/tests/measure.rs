@@ -320,3 +320,50 @@ fn bad_input_ends_in_one_sentence() {
         check_error(path, &[&["measure"], arguments].concat(), words);
     }
 }
+
+#[test]
+fn a_region_has_its_numbers() {
+    let folder = tempfile::tempdir().unwrap();
+    // Linear gray of 0.3, a brighter half, and a color beside them.
+    let gray = ImageBuffer::from_fn(40, 20, |x, _| Luma([if x < 20 { 19_661_u16 } else { 39_322 }]));
+    save(&gray.into(), &folder.path().join("gray.png")).unwrap();
+    let measured =
+        json(folder.path(), &["measure", "region", "gray.png", "--region", "0,0,20,20", "--json", "-o", "out"]);
+    let channel = &measured["channels"][0];
+    assert!((number(&channel["mean"]) - 0.3).abs() < 1e-4 && number(&channel["deviation"]) == 0.0, "{channel}");
+    assert!(channel["signal_to_noise"].is_null() && number(&channel["uniformity"]) == 1.0);
+    assert!(folder.path().join("out/region.json").exists() && folder.path().join("out/histogram.svg").exists());
+    let color = ImageBuffer::from_fn(40, 20, |x, _| Rgb(if x < 20 { [188_u8, 188, 188] } else { [188, 170, 188] }));
+    save(&color.into(), &folder.path().join("color.png")).unwrap();
+    let arguments = ["measure", "region", "color.png", "--region", "20,0,20,20", "--reference", "0,0,20,20", "--json"];
+    let measured = json(folder.path(), &arguments);
+    assert_eq!(measured["channels"].as_array().unwrap().len(), 4);
+    let difference = &measured["difference"];
+    assert!(number(&difference["delta_e_2000"]) > 5.0 && number(&difference["delta_e_76"]) > 5.0, "{difference}");
+    // Less green than gray is magenta.
+    assert!(number(&measured["color"]["lab"][1]) > 5.0 && number(&measured["color"]["duv"]) < 0.0, "{measured}");
+    common::check_error(folder.path(), &["measure", "region", "gray.png", "--region", "30,0,20,20"], &["40 × 20"]);
+}
+
+#[test]
+fn a_raw_file_is_measured_by_its_frame_and_its_mosaic() {
+    let folder = tempfile::tempdir().unwrap();
+    let camera = common::CAMERA.replace("pattern: Uniform", "pattern: SlantedBar(slope: 6.0)");
+    fs::write(folder.path().join("camera.ron"), camera.replace("columns: 48, rows: 32", "columns: 144, rows: 144"))
+        .unwrap();
+    let run = ["run", "camera.ron", "--noise", "none", "--also", "raw-dng", "--out", "shot", "--quiet"];
+    output(folder.path(), &run);
+    let measured = json(folder.path(), &["measure", "region", "shot/raw.dng", "--region", "4,4,20,20", "--json"]);
+    let names: Vec<&str> =
+        measured["channels"].as_array().unwrap().iter().map(|c| c["channel"].as_str().unwrap()).collect();
+    assert_eq!(names, ["R", "G", "B"]);
+    assert_eq!(number(&measured["channels"][1]["n_samples"]), 200.0);
+    // The whole frame and not the preview in it.
+    let whole = json(folder.path(), &["measure", "region", "shot/raw.dng", "--json"]);
+    assert_eq!((number(&whole["region"]["columns"]), number(&whole["region"]["rows"])), (144.0, 144.0));
+    common::check_error(
+        folder.path(),
+        &["measure", "color", "shot/raw.dng"],
+        &["raw.dng", "mosaic", "dioptric develop"],
+    );
+}

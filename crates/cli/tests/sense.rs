@@ -51,6 +51,23 @@ fn every_file_of_a_frame_is_written_and_reads_back() {
     assert!(folder.path().join("both/electrons.exr").exists() && folder.path().join("both/raw.dng").exists());
 }
 
+#[test]
+fn sense_makes_white_as_the_run_did() {
+    let folder = folder();
+    let warm = fs::read_to_string(folder.path().join("camera.ron"))
+        .unwrap()
+        .replace("depth_m: 2.0", "depth_m: 2.0, illuminant: A");
+    fs::write(folder.path().join("warm.ron"), warm).unwrap();
+    output(folder.path(), &["run", "warm.ron", "--noise", "none", "--out", "warm", "--quiet"]);
+    let options = ["sense", "warm/irradiance.exr", "--sensor", "nikon-d5100", "--pixel-um", "200", "--noise", "none"];
+    output(folder.path(), &[&options[..], &["--out", "sensed"]].concat());
+    let codes = |name: &str| read_picture(&folder.path().join(name)).into_rgb8().into_raw();
+    // The file states the light: an even gray under incandescent light is gray in both.
+    assert_eq!(codes("sensed/picture.png"), codes("warm/picture.png"));
+    output(folder.path(), &[&options[..], &["--illuminant", "D65", "--out", "other"]].concat());
+    assert_ne!(codes("other/picture.png"), codes("warm/picture.png"));
+}
+
 /// Returns the standard deviation of the picture's green codes in the middle of the frame.
 fn noise(folder: &Path) -> f64 {
     let picture = read_picture(&folder.join("out/picture-16.png")).into_rgb16();

@@ -2,6 +2,7 @@
 #![doc = include_str!("../README.md")]
 
 mod reduced;
+mod tagged;
 
 use std::{
     fs,
@@ -10,10 +11,11 @@ use std::{
 };
 
 use dioptric_files::memory;
-use image::{ExtendedColorType, ImageDecoder, ImageEncoder, ImageReader, codecs::png::PngEncoder};
+use image::{ExtendedColorType, ImageDecoder, ImageReader};
 
 pub use image::{DynamicImage, ImageError, ImageFormat, Limits};
 pub use reduced::{Curve, read_reduced};
+pub use tagged::{CodeSpace, encode_in};
 
 /// Returns the format of a file by its first bytes, or by the extension of its name where they say nothing.
 ///
@@ -73,7 +75,8 @@ pub fn encode(picture: &DynamicImage, format: ImageFormat) -> Result<Vec<u8>, Im
     Ok(bytes.into_inner())
 }
 
-/// Returns codes of red, green and blue, pixel by pixel in rows, as the bytes of a PNG file of so many columns and rows.
+/// Returns codes of red, green and blue, pixel by pixel in rows, as the bytes of a PNG file of so many columns and rows, whose colors are those
+/// of sRGB.
 ///
 /// # Errors
 /// When there is no pixel, or too many.
@@ -81,9 +84,23 @@ pub fn encode(picture: &DynamicImage, format: ImageFormat) -> Result<Vec<u8>, Im
 /// # Panics
 /// When there are not three codes a pixel.
 pub fn encode_rgb8_png(codes: &[u8], (columns, rows): (usize, usize)) -> Result<Vec<u8>, ImageError> {
-    let mut bytes = Vec::new();
-    PngEncoder::new(&mut bytes).write_image(codes, columns as u32, rows as u32, ExtendedColorType::Rgb8)?;
-    Ok(bytes)
+    encode_rgb8_png_in(codes, (columns, rows), CodeSpace::Srgb)
+}
+
+/// Returns such codes of other colors as the bytes of a PNG file.
+///
+/// # Errors
+/// When there is no pixel, or too many.
+///
+/// # Panics
+/// When there are not three codes a pixel.
+pub fn encode_rgb8_png_in(
+    codes: &[u8],
+    (columns, rows): (usize, usize),
+    space: CodeSpace,
+) -> Result<Vec<u8>, ImageError> {
+    let size = (columns as u32, rows as u32);
+    tagged::encode_samples(codes, size, ExtendedColorType::Rgb8, (ImageFormat::Png, space))
 }
 
 /// Writes a picture in the format of the path's extension.

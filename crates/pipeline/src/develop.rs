@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use dioptric_sensor::{Developed, DngFile, Picture, Processing, SensorError};
+use dioptric_sensor::{Developed, DngFile, DngOpcodes, Picture, Processing, SensorError};
 
 use crate::{FrameFile, PipelineError, picture_png, write_file};
 
@@ -24,7 +24,18 @@ impl DevelopedFile {
     /// When it cannot be read, or the processing asks for what such a file does not hold: corrections of a simulated lens, roots
     /// of channels, and what [`DngFile::develop`] refuses.
     pub fn read(path: &Path, processing: Processing) -> Result<Self, PipelineError> {
-        let file = DngFile::read(path)?;
+        Self::of(DngFile::read(path)?, processing)
+    }
+
+    /// Reads a DNG file and develops its frame as the sensor gave it, without the corrections that the file asks for.
+    ///
+    /// # Errors
+    /// As [`read`](Self::read).
+    pub fn read_uncorrected(path: &Path, processing: Processing) -> Result<Self, PipelineError> {
+        Self::of(DngFile::read_with(path, DngOpcodes::Ignored)?, processing)
+    }
+
+    fn of(file: DngFile, processing: Processing) -> Result<Self, PipelineError> {
         if !processing.lens_corrections.is_none() {
             let reason = "need a simulated lens, which a raw file does not hold, expected none".to_owned();
             return Err(SensorError::Unsuitable { what: "lens_corrections", reason }.into());

@@ -26,6 +26,14 @@ impl SpectrumToRgb {
         Self { weights }
     }
 
+    /// For spectra that are shown: seen as they are, or in gray, the sum of all bands, where none of them is visible.
+    pub fn shown(grid: &WavelengthGrid) -> Self {
+        /// Light beyond is less than a ten-thousandth as bright as the best seen (CIE 1924).
+        const VISIBLE_NM: [f64; 2] = [390.0, 740.0];
+        let is_visible = grid.centers_nm().iter().any(|nm| (VISIBLE_NM[0]..=VISIBLE_NM[1]).contains(nm));
+        if is_visible { Self::new(grid) } else { Self { weights: [0, 1, 2].map(|_| vec![1.0; grid.len()]) } }
+    }
+
     /// For spectra of which this one is to look white, linear (1, 1, 1).
     pub fn with_white(grid: &WavelengthGrid, white: &[f64]) -> Self {
         let mut it = Self::new(grid);
@@ -56,17 +64,6 @@ impl LinearRgb {
     /// A picture without light.
     pub fn black(rows: usize, columns: usize) -> Self {
         Self { planes: [(); 3].map(|()| Array2::zeros((rows, columns))) }
-    }
-
-    /// Returns the share of pixels that get next to nothing of the mean light.
-    pub fn dark_fraction(&self) -> f64 {
-        /// A blur leaves nothing beyond its window; the mean of a night scene is a thousand times its darkest places.
-        const DARK: f32 = 1e-6;
-        let [red, green, blue] = &self.planes;
-        let light = || red.iter().zip(green).zip(blue).map(|((r, g), b)| r.abs() + g.abs() + b.abs());
-        let n = red.len().max(1) as f64;
-        let mean = (light().map(f64::from).sum::<f64>() / n) as f32;
-        light().filter(|&light| light <= DARK * mean).count() as f64 / n
     }
 
     /// Adds a band seen in this color.
@@ -121,6 +118,15 @@ impl LinearRgb {
             image::Rgb([0, 1, 2].map(|i| code(black[i] + (1.0 - black[i]) * f64::from(self.planes[i][at]) / white)))
         })
     }
+}
+
+/// Returns the share of samples that get next to nothing of the mean light.
+pub fn dark_fraction(light: &Array2<f32>) -> f64 {
+    /// A blur leaves nothing beyond its window; the mean of a night scene is a thousand times its darkest places.
+    const DARK: f32 = 1e-6;
+    let n = light.len().max(1) as f64;
+    let mean = (light.iter().map(|&v| f64::from(v)).sum::<f64>() / n) as f32;
+    light.iter().filter(|&&light| light <= DARK * mean).count() as f64 / n
 }
 
 /// Returns the level below which this share of all samples of planes lie, found by counting: the samples are not copied.
@@ -273,12 +279,18 @@ mod tests {
 
     #[test]
     fn film_beyond_the_light_is_counted() {
-        let mut seen = LinearRgb::black(10, 10);
-        assert_eq!(seen.dark_fraction(), 1.0);
+        assert_eq!(dark_fraction(&Array2::zeros((10, 10))), 1.0);
         // A dim corner is no darkness.
         let lit = |(row, column): (usize, usize)| if column < 7 { if row == 0 { 1e-3 } else { 5.0 } } else { 0.0 };
-        seen.add(&Array2::from_shape_fn((10, 10), lit), [0.3, -0.1, 0.8]);
-        assert_eq!(seen.dark_fraction(), 0.3);
+        assert_eq!(dark_fraction(&Array2::from_shape_fn((10, 10), lit)), 0.3);
+    }
+
+    #[test]
+    fn the_near_infrared_is_shown_in_gray() {
+        let grid = WavelengthGrid::uniform(800.0, 900.0, 50.0).unwrap();
+        assert_eq!([0, 1, 2].map(|band| SpectrumToRgb::shown(&grid).of_band(band)), [[1.0; 3]; 3]);
+        let partly = WavelengthGrid::uniform(700.0, 900.0, 50.0).unwrap();
+        assert!(SpectrumToRgb::shown(&partly).of_band(0)[0] > 10.0 * SpectrumToRgb::shown(&partly).of_band(4)[0].abs());
     }
 
     #[test]

@@ -194,7 +194,8 @@ pub fn write_frames(
 /// # Errors
 /// When it cannot be encoded.
 pub fn picture_png(picture: &Picture) -> Result<Vec<u8>, PipelineError> {
-    dioptric_pictures::encode_rgb8_png(&picture.to_rgb8(), (picture.columns(), picture.rows()))
+    let size = (picture.columns(), picture.rows());
+    dioptric_pictures::encode_rgb8_png_in(&picture.to_rgb8(), size, picture.space.of_file())
         .map_err(|e| PipelineError::Png { reason: e.to_string() })
 }
 

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use dioptric_scene::read_exr_light;
 use dioptric_sensor::{
     Developed, ElectronRate, ExitPupil, ExposureControl, Illumination, Noise, NoiseSources, OpticalFilter, Processing,
     Sensor,
@@ -31,7 +32,7 @@ pub struct SenseRequest {
     pub processing: Processing,
     /// Which sources of noise are on.
     pub noise: NoiseSources,
-    /// The light that white balance goes by; the mean of the picture where it is not known.
+    /// The light that white balance goes by, in place of the one that the file states; the mean of the picture where neither is known.
     pub illuminant: Option<Illuminant>,
     /// The distance of the exit pupil from the sensor, mm, from which each pixel's chief ray follows; `None` for chief rays along the
     /// axis everywhere.
@@ -40,6 +41,8 @@ pub struct SenseRequest {
     pub f_number: Option<f64>,
     /// The seed of all noise.
     pub seed: u64,
+    /// The seed of what stays with the chip.
+    pub chip_seed: u64,
     /// What is written besides the picture and the report; of irradiance and depth there is nothing to write.
     pub outputs: Outputs,
 }
@@ -122,6 +125,10 @@ impl SenseRequest {
             let covering = sensor.with_size(covered(rows, sensor.rows), covered(columns, sensor.columns));
             (Illumination::with_pitch_um(&irradiance, sample_um), covering)
         };
+        let illuminant = match &self.illuminant {
+            Some(light) => Some(light.clone()),
+            None => stated_light(image)?,
+        };
         let mut notes = Vec::new();
         if !(0.5..=2.0).contains(&(sample_um / pixel_um)) {
             notes.push(format!(
@@ -137,11 +144,11 @@ impl SenseRequest {
         let shutter = ShutterInputs {
             exposure: self.exposure,
             frames: self.frames.clone(),
-            noise: Noise { sources: self.noise, ..Noise::all(self.seed) },
+            noise: Noise { sources: self.noise, fixed_pattern_seed: self.chip_seed, ..Noise::all(self.seed) },
         };
         let samples_per_px = light.pitch_um.map_or(1.0, |sample_um| sensor.pixel_pitch_um / sample_um);
         let frames = expose(&shutter, &exposed, &rate, Some(&MovedLight { light, samples_per_px }))?;
-        let processing = self.processing.under(self.illuminant.as_ref());
+        let processing = self.processing.under(illuminant.as_ref());
         let developed = sensor.develop(frames.exposed.developed_from(), &processing)?;
         Ok(Sensed {
             sensor,
@@ -150,7 +157,7 @@ impl SenseRequest {
             frames,
             processing,
             developed,
-            light: self.illuminant.clone().unwrap_or(Illuminant::D65),
+            light: illuminant.unwrap_or(Illuminant::D65),
             grid: irradiance.grid().clone(),
             exit_pupil,
             notes,
@@ -175,4 +182,14 @@ impl SenseRequest {
         };
         Some(ExitPupil { f_number: f_number.unwrap_or(f64::INFINITY), ..ExitPupil::centered(distance_mm) })
     }
+}
+
+/// Returns the light on the scene that a file of irradiance states, as those of a run do.
+fn stated_light(image: &Path) -> Result<Option<Illuminant>, PipelineError> {
+    let Some(text) = read_exr_light(image)? else { return Ok(None) };
+    let wrong = |reason: String| PipelineError::Read { path: image.to_owned(), reason };
+    let light: Illuminant =
+        ron::from_str(&text).map_err(|e| wrong(format!("its light, '{text}', cannot be read: {e}")))?;
+    light.check().map_err(|e| wrong(e.to_string()))?;
+    Ok(Some(light))
 }

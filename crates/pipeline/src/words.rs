@@ -29,11 +29,14 @@ pub fn with_auto_exposure(control: ExposureControl) -> ExposureControl {
 
 /// Returns the exposure with another analog gain; time and temperature stay.
 pub fn with_analog_gain(control: ExposureControl, analog_gain: f64) -> ExposureControl {
+    with_shot(control, |exposure| Exposure { analog_gain, ..exposure })
+}
+
+/// Returns an exposure whose shot is changed; its time stays that of the hand or the longest.
+pub(crate) fn with_shot(control: ExposureControl, change: impl FnOnce(Exposure) -> Exposure) -> ExposureControl {
     match control {
-        ExposureControl::Manual(exposure) => ExposureControl::Manual(Exposure { analog_gain, ..exposure }),
-        ExposureControl::Auto(auto) => {
-            ExposureControl::Auto(AutoExposure { limit: Exposure { analog_gain, ..auto.limit }, ..auto })
-        }
+        ExposureControl::Manual(exposure) => ExposureControl::Manual(change(exposure)),
+        ExposureControl::Auto(auto) => ExposureControl::Auto(AutoExposure { limit: change(auto.limit), ..auto }),
     }
 }
 

@@ -241,7 +241,8 @@ fn set_film(camera: &mut Camera, given: &GivenParts, key: &str, value: &Bound<'_
             camera.film = match word(key, value)?.as_str() {
                 "sensor" => FilmSpec::Sensor,
                 "scene" => FilmSpec::Scene,
-                other => return Err(wrong(key, format!("'{other}'"), "'sensor' or 'scene'")),
+                "field" => FilmSpec::Field,
+                other => return Err(wrong(key, format!("'{other}'"), "'sensor', 'field' or 'scene'")),
             }
         }
         "pixels" => {

@@ -320,7 +320,8 @@ impl Shot {
         let outputs = &capture.camera.outputs;
         let mut files = Vec::new();
         if outputs.irradiance {
-            capture.irradiance.write_exr(&folder.join(IRRADIANCE_FILE), outputs.exr_samples)?;
+            let light = capture.scene.light.as_ref().map(|light| &light.illuminant);
+            capture.irradiance.write_exr_under(light, &folder.join(IRRADIANCE_FILE), outputs.exr_samples)?;
             files.push(IRRADIANCE_FILE.to_owned());
         }
         if outputs.depth {

@@ -124,7 +124,8 @@ mod tests {
     /// A response by formula, cycles a pixel.
     fn response(formula: impl Fn(f64) -> f64) -> EdgeResponse {
         let frequencies: Vec<f64> = (0..=1000).map(|i| f64::from(i) / 1000.0).collect();
-        EdgeResponse { response: frequencies.iter().map(|&f| formula(f)).collect(), frequencies, slant_deg: 5.0 }
+        let response = frequencies.iter().map(|&f| formula(f)).collect();
+        EdgeResponse::of_curve(frequencies, response)
     }
 
     fn viewing(pixels_per_degree: f64) -> Viewing {

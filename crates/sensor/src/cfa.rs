@@ -125,6 +125,11 @@ impl Tile {
         &self.filters[start..start + self.columns]
     }
 
+    /// Returns the tile with other numbers for its filters.
+    pub(crate) fn renumbered(&self, number: impl Fn(usize) -> usize) -> Self {
+        Self { filters: self.filters.iter().map(|&filter| number(filter)).collect(), ..self.clone() }
+    }
+
     /// Returns the number of filters that are needed to describe the tile: one more than the last in use.
     pub fn n_filters(&self) -> usize {
         self.filters.iter().max().map_or(0, |last| last + 1)

@@ -60,25 +60,52 @@ impl SampleNoise {
     }
 }
 
-/// The sample of a middle gray, and the shares of it that noise must reach for any, and for all, of the automatic strength.
-const MIDDLE_GRAY: f64 = 0.18;
+/// The level of a frame at which its noise is judged: the median of its samples, but no more than a middle gray and no less than a few thousandths of
+/// saturation, where a picture is black. The shares of it that noise must reach for any, and for all, of the automatic strength.
+const LEVELS: [f64; 2] = [0.005, 0.18];
+/// Samples that tell the median.
+const LEVEL_SAMPLES: usize = 1 << 16;
 const NOISE_SHARES: [f64; 2] = [0.05, 0.1];
 /// The strength at which a noisy photograph comes nearest to a clean one (docs/sensor.md).
 const AUTOMATIC_STRENGTH: f64 = 0.5;
 
-/// Returns the strength that a frame's noise asks for.
-pub(crate) fn automatic_strength(noise: &SampleNoise) -> f64 {
-    AUTOMATIC_STRENGTH * noisiness(noise)
+/// Returns the level at which the noise of a frame is judged, by the samples of one channel.
+pub(crate) fn level(planes: &[Array2<f32>], tile: Option<&Tile>, channel: usize) -> f64 {
+    let (rows, columns) = planes[0].dim();
+    // A lattice of tiles, so that all filters have their part.
+    let period = tile.map_or((1, 1), |tile| (tile.rows(), tile.columns()));
+    let stride = ((rows * columns / LEVEL_SAMPLES) as f64).sqrt().floor().max(1.0) as usize;
+    let mut samples: Vec<f32> = Vec::new();
+    for row in (0..rows).filter(|row| row / period.0 % stride == 0) {
+        for column in (0..columns).filter(|column| column / period.1 % stride == 0) {
+            match tile {
+                Some(tile) if tile.filter_at(row, column) == channel => samples.push(planes[0][(row, column)]),
+                Some(_) => {}
+                None => samples.push(planes[channel.min(planes.len() - 1)][(row, column)]),
+            }
+        }
+    }
+    if samples.is_empty() {
+        return LEVELS[1];
+    }
+    let middle = samples.len() / 2;
+    let (_, median, _) = samples.select_nth_unstable_by(middle, f32::total_cmp);
+    f64::from(*median).clamp(LEVELS[0], LEVELS[1])
 }
 
-/// Returns how much noise a frame has: 0 where a middle gray stands 20 times above it or more, 1 where it stands ten times above it or less,
+/// Returns the strength that a frame's noise asks for at a level of it.
+pub(crate) fn automatic_strength(noise: &SampleNoise, level: f64) -> f64 {
+    AUTOMATIC_STRENGTH * noisiness(noise, level)
+}
+
+/// Returns how much noise a frame has: 0 where its level stands 20 times above it or more, 1 where it stands ten times above it or less,
 /// which ISO 12232 takes to be just acceptable.
-pub(crate) fn noisiness(noise: &SampleNoise) -> f64 {
+pub(crate) fn noisiness(noise: &SampleNoise, level: f64) -> f64 {
     // The slope of the scale on which noise is 1 is one over the noise.
-    let (below, above) = (0.98 * MIDDLE_GRAY, 1.02 * MIDDLE_GRAY);
+    let (below, above) = (0.98 * level, 1.02 * level);
     let slope = f64::from(noise.stabilized(above as f32) - noise.stabilized(below as f32)) / (above - below);
     let [least, most] = NOISE_SHARES;
-    let share = 1.0 / (slope * MIDDLE_GRAY);
+    let share = 1.0 / (slope * level);
     ((share - least) / (most - least)).clamp(0.0, 1.0)
 }
 
@@ -293,7 +320,7 @@ mod tests {
     #[test]
     fn noise_asks_for_denoising() {
         let strength = |electrons_per_unit: f64, floor_e: f64| {
-            automatic_strength(&SampleNoise::Frame { electrons_per_unit, floor_e })
+            automatic_strength(&SampleNoise::Frame { electrons_per_unit, floor_e }, LEVELS[1])
         };
         // A middle gray of n electrons has √(n + floor²) of noise: a twentieth of 400, a tenth of 100.
         assert_eq!(strength(33_000.0, 10.0), 0.0);
@@ -302,6 +329,20 @@ mod tests {
         let n = 200.0_f64;
         let expected = 0.5 * ((n + 25.0).sqrt() / n - 0.05) / 0.05;
         assert!((strength(n / 0.18, 5.0) - expected).abs() < 1e-3, "{} {expected}", strength(n / 0.18, 5.0));
+    }
+
+    #[test]
+    fn a_dark_frame_is_judged_by_its_own_level() {
+        let tile = crate::Cfa::two_by_two("RGGB").unwrap().resolve("test", &["R", "G", "B"]).unwrap().unwrap();
+        let frame =
+            |green: f32| Array2::from_shape_fn((40, 60), |(r, c)| if tile.filter_at(r, c) == 1 { green } else { 0.9 });
+        let level_of = |green: f32| level(&[frame(green)], Some(&tile), 1);
+        for (green, wanted) in [(0.05, 0.05), (0.6, 0.18), (0.001, 0.005)] {
+            assert!((level_of(green) - wanted).abs() < 1e-6, "{green}: {}", level_of(green));
+        }
+        // A well of 5000 electrons: 900 of a middle gray stand 30 times above their noise, 50 of a night scene 7 times.
+        let noise = SampleNoise::Frame { electrons_per_unit: 5000.0, floor_e: 2.0 };
+        assert_eq!([0.18, 0.01].map(|level| automatic_strength(&noise, level)), [0.0, 0.5]);
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 mod area;
 mod color;
+mod corrections;
 mod file_camera;
 mod file_color;
 mod file_profile;
@@ -29,7 +30,7 @@ use self::{
 pub use self::{
     file_color::{DngColor, DngLight},
     file_profile::{DngNoise, DngProfile},
-    read::{DngFile, DngShot},
+    read::{DngFile, DngOpcodes, DngShot},
 };
 use crate::{
     LensCorrections, LensTables, Picture, Raw, RawPlane, Sensor, SensorError, files::write_error,

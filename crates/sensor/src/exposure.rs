@@ -69,6 +69,8 @@ pub enum Metering {
     Peak,
     /// The pixel that this share (0–100 %) of all pixels does not exceed.
     Percentile(f64),
+    /// The same of each filter's pixels by themselves; the filter that gets the most counts, so that none clips.
+    EachFilter(f64),
 }
 
 fn one() -> f64 {
@@ -133,11 +135,59 @@ impl ExposureControl {
     }
 }
 
+impl GainMode {
+    /// Returns the mode of a name: `low` or `high`.
+    ///
+    /// # Errors
+    /// When the name is another.
+    pub fn parse(name: &str) -> Result<Self, SensorError> {
+        match name.to_ascii_lowercase().as_str() {
+            "low" => Ok(Self::Low),
+            "high" => Ok(Self::High),
+            _ => Err(SensorError::Word {
+                what: "a readout of a dual-gain pixel",
+                found: name.to_owned(),
+                expected: "low, high".to_owned(),
+            }),
+        }
+    }
+}
+
 impl Metering {
+    /// Returns the metering of a word: `mean`, `center`, `peak`, `percentile:P` or `filters:P`, P being 99 where it is left out.
+    ///
+    /// # Errors
+    /// When the word is another, or P is no number from 0 to 100.
+    pub fn parse(text: &str) -> Result<Self, SensorError> {
+        let lower = text.to_ascii_lowercase();
+        let (word, percent) = match lower.split_once(':') {
+            Some((word, number)) => (word, number.trim().parse::<f64>().ok()),
+            None => (lower.as_str(), Some(99.0)),
+        };
+        let metering = match (word, percent) {
+            ("mean", _) => Self::Mean,
+            ("center" | "centre", _) => Self::CenterWeighted,
+            ("peak", _) => Self::Peak,
+            ("percentile", Some(percent)) => Self::Percentile(percent),
+            ("filters", Some(percent)) => Self::EachFilter(percent),
+            _ => {
+                return Err(SensorError::Word {
+                    what: "a metering",
+                    found: text.to_owned(),
+                    expected: "mean, center, peak, percentile:99, filters:99".to_owned(),
+                });
+            }
+        };
+        metering.check().map(|()| metering)
+    }
+
     pub(crate) fn check(self) -> Result<(), SensorError> {
         match self {
             Self::Percentile(percent) if !(0.0..=100.0).contains(&percent) => {
                 Err(SensorError::value("the automatic exposure", "Percentile", percent, "a number from 0 to 100"))
+            }
+            Self::EachFilter(percent) if !(0.0..=100.0).contains(&percent) => {
+                Err(SensorError::value("the automatic exposure", "EachFilter", percent, "a number from 0 to 100"))
             }
             _ => Ok(()),
         }

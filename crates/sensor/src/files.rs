@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use dioptric_files::WriteError;
-use dioptric_pictures::{DynamicImage, ImageFormat, encode};
+use dioptric_pictures::{CodeSpace, DynamicImage, ImageFormat, encode, encode_in};
 use image::ImageBuffer;
 
 use crate::{Picture, Raw, RawPlane, SensorError};
@@ -21,7 +21,7 @@ pub enum Depth {
 }
 
 impl Picture {
-    /// Writes the picture as PNG or TIFF, by the path's extension.
+    /// Writes the picture as PNG or TIFF, by the path's extension, with the profile of its colors.
     ///
     /// # Errors
     /// When the extension is another or the file cannot be written; then there is no file.
@@ -31,7 +31,7 @@ impl Picture {
             Depth::Eight => ImageBuffer::from_raw(width, height, self.to_rgb8()).map(DynamicImage::ImageRgb8),
             Depth::Sixteen => ImageBuffer::from_raw(width, height, self.to_rgb16()).map(DynamicImage::ImageRgb16),
         };
-        write_image(path, &image.expect("three codes a pixel"))
+        write_image(path, &image.expect("three codes a pixel"), Some(self.space.of_file()))
     }
 }
 
@@ -68,7 +68,7 @@ impl RawPlane {
         let dn = self.dn().ok_or_else(|| self.without_numbers(A_PICTURE))?;
         let codes: Vec<u16> = dn.iter().copied().collect();
         let image = ImageBuffer::from_raw(dn.ncols() as u32, dn.nrows() as u32, codes).map(DynamicImage::ImageLuma16);
-        write_image(path, &image.expect("one code a pixel"))
+        write_image(path, &image.expect("one code a pixel"), None)
     }
 
     fn without_numbers(&self, what: &'static str) -> SensorError {
@@ -85,13 +85,18 @@ fn needs_numbers(what: &'static str, found: &str) -> SensorError {
     SensorError::Unsuitable { what, reason: format!("needs one plane of digital numbers, but the frame has {found}") }
 }
 
-fn write_image(path: &Path, image: &DynamicImage) -> Result<(), SensorError> {
+/// Writes a picture of colors, or codes that are none.
+fn write_image(path: &Path, image: &DynamicImage, space: Option<CodeSpace>) -> Result<(), SensorError> {
     let format = match path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase).as_deref() {
         Some("png") => ImageFormat::Png,
         Some("tif" | "tiff") => ImageFormat::Tiff,
         _ => return Err(write_error(path, "the extension must be png, tif or tiff")),
     };
-    Ok(dioptric_files::write(path, &encode(image, format).map_err(|e| write_error(path, e))?)?)
+    let bytes = match space {
+        Some(space) => encode_in(image, format, space),
+        None => encode(image, format),
+    };
+    Ok(dioptric_files::write(path, &bytes.map_err(|e| write_error(path, e))?)?)
 }
 
 impl From<WriteError> for SensorError {

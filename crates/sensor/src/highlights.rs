@@ -52,10 +52,17 @@ const SURE: f32 = 0.9;
 /// Surroundings tell the color of what is blown where they are part of its glow: not at all up to the first of these shares of
 /// saturation, by their largest channel, and fully from the second on. What is blown before a dim wall is white.
 const GLOW: [f32; 2] = [0.3, 0.5];
+/// A glint is as small as pixels are apart: its filters see different parts of it, whatever is demosaiced. Its color is the mean over so many
+/// pixels each way, all channels held to one level. What is blown within a wider window tells how small it is: all of a glint up to the first
+/// of these numbers of pixels, none from the second on.
+const GLINT_PX: usize = 2;
+const AROUND_PX: usize = 4;
+const GLINT_PIXELS: [f32; 2] = [12.0, 28.0];
 
 /// Which channels are saturated in or next to each pixel, a bit a channel.
 pub(crate) struct Saturated {
     bits: Array2<u32>,
+    is_mosaic: bool,
 }
 
 impl Saturated {
@@ -77,7 +84,7 @@ impl Saturated {
         }
         // Stacked filters are not interpolated.
         let bits = if tile.is_some() { spread(&spread(&bits).reversed_axes()).reversed_axes() } else { bits };
-        Some(Self { bits: bits.as_standard_layout().into_owned() })
+        Some(Self { bits: bits.as_standard_layout().into_owned(), is_mosaic: tile.is_some() })
     }
 }
 
@@ -117,6 +124,52 @@ pub(crate) fn reconstruct(channels: &mut [Array2<f32>], saturated: &Saturated, l
             }
         }
     });
+    if saturated.is_mosaic {
+        even_glints(channels, saturated, &levels);
+    }
+}
+
+/// Gives glints the mean color about them, as bright as each pixel is.
+fn even_glints(channels: &mut [Array2<f32>], saturated: &Saturated, levels: &[f32]) {
+    let (rows, columns) = saturated.bits.dim();
+    let level = levels.iter().copied().fold(f32::INFINITY, f32::min);
+    let n = channels.len();
+    let around = |i: usize, reach: usize, all: usize| i.saturating_sub(reach)..(i + reach + 1).min(all);
+    let seen: &[Array2<f32>] = channels;
+    let is_blown =
+        |row: usize, column: usize| seen.iter().zip(levels).any(|(plane, level)| plane[(row, column)] >= SURE * level);
+    let of_row = |row: usize| {
+        let mut evened = Vec::new();
+        for column in (0..columns).filter(|column| saturated.bits[(row, *column)] != 0) {
+            let (down, across) = (around(row, AROUND_PX, rows), around(column, AROUND_PX, columns));
+            let blown = down.flat_map(|r| across.clone().map(move |c| (r, c))).filter(|&(r, c)| is_blown(r, c)).count();
+            let [few, many] = GLINT_PIXELS;
+            let part = ((many - blown as f32) / (many - few)).clamp(0.0, 1.0);
+            if part == 0.0 {
+                continue;
+            }
+            let mut color = vec![0.0_f32; n];
+            for r in around(row, GLINT_PX, rows) {
+                for c in around(column, GLINT_PX, columns) {
+                    color.iter_mut().zip(seen).for_each(|(sum, plane)| *sum += plane[(r, c)].clamp(0.0, level));
+                }
+            }
+            let total: f32 = color.iter().sum();
+            let brightness: f32 = seen.iter().map(|plane| plane[(row, column)].max(0.0)).sum();
+            if total > 0.0 {
+                let own = |k: usize| seen[k][(row, column)];
+                let values = (0..n).map(|k| own(k) + part * (brightness * color[k] / total - own(k)));
+                evened.push((column, values.collect::<Vec<f32>>()));
+            }
+        }
+        evened
+    };
+    let evened: Vec<Vec<(usize, Vec<f32>)>> = (0..rows).into_par_iter().map(of_row).collect();
+    for (row, places) in evened.into_iter().enumerate() {
+        for (column, values) in places {
+            channels.iter_mut().zip(values).for_each(|(plane, value)| plane[(row, column)] = value);
+        }
+    }
 }
 
 /// Returns what the surrounding color is multiplied by at one pixel.
@@ -321,6 +374,40 @@ mod tests {
         reconstruct(&mut channels, &saturated, &[1.0; 3]);
         assert_eq!(dimmed([0, 1, 2].map(|k| channels[k][(30, 40)])), [1.0; 3]);
         assert_eq!([0, 1, 2].map(|k| channels[k][(5, 5)]), wall);
+    }
+
+    /// Glints of white light on gray, smaller than the mosaic's tile, at every phase of it.
+    #[test]
+    fn small_glints_end_white() {
+        let tile = Cfa::two_by_two("RGGB").unwrap().resolve("test", &["R", "G", "B"]).unwrap().unwrap();
+        let gains = [2.0_f32, 1.0, 1.6];
+        let places: Vec<(f32, f32)> =
+            (0..16).map(|i| (12.0 + 20.25 * (i / 4) as f32, 12.0 + 20.75 * (i % 4) as f32)).collect();
+        // White gives each filter less by its gain; pixels hold 1.
+        let light = |r: usize, c: usize| {
+            let glint = |&(y, x): &(f32, f32)| {
+                let squared = (r as f32 - y).powi(2) + (c as f32 - x).powi(2);
+                7.0 * (-squared / (2.0 * 0.75 * 0.75)).exp()
+            };
+            0.08 + places.iter().map(glint).sum::<f32>()
+        };
+        let raw = Array2::from_shape_fn((96, 96), |(r, c)| (light(r, c) / gains[tile.filter_at(r, c)]).min(1.0));
+        let saturated = Saturated::find(std::slice::from_ref(&raw), Some(&tile), 3, 0.998).unwrap();
+        let balanced = Array2::from_shape_fn((96, 96), |(r, c)| raw[(r, c)] * gains[tile.filter_at(r, c)]);
+        let mut channels = crate::demosaic(&balanced, &tile, 3, crate::Demosaic::DirectionalRatio).unwrap();
+        // A pixel is colored where its parts differ by a third of the largest, and bright enough to be seen so.
+        let colored = |channels: &[Array2<f32>]| {
+            let bright = |&(r, c): &(usize, usize)| {
+                let parts = dimmed([0, 1, 2].map(|k| channels[k][(r, c)]));
+                let (least, most) = parts.iter().fold((1.0_f32, 0.0_f32), |(a, b), v| (a.min(*v), b.max(*v)));
+                most > 0.4 && least < 0.67 * most
+            };
+            (0..96).flat_map(|r| (0..96).map(move |c| (r, c))).filter(bright).count()
+        };
+        let before = colored(&channels);
+        reconstruct(&mut channels, &saturated, &gains.map(f64::from));
+        let after = colored(&channels);
+        assert!(before > 40 && after * 20 <= before, "{after} of {before} pixels are colored");
     }
 
     #[test]

@@ -89,7 +89,7 @@ pub use collect::Illumination;
 pub use color::{ColorCorrection, ColorMatrix};
 pub use demosaic::{Demosaic, demosaic};
 pub use disparity::{DisparityAxis, DisparityMap, DisparitySearch};
-pub use dng::{DngColor, DngDetails, DngFile, DngLight, DngNoise, DngProfile, DngShot};
+pub use dng::{DngColor, DngDetails, DngFile, DngLight, DngNoise, DngOpcodes, DngProfile, DngShot};
 pub use error::SensorError;
 pub use exit_pupil::ExitPupil;
 pub use exposure::{AutoExposure, Exposure, ExposureControl, GainMode, Metering};
@@ -103,7 +103,7 @@ pub use motion::Moved;
 pub use noise::{Noise, NoiseSource, NoiseSources};
 pub use optical_filter::OpticalFilter;
 pub use perspective::Perspective;
-pub use photon_transfer::{DarkCurrentEstimate, FlatPoint, PhotonTransfer};
+pub use photon_transfer::{DarkCurrentEstimate, FlatPoint, Linearity, PhotonTransfer};
 pub use picture::Picture;
 pub use pixel_stack::{
     Interfaces, Microlens, MicrolensOutline, MicrolensPower, MicrolensShift, PixelStack, QuantumEfficiencyOf,
@@ -122,4 +122,4 @@ pub use similarity::{psnr_db, ssim};
 pub use space::ColorSpace;
 pub use texture::{TextureNoise, TextureResponse, TextureSpectra};
 pub use tone::{Brightness, ToneCurve};
-pub use uniformity::{FrameStack, NonUniformity};
+pub use uniformity::{FrameStack, NonUniformity, Parts, Spectrogram};

@@ -10,6 +10,11 @@ use crate::SensorError;
 
 /// The variance of rounding to whole numbers.
 const QUANTISATION_VARIANCE: f64 = 1.0 / 12.0;
+/// A dark variance below this is that of rounding, DN²: the noise may be anything below its root without that of rounding, 0.4 DN.
+const HIDDEN_BELOW_DN2: f64 = 0.24;
+/// The signal between which linearity is judged, as shares of saturation (EMVA 1288, 6.7).
+const LINEAR_FROM: f64 = 0.05;
+const LINEAR_TO: f64 = 0.95;
 /// The share of saturation up to which the gain is fitted (EMVA 1288, 6.6).
 const FIT_UP_TO: f64 = 0.7;
 
@@ -45,6 +50,49 @@ impl FlatPoint {
     }
 }
 
+/// How far a signal is from a straight line over light.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Linearity {
+    /// The mean of the deviations' magnitudes, as a share of the line: the linearity error (EMVA 1288, 6.7).
+    pub mean_error: f64,
+    /// The largest of them.
+    pub largest_error: f64,
+    /// Photons, and the deviation there as a share of the line.
+    pub deviations: Vec<(f64, f64)>,
+}
+
+impl Linearity {
+    /// Returns the deviations from the line with the least relative ones.
+    fn fit(dark: &FlatPoint, points: &[FlatPoint], saturation_dn: f64) -> Option<Self> {
+        let full = saturation_dn - dark.mean_dn;
+        let signals: Vec<(f64, f64)> = points
+            .iter()
+            .map(|point| (point.photons, point.mean_dn - dark.mean_dn))
+            .filter(|(_, signal)| (LINEAR_FROM * full..=LINEAR_TO * full).contains(signal))
+            .collect();
+        if signals.len() < 3 {
+            return None;
+        }
+        // y = a + b x with weights 1 / y²: the sum of squared shares is least.
+        let sums = signals.iter().fold([0.0; 5], |sums, (x, y)| {
+            let weight = 1.0 / (y * y);
+            let terms = [weight, weight * x, weight * x * x, weight * y, weight * x * y];
+            std::array::from_fn(|i| sums[i] + terms[i])
+        });
+        let [w, wx, wxx, wy, wxy] = sums;
+        let slope = (w * wxy - wx * wy) / (w * wxx - wx * wx);
+        let offset = (wy - slope * wx) / w;
+        let deviations: Vec<(f64, f64)> =
+            signals.iter().map(|(x, y)| (*x, (y - offset - slope * x) / (offset + slope * x))).collect();
+        let magnitudes = || deviations.iter().map(|(_, share)| share.abs());
+        Some(Self {
+            mean_error: magnitudes().sum::<f64>() / deviations.len() as f64,
+            largest_error: magnitudes().fold(0.0, f64::max),
+            deviations,
+        })
+    }
+}
+
 /// The temporal parameters of a camera.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PhotonTransfer {
@@ -56,6 +104,11 @@ pub struct PhotonTransfer {
     pub quantum_efficiency: f64,
     /// The temporal dark noise without that of rounding, electrons.
     pub dark_noise_e: f64,
+    /// Whether rounding hides the dark noise, so that this is the most that it may be (EMVA 1288, 6.5: a variance below 0.24 DN²).
+    pub dark_noise_is_limit: bool,
+    /// How far the signal is from the straight line that fits it best; `None` where fewer than three points lie between 5 and 95 % of
+    /// saturation.
+    pub linearity: Option<Linearity>,
     /// The electrons at which the variance is largest: saturation.
     pub saturation_e: f64,
     /// The photons at which signal and noise are equal.
@@ -96,7 +149,9 @@ impl PhotonTransfer {
             return Err(SensorError::Unsuitable { what: "photon transfer", reason });
         }
         let quantum_efficiency = responsivity / gain_dn_per_e;
-        let dark_e2 = (dark.variance_dn2 - QUANTISATION_VARIANCE).max(0.0) / gain_dn_per_e.powi(2);
+        let dark_noise_is_limit = dark.variance_dn2 < HIDDEN_BELOW_DN2;
+        let dark_dn2 = dark.variance_dn2.max(HIDDEN_BELOW_DN2) - QUANTISATION_VARIANCE;
+        let dark_e2 = dark_dn2 / gain_dn_per_e.powi(2);
         let rounding_e2 = QUANTISATION_VARIANCE / gain_dn_per_e.powi(2);
         // Signal = noise: e = √(e + σd² + σq²), solved for e (EMVA 1288, equation 26).
         let threshold_e = 0.5 + (dark_e2 + rounding_e2 + 0.25).sqrt();
@@ -106,6 +161,8 @@ impl PhotonTransfer {
             responsivity_dn_per_photon: responsivity,
             quantum_efficiency,
             dark_noise_e: dark_e2.sqrt(),
+            dark_noise_is_limit,
+            linearity: Linearity::fit(&dark, &points, saturated.mean_dn),
             saturation_e,
             threshold_photons: threshold_e / quantum_efficiency,
             dynamic_range_db: 20.0 * (saturation_e / threshold_e).log10(),
@@ -126,7 +183,12 @@ impl PhotonTransfer {
 
     /// Returns the signal-to-noise ratio that the linear model gives for a number of electrons.
     pub fn model_snr(&self, electrons: f64) -> f64 {
-        electrons / (electrons + self.dark_noise_e.powi(2) + QUANTISATION_VARIANCE / self.gain_dn_per_e.powi(2)).sqrt()
+        electrons / self.variance_e2(electrons).sqrt()
+    }
+
+    /// Returns the temporal variance that the linear model gives for a number of electrons.
+    pub(crate) fn variance_e2(&self, electrons: f64) -> f64 {
+        electrons + self.dark_noise_e.powi(2) + QUANTISATION_VARIANCE / self.gain_dn_per_e.powi(2)
     }
 }
 
@@ -178,4 +240,36 @@ fn slope(points: impl Iterator<Item = (f64, f64)> + Clone) -> f64 {
     let (xy, xx) =
         points.fold((0.0, 0.0), |(xy, xx), (x, y)| (xy + (x - mean_x) * (y - mean_y), xx + (x - mean_x).powi(2)));
     xy / xx
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    fn point(photons: f64, mean_dn: f64, variance_dn2: f64) -> FlatPoint {
+        FlatPoint { photons, mean_dn, variance_dn2 }
+    }
+
+    #[test]
+    fn a_bent_response_has_its_linearity_error_and_hidden_noise_its_limit() {
+        // A signal of 0.1 DN a photon that sags by 2 % towards saturation at 3000 DN, where the variance is largest.
+        let signal = |photons: f64| 0.1 * photons * (1.0 - 0.02 * photons / 30_000.0);
+        let points: Vec<FlatPoint> = (1..=40)
+            .map(|i| 750.0 * f64::from(i))
+            .map(|photons| point(photons, 10.0 + signal(photons), 0.1 + 0.2 * signal(photons)))
+            .collect();
+        let transfer = PhotonTransfer::fit(point(0.0, 10.0, 0.1), &points).unwrap();
+        let linearity = transfer.linearity.unwrap();
+        // The best line through a parabola of 2 %: a quarter of it is left at the ends, and about a tenth on the mean.
+        assert!((0.001..0.004).contains(&linearity.mean_error), "{}", linearity.mean_error);
+        assert!(linearity.largest_error < 0.012 && linearity.deviations.len() > 30);
+        // A dark variance of 0.1 DN² is that of rounding: the noise is below 0.4 DN, 2 electrons at 0.2 DN an electron.
+        assert!(transfer.dark_noise_is_limit);
+        assert_relative_eq!(transfer.dark_noise_e, 0.3958 / 0.2, max_relative = 0.02);
+        let straight: Vec<FlatPoint> =
+            (1..=20).map(|i| 1500.0 * f64::from(i)).map(|p| point(p, 10.0 + 0.1 * p, 9.0 + 0.02 * p)).collect();
+        let transfer = PhotonTransfer::fit(point(0.0, 10.0, 9.0), &straight).unwrap();
+        assert!(transfer.linearity.unwrap().largest_error < 1e-12 && !transfer.dark_noise_is_limit);
+    }
 }

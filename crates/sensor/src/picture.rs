@@ -2,11 +2,15 @@
 
 use ndarray::{Array3, Axis};
 
+use crate::ColorSpace;
+
 /// A picture of red, green and blue codes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picture {
     /// Codes of 0–1: rows × columns × (red, green, blue).
     pub codes: Array3<f32>,
+    /// The primaries of the codes.
+    pub space: ColorSpace,
 }
 
 impl Picture {
@@ -38,7 +42,7 @@ impl Picture {
         if matches!(orientation, 3 | 4 | 7 | 8) {
             codes.invert_axis(Axis(0));
         }
-        Self { codes: codes.as_standard_layout().into_owned() }
+        Self { codes: codes.as_standard_layout().into_owned(), space: self.space }
     }
 
     /// Returns 8-bit codes, row by row, red, green, blue.

@@ -11,7 +11,7 @@ use crate::{
     balance::gains,
     color::pairs,
     defects, demosaic,
-    denoise::{SampleNoise, automatic_strength, denoise, noisiness},
+    denoise::{SampleNoise, automatic_strength, denoise, level, noisiness},
     highlights::{Saturated, dimmed, reconstruct},
     lens_tables::warp,
     metering::percentile,
@@ -33,8 +33,8 @@ pub struct Processing {
     /// The fall of light towards the corners that is undone; left out, it stays.
     pub shading: Option<LensShading>,
     /// How much noise is taken out of the raw frame: 0 none, 1 what is below three standard deviations; left out, as much as
-    /// its own noise asks for. That is none up to a twentieth of the signal of a middle gray (18 % of saturation), and 0.5 from a
-    /// tenth on.
+    /// its own noise asks for. That is none up to a twentieth of the signal at the frame's own level (its median, at most a middle gray of 18 % of
+    /// saturation), and 0.5 from a tenth on.
     pub denoise: Option<f64>,
     /// Aberrations of the lens that are undone; left out, they stay.
     pub lens_corrections: LensCorrections,
@@ -200,7 +200,10 @@ impl Sensor {
         processing: &Processing,
         lens: Option<&LensTables>,
     ) -> Result<LinearPicture, SensorError> {
-        develop_linear(self, raw, processing, lens)
+        match Used::of(self, raw) {
+            Some(used) => used.develop_linear(self, raw, processing, lens),
+            None => develop_linear(self, raw, processing, lens),
+        }
     }
 
     /// Returns the noise of a frame that does not depend on the signal, rms electrons.
@@ -215,6 +218,85 @@ impl Sensor {
         let floor_v = (volts * exposure.analog_gain).hypot(rounding_v);
         let dark_e = self.dark_current.at(exposure.temperature_c) * exposure.time_s;
         (floor_v / levels.volts_per_electron).hypot(dark_e.sqrt())
+    }
+}
+
+/// The filters that stand before pixels of a sensor which has others besides: these see nothing, and must have no part in colors.
+struct Used {
+    filters: Vec<usize>,
+    n_all: usize,
+}
+
+impl Used {
+    /// Returns them, or `None` where all filters are used.
+    fn of(sensor: &Sensor, raw: &Raw) -> Option<Self> {
+        let n_all = sensor.filters.len();
+        let tile = raw.tile.as_ref()?;
+        let is_used = |filter: &usize| (0..tile.rows()).any(|row| tile.row(row).contains(filter));
+        let filters: Vec<usize> = (0..n_all).filter(is_used).collect();
+        (filters.len() < n_all && !filters.is_empty()).then_some(Self { filters, n_all })
+    }
+
+    fn only<T: Clone>(&self, all: &[T]) -> Vec<T> {
+        // What has another length is refused by whoever takes it.
+        if all.len() == self.n_all {
+            self.filters.iter().map(|&filter| all[filter].clone()).collect()
+        } else {
+            all.to_vec()
+        }
+    }
+
+    /// Develops a frame as that of a sensor without the other filters, whose factors are then 1 in the balance and 0 in the matrix.
+    fn develop_linear(
+        &self,
+        sensor: &Sensor,
+        raw: &Raw,
+        processing: &Processing,
+        lens: Option<&LensTables>,
+    ) -> Result<LinearPicture, SensorError> {
+        let sensor = Sensor { filters: self.only(&sensor.filters), ..sensor.clone() };
+        let number = |filter: usize| self.filters.iter().position(|used| *used == filter).unwrap_or(0);
+        let tile = raw.tile.as_ref().map(|tile| tile.renumbered(number));
+        let raw = Raw { tile, filter_names: self.only(&raw.filter_names), ..raw.clone() };
+        let white = match &processing.white {
+            WhiteBalance::Gains(gains) => WhiteBalance::Gains(self.only(gains)),
+            white => white.clone(),
+        };
+        let color = match &processing.color {
+            ColorCorrection::Matrix(rows) => ColorCorrection::Matrix(rows.each_ref().map(|row| self.only(row))),
+            color => color.clone(),
+        };
+        let lens = lens.map(|tables| LensTables {
+            size: tables.size,
+            distortion_px: tables.distortion_px.clone(),
+            lateral_color_px: self.only(&tables.lateral_color_px),
+            vignetting: self.only(&tables.vignetting),
+        });
+        let processing = Processing { white, color, ..processing.clone() };
+        let linear = develop_linear(&sensor, &raw, &processing, lens.as_ref())?;
+        let mut balance = vec![1.0; self.n_all];
+        self.filters.iter().zip(&linear.balance).for_each(|(&filter, gain)| balance[filter] = *gain);
+        Ok(LinearPicture { balance, color: self.widened(&linear.color), ..linear })
+    }
+
+    /// Returns a matrix with factors of 0 for the filters that are not used, and for roots of their products.
+    fn widened(&self, color: &ColorMatrix) -> ColorMatrix {
+        let n = self.filters.len();
+        let roots: Vec<(usize, usize)> = if color.has_roots { pairs(self.n_all).collect() } else { Vec::new() };
+        let rows = color.rows.each_ref().map(|row| {
+            let mut wide = vec![0.0; self.n_all + roots.len()];
+            for (&filter, factor) in self.filters.iter().zip(row) {
+                wide[filter] = *factor;
+            }
+            for ((i, j), factor) in pairs(n).zip(row.iter().skip(n)).filter(|_| color.has_roots) {
+                let pair = (self.filters[i], self.filters[j]);
+                if let Some(place) = roots.iter().position(|own| *own == pair) {
+                    wide[self.n_all + place] = *factor;
+                }
+            }
+            wide
+        });
+        ColorMatrix { rows, has_roots: color.has_roots, delta_e: color.delta_e.clone() }
     }
 }
 
@@ -242,7 +324,8 @@ pub(crate) fn develop_linear(
         Highlights::Clip => None,
         Highlights::Reconstruct => Saturated::find(&planes, tile, n_channels, camera.saturated_from(raw)),
     };
-    clean(&mut planes, tile, &processing, &noise);
+    let level = level(&planes, tile, middle(n_channels));
+    clean(&mut planes, tile, &processing, (&noise, level));
     if let Some(lens) = lens.filter(|_| corrections.vignetting) {
         lens.even_out(&mut planes, tile);
     }
@@ -256,15 +339,17 @@ pub(crate) fn develop_linear(
     if let Some(saturated) = saturated {
         reconstruct(&mut channels, &saturated, &balance);
     }
+    channels = camera.corrected(channels, &balance);
     if let Some(lens) = lens.filter(|_| corrections.moves()) {
         let sources: Vec<_> = (0..n_channels).map(|channel| lens.source_px(channel, corrections)).collect();
         channels = warp(&channels, &sources);
     }
-    let roots_weight = 1.0 - noisiness(middle(&noise));
+    let middle_noise = &noise[middle(noise.len())];
+    let roots_weight = 1.0 - noisiness(middle_noise, level);
     let color = camera.color_matrix(&processing.color, &balance, roots_weight)?;
     if processing.sharpen_px > 0.0 {
         let luminance = color.luminance_shares(n_channels);
-        let of = SharpenedChannels { luminance: &luminance, balance: &balance, noise: middle(&noise) };
+        let of = SharpenedChannels { luminance: &luminance, balance: &balance, noise: middle_noise };
         sharpen(&mut channels, processing.sharpen_px, &of);
     }
     if let Some(perspective) = processing.perspective {
@@ -325,22 +410,27 @@ impl Processing {
 }
 
 /// Mends defects, undoes a given fall of light and takes out noise, that of each filter.
-fn clean(planes: &mut [Array2<f32>], tile: Option<&Tile>, processing: &Processing, noise: &[SampleNoise]) {
+fn clean(
+    planes: &mut [Array2<f32>],
+    tile: Option<&Tile>,
+    processing: &Processing,
+    (noise, level): (&[SampleNoise], f64),
+) {
     if let Some(threshold) = processing.defect_threshold {
         defects::correct(planes, tile, threshold as f32);
     }
     if let Some(shading) = &processing.shading {
         shading.correct(planes, tile);
     }
-    let strength = processing.denoise.unwrap_or_else(|| automatic_strength(middle(noise)));
+    let strength = processing.denoise.unwrap_or_else(|| automatic_strength(&noise[middle(noise.len())], level));
     if strength > 0.0 {
         denoise(planes, tile, noise, strength);
     }
 }
 
-/// Returns the noise of the filter that stands for all: the second of several, which is green in most files, or the only one.
-fn middle(noise: &[SampleNoise]) -> &SampleNoise {
-    noise.get(1).unwrap_or(&noise[0])
+/// Returns which of so many filters stands for all: the second of several, which is green in most files, or the only one.
+fn middle(n: usize) -> usize {
+    1.min(n - 1)
 }
 
 impl LinearPicture {
@@ -368,7 +458,7 @@ impl LinearPicture {
             let light = if keeps_hue { dimmed(light) } else { light };
             pixel.iter_mut().zip(light).for_each(|(code, light)| *code = table.encode(light));
         });
-        Developed { picture: Picture { codes }, balance: self.balance, color: self.color, brightness }
+        Developed { picture: Picture { codes, space }, balance: self.balance, color: self.color, brightness }
     }
 }
 

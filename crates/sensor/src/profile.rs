@@ -1,6 +1,7 @@
 //! What developing needs to know of the camera that took a frame.
 
 use dioptric_spectrum::{Illuminant, Spectrum, color_checker_reflectances};
+use ndarray::Array2;
 
 use crate::{
     ColorCorrection, ColorMatrix, Raw, Sensor, SensorError,
@@ -37,6 +38,12 @@ pub(crate) trait CameraProfile {
 
     /// Returns the noise of a frame's samples in units of saturation, for each channel.
     fn sample_noise(&self, raw: &Raw) -> Vec<SampleNoise>;
+
+    /// Returns demosaiced channels, which were balanced so, as the camera itself wants them corrected.
+    fn corrected(&self, channels: Vec<Array2<f32>>, balance: &[f64]) -> Vec<Array2<f32>> {
+        let _ = balance;
+        channels
+    }
 }
 
 impl dyn CameraProfile + '_ {

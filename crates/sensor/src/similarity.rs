@@ -67,10 +67,11 @@ pub(crate) fn check_sizes(first: &Array3<f32>, second: &Array3<f32>) -> Result<(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::ColorSpace;
     use approx::assert_relative_eq;
 
     fn picture(code: impl Fn(usize, usize, usize) -> f32) -> Picture {
-        Picture { codes: Array3::from_shape_fn((24, 32, 3), |(r, c, i)| code(r, c, i)) }
+        Picture { codes: Array3::from_shape_fn((24, 32, 3), |(r, c, i)| code(r, c, i)), space: ColorSpace::Srgb }
     }
 
     #[test]
@@ -78,7 +79,7 @@ mod tests {
         let (a, b) = (picture(|_, _, _| 0.5), picture(|_, _, _| 0.6));
         assert_relative_eq!(psnr_db(&a, &b).unwrap(), 20.0, max_relative = 1e-5);
         assert_eq!(psnr_db(&a, &a).unwrap(), f64::INFINITY);
-        assert!(psnr_db(&a, &Picture { codes: Array3::zeros((2, 2, 3)) }).is_err());
+        assert!(psnr_db(&a, &Picture { codes: Array3::zeros((2, 2, 3)), space: ColorSpace::Srgb }).is_err());
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! The primaries of a picture.
 
+use dioptric_pictures::CodeSpace;
 use serde::{Deserialize, Serialize};
 
 use crate::SensorError;
@@ -33,6 +34,14 @@ impl ColorSpace {
                 found: text.to_owned(),
                 expected: "srgb, display-p3".to_owned(),
             }),
+        }
+    }
+
+    /// Returns what files of pictures say of them.
+    pub fn of_file(self) -> CodeSpace {
+        match self {
+            Self::Srgb => CodeSpace::Srgb,
+            Self::DisplayP3 => CodeSpace::DisplayP3,
         }
     }
 

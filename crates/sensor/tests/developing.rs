@@ -103,7 +103,10 @@ fn shoot(sensor: &Sensor, image: &SpectralImage, shift_px: [f64; 2], exposure: E
 
 /// Returns the PSNR away from the border, which frames that move do not share.
 fn inner_psnr_db(a: &Picture, b: &Picture) -> f64 {
-    let inner = |p: &Picture| Picture { codes: p.codes.slice(s![16..ROWS - 16, 16..COLUMNS - 16, ..]).to_owned() };
+    let inner = |p: &Picture| Picture {
+        codes: p.codes.slice(s![16..ROWS - 16, 16..COLUMNS - 16, ..]).to_owned(),
+        space: p.space,
+    };
     psnr_db(&inner(a), &inner(b)).unwrap()
 }
 

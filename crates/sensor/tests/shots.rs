@@ -9,9 +9,9 @@ use approx::assert_relative_eq;
 use common::chart;
 use dioptric_pictures::{Limits, read};
 use dioptric_sensor::{
-    Adc, AutoExposure, Cfa, ChartReport, ColorCorrection, Demosaic, Depth, DngDetails, ElectronRate, Exposure,
-    ExposureControl, Filter, FrameTable, Illumination, LensCorrections, LensTables, Metering, Noise, NoiseSource,
-    Picture, Processing, Raw, RawPlane, Response, Sensor,
+    Adc, AutoExposure, Cfa, ChartReport, ColorCorrection, ColorSpace, Demosaic, Depth, DngDetails, ElectronRate,
+    Exposure, ExposureControl, Filter, FrameTable, Illumination, LensCorrections, LensTables, Metering, Noise,
+    NoiseSource, Picture, Processing, Raw, RawPlane, Response, Sensor,
 };
 use dioptric_spectrum::{Illuminant, Spectrum};
 use ndarray::{Array2, Array3};
@@ -300,12 +300,17 @@ fn a_dng_says_how_it_was_taken_and_through_what() {
 #[test]
 fn pictures_come_back_from_their_files() {
     let folder = tempfile::tempdir().unwrap();
-    let picture = Picture { codes: Array3::from_shape_fn((5, 7, 3), |(r, c, i)| (r * 21 + c * 3 + i) as f32 / 104.0) };
+    let codes = Array3::from_shape_fn((5, 7, 3), |(r, c, i)| (r * 21 + c * 3 + i) as f32 / 104.0);
+    let picture = Picture { codes, space: ColorSpace::DisplayP3 };
     for (name, depth) in
         [("a.png", Depth::Eight), ("b.png", Depth::Sixteen), ("c.tiff", Depth::Eight), ("d.tif", Depth::Sixteen)]
     {
         let path = folder.path().join(name);
         picture.write(&path, depth).unwrap();
+        // The profile is compressed in PNG files, and stands in TIFF files as it is.
+        let (bytes, profile) = (std::fs::read(&path).unwrap(), picture.space.of_file().icc_profile());
+        let holds = |what: &[u8]| bytes.windows(what.len()).any(|part| part == what);
+        assert!(if name.ends_with("png") { holds(b"iCCP") } else { holds(&profile) }, "{name}");
         let back = read(&path, Limits::no_limits()).unwrap();
         assert_eq!((back.width(), back.height()), (7, 5));
         match depth {

@@ -3,7 +3,7 @@
 use std::{fmt, fs, io, path::Path, sync::Arc};
 
 use dioptric_analysis::{Run, RunOptics, RunReport};
-use dioptric_pictures::encode_rgb8_png;
+use dioptric_pictures::encode_rgb8_png_in;
 use dioptric_pipeline::{
     Camera, Capture, FilmPlace, GivenParts, KeptCamera, PaintingFolder, PipelineError, Progress, ResolvedLens,
     SceneSummary, Stage, write_capture, write_file, write_json,
@@ -164,5 +164,6 @@ fn thumbnail(capture: &Capture) -> Result<Vec<u8>, PipelineError> {
             small.push(((sum + n / 2) / n) as u8);
         }
     }
-    encode_rgb8_png(&small, (width, height)).map_err(|error| PipelineError::Png { reason: error.to_string() })
+    let space = picture.space.of_file();
+    encode_rgb8_png_in(&small, (width, height), space).map_err(|error| PipelineError::Png { reason: error.to_string() })
 }

@@ -67,7 +67,7 @@ impl ItemKey {
     pub(crate) fn of(camera: &Camera, still: &Camera, inputs: &Inputs) -> Result<Self, SweepError> {
         let camera = inputs.by_content(camera)?;
         let scene = &camera.scene;
-        let sensor = (camera.film == FilmSpec::Sensor).then_some(&camera.sensor);
+        let sensor = matches!(camera.film, FilmSpec::Sensor | FilmSpec::Field).then_some(&camera.sensor);
         // They decide nothing but the order, so that the words of a debugger will do.
         let of = |part: &dyn fmt::Debug| short(&hash(&format!("{part:?}")));
         let stages = [
@@ -77,7 +77,7 @@ impl ItemKey {
             of(&(camera.blur, camera.border, &camera.light_field)),
             of(&(&scene.illuminant, scene.illuminance_lux, &scene.light, scene.mean_luminance_cd_m2)),
             of(&(&camera.sensor, &camera.filters)),
-            of(&(camera.exposure, camera.noise, &camera.frames, camera.seed)),
+            of(&(camera.exposure, camera.noise, &camera.frames, camera.seed, camera.chip_seed)),
         ];
         let imaging = Camera {
             name: String::new(),

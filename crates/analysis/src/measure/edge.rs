@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use dioptric_sensor::{EdgeResponse, Viewing, find_edge};
+use dioptric_sensor::{EdgeResponse, Tile, Viewing, find_edge};
 use ndarray::{Array2, ArrayView2, s};
 use serde::Serialize;
 
@@ -60,6 +60,8 @@ pub struct EdgeChannel {
     pub channel: String,
     /// The frequency at which half the response is left, cycles a pixel.
     pub mtf50_cycles_per_pixel: Option<f64>,
+    /// One standard error of it, by the noise of the pixels.
+    pub mtf50_error_cycles_per_pixel: Option<f64>,
     /// The frequency beyond the peak at which half the peak is left, cycles a pixel.
     pub mtf50p_cycles_per_pixel: Option<f64>,
     /// The first of these in cycles a millimetre, where the distance between pixels was given.
@@ -79,6 +81,10 @@ pub struct EdgeChannel {
     pub frequencies_cycles_per_pixel: Vec<f64>,
     /// The response at each frequency, 1 at 0.
     pub response: Vec<f64>,
+    /// One standard error of each response, by the noise of the pixels.
+    pub response_error: Vec<f64>,
+    /// The step of light in standard deviations of a pixel; none where there is no noise.
+    pub contrast_to_noise: Option<f64>,
 }
 
 /// A channel in which the edge cannot be measured.
@@ -139,6 +145,9 @@ impl EdgeRequest {
 
     /// Parts a picture into channels.
     fn samples<'a>(&self, picture: &'a MeasuredPicture) -> Result<Samples<'a>, PipelineError> {
+        if let (None, Some((tile, names))) = (&self.mosaic, &picture.mosaic) {
+            return Self::filters(picture, tile, names);
+        }
         let Some(letters) = &self.mosaic else {
             let whole = |plane| vec![Part { plane: Plane::Borrowed(plane), first: (0, 0) }];
             let mut channels: Vec<(String, Vec<Part<'a>>)> =
@@ -169,6 +178,22 @@ impl EdgeRequest {
         Ok(Samples { period, channels })
     }
 
+    /// Parts the mosaic of a raw file into its filters, each with a part for every place in the tile.
+    fn filters<'a>(picture: &'a MeasuredPicture, tile: &Tile, names: &[String]) -> Result<Samples<'a>, PipelineError> {
+        let (rows, columns) = (tile.rows(), tile.columns());
+        if rows != columns {
+            let reason = format!("has a mosaic of {rows} × {columns} pixels, expected a square one");
+            return Err(PipelineError::Read { path: picture.name.clone().into(), reason });
+        }
+        let mut channels: Vec<(String, Vec<Part<'a>>)> = names.iter().map(|name| (name.clone(), Vec::new())).collect();
+        for (row, column) in (0..rows).flat_map(|row| (0..columns).map(move |column| (row, column))) {
+            let part = Part { plane: Plane::Borrowed(&picture.planes[0].1), first: (row, column) };
+            channels[tile.filter_at(row, column)].1.push(part);
+        }
+        channels.retain(|(_, parts)| !parts.is_empty());
+        Ok(Samples { period: rows, channels })
+    }
+
     /// Returns the region given, or the most edge-like square.
     fn region(&self, picture: &MeasuredPicture, period: usize) -> Result<PixelRegion, PipelineError> {
         let (rows, columns) = picture.size();
@@ -197,6 +222,7 @@ impl EdgeRequest {
         Ok(EdgeChannel {
             channel: name.to_owned(),
             mtf50_cycles_per_pixel: mtf50,
+            mtf50_error_cycles_per_pixel: response.mtf50_error(),
             mtf50p_cycles_per_pixel: mtf50p,
             mtf50_cycles_per_mm: mtf50.and_then(per_mm),
             mtf50p_cycles_per_mm: mtf50p.and_then(per_mm),
@@ -206,6 +232,8 @@ impl EdgeRequest {
             aliasing_share: (last > 1.0 - 1e-9).then(|| response.aliasing_share()),
             frequencies_cycles_per_pixel: response.frequencies.clone(),
             response: response.response.clone(),
+            response_error: response.standard_error.clone(),
+            contrast_to_noise: Some(response.contrast_to_noise).filter(|ratio| ratio.is_finite()),
         })
     }
 }
@@ -248,7 +276,13 @@ fn mean_response(parts: &[EdgeResponse], period: usize) -> EdgeResponse {
     EdgeResponse {
         frequencies: parts[0].frequencies.iter().map(|f| f / period as f64).collect(),
         response: (0..parts[0].response.len()).map(|i| mean(&|part| part.response[i])).collect(),
+        // Parts have pixels of their own.
+        standard_error: (0..parts[0].response.len())
+            .map(|i| (mean(&|part| part.standard_error[i].powi(2)) / n).sqrt())
+            .collect(),
         slant_deg: mean(&|part| part.slant_deg),
+        contrast: mean(&|part| part.contrast),
+        contrast_to_noise: mean(&|part| part.contrast_to_noise),
     }
 }
 

@@ -14,6 +14,7 @@ use std::{
 use dioptric_scene::read_picture_samples;
 use ndarray::Array2;
 
+use super::open::read_dng;
 use dioptric_pipeline::PipelineError;
 
 /// The name of the descriptor in a folder.
@@ -83,14 +84,14 @@ fn series_by_name(folder: &Path) -> Result<Vec<FileSeries>, PipelineError> {
         let stem = path.file_stem().unwrap_or_default().to_string_lossy().to_lowercase();
         let is_picture = path
             .extension()
-            .is_some_and(|e| ["png", "tif", "tiff"].contains(&e.to_string_lossy().to_lowercase().as_str()));
+            .is_some_and(|e| ["png", "tif", "tiff", "dng"].contains(&e.to_string_lossy().to_lowercase().as_str()));
         if is_picture && (stem.starts_with("dark") || stem.starts_with("flat")) {
             let group = stem.rsplit_once(['-', '_']).map_or(stem.as_str(), |(group, _)| group);
             groups.entry(group.to_owned()).or_default().push(path);
         }
     }
     if groups.is_empty() {
-        let reason = format!("it holds neither {DESCRIPTOR_FILE} nor PNG or TIFF frames named dark… and flat…");
+        let reason = format!("it holds neither {DESCRIPTOR_FILE} nor PNG, TIFF or DNG frames named dark… and flat…");
         return Err(PipelineError::Read { path: folder.to_owned(), reason });
     }
     Ok(groups
@@ -105,6 +106,13 @@ fn series_by_name(folder: &Path) -> Result<Vec<FileSeries>, PipelineError> {
 
 /// Reads a frame of digital numbers.
 pub(crate) fn read_frame(path: &Path) -> Result<Array2<f32>, PipelineError> {
+    if let Some(file) = read_dng(path)? {
+        let wrong = |reason: &str| PipelineError::Read { path: path.to_owned(), reason: reason.to_owned() };
+        return match file.raw.dn() {
+            Some(dn) => Ok(dn.mapv(f32::from)),
+            None => Err(wrong("its raw frame is no single plane of digital numbers, expected a mosaic or one filter")),
+        };
+    }
     let samples = read_picture_samples(path)?;
     let wrong = |reason: String| PipelineError::Read { path: path.to_owned(), reason };
     match (samples.top, samples.planes.len()) {

@@ -9,6 +9,7 @@ mod noise_charts;
 mod open;
 mod points;
 mod region;
+mod region_statistics;
 mod texture;
 
 use serde::Serialize;
@@ -16,10 +17,11 @@ use serde::Serialize;
 pub use chart::{ChartMeasurement, ChartRequest, PatchRow};
 pub use compare::{CompareRequest, Comparison, DeltaESummary, PictureViewing};
 pub use edge::{EdgeChannel, EdgeMeasurement, EdgeRequest, UnmeasuredChannel};
-pub use noise::{BenchRequest, NoiseData, NoiseDataSheet, NoisePoint, measure_bench, measure_frames};
+pub use noise::{BenchRequest, NoiseData, NoiseDataSheet, NoisePoint, SpatialPatterns, measure_bench, measure_frames};
 pub use open::{CodeCurve, MeasuredPicture};
 pub use points::{PointRequest, PointRow, PointSet};
 pub use region::PixelRegion;
+pub use region_statistics::{BandMean, ColorDifference, RegionChannel, RegionColor, RegionMeasurement, RegionRequest};
 pub use texture::{TextureChannel, TextureCurve, TextureMeasurement, TextureNoiseRequest, TextureRequest};
 
 use crate::LineChart;

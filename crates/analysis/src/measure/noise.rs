@@ -6,7 +6,8 @@ use std::{
 };
 
 use dioptric_sensor::{
-    Bench, BenchSettings, DarkCurrentEstimate, Exposure, FlatPoint, FrameStack, NonUniformity, PhotonTransfer, Raw,
+    Bench, BenchSettings, DarkCurrentEstimate, Exposure, FlatPoint, FrameStack, NonUniformity, Parts, PhotonTransfer,
+    Raw, Spectrogram,
 };
 use dioptric_spectrum::Illuminant;
 use ndarray::Array2;
@@ -66,7 +67,7 @@ impl BenchRequest {
     }
 }
 
-/// Parameters of EMVA standard 1288, release 3.1.
+/// Parameters of EMVA standard 1288, release 4.0 (linear model).
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct NoiseData {
     /// The sensor, or the file or folder of frames.
@@ -87,6 +88,12 @@ pub struct NoiseData {
     pub quantum_efficiency: Option<f64>,
     /// The temporal dark noise σd without that of rounding, electrons.
     pub dark_noise_e: f64,
+    /// Whether rounding hides it, so that it is less than this.
+    pub dark_noise_is_limit: bool,
+    /// The mean deviation of the signal from a straight line, from 5 to 95 % of saturation, percent; none with fewer than three points there.
+    pub linearity_error_percent: Option<f64>,
+    /// The largest deviation, percent.
+    pub largest_linearity_error_percent: Option<f64>,
     /// The electrons at which the variance is largest.
     pub saturation_e: f64,
     /// The photons at which it is.
@@ -105,6 +112,12 @@ pub struct NoiseData {
     pub dsnu_e: Option<f64>,
     /// Photo-response non-uniformity, rms percent.
     pub prnu_percent: Option<f64>,
+    /// What of the first is of rows, columns and single pixels, rms electrons.
+    pub dsnu_parts_e: Option<Parts>,
+    /// What of the second, rms percent.
+    pub prnu_parts_percent: Option<Parts>,
+    /// How the mean frames of the stacks differ over the chip; none without stacks.
+    pub patterns: Option<SpatialPatterns>,
     /// The dark current from the rise of the mean, electrons a second; none without dark frames of several times.
     pub dark_current_by_mean_e_per_s: Option<f64>,
     /// The dark current from the rise of the variance.
@@ -115,6 +128,70 @@ pub struct NoiseData {
     pub data_sheet: Option<NoiseDataSheet>,
     /// The points of the photon transfer, darkness first.
     pub points: Vec<NoisePoint>,
+}
+
+/// How the mean dark frame, and that about half saturation, differ from pixel to pixel.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SpatialPatterns {
+    /// Frequencies along rows, cycles a pixel.
+    pub horizontal_cycles_per_pixel: Vec<f64>,
+    /// The root of the power of dark patterns at each, electrons.
+    pub horizontal_dsnu_e: Vec<f64>,
+    /// The root of the power of bright patterns, percent of the signal.
+    pub horizontal_prnu_percent: Vec<f64>,
+    /// Frequencies along columns.
+    pub vertical_cycles_per_pixel: Vec<f64>,
+    /// The same of dark patterns along columns.
+    pub vertical_dsnu_e: Vec<f64>,
+    /// The same of bright ones.
+    pub vertical_prnu_percent: Vec<f64>,
+    /// The variance of dark patterns over that of white ones of the median of the spectrum along rows, and along columns: 1 of white noise.
+    pub dsnu_nonwhiteness: [f64; 2],
+    /// The same of bright ones.
+    pub prnu_nonwhiteness: [f64; 2],
+    /// Shares of all pixels, in powers of a half from 1/2 on, and by how many electrons these or fewer pixels are off in the dark.
+    pub dsnu_accumulated_e: Vec<(f64, f64)>,
+    /// The same of the response, percent of the signal.
+    pub prnu_accumulated_percent: Vec<(f64, f64)>,
+}
+
+impl SpatialPatterns {
+    fn of(dark: &FrameStack, bright: &FrameStack, gain_dn_per_e: f64) -> Self {
+        let (to_e, to_percent) = (1.0 / gain_dn_per_e, 100.0 / (bright.mean() - dark.mean()));
+        let scaled = |spectrogram: &Spectrogram, by: f64| spectrogram.amplitude_dn.iter().map(|v| v * by).collect();
+        let along = [true, false].map(|rows| (dark.spectrogram(rows), bright.spectrogram(rows)));
+        let variance = |stack: &FrameStack| {
+            stack.deviations_dn().iter().map(|v| v * v).sum::<f64>() / stack.deviations_dn().len() as f64
+        };
+        let nonwhite = |stack: &FrameStack, of: &Spectrogram| variance(stack) / of.white_dn().powi(2);
+        let [(dark_along_rows, bright_along_rows), (dark_along_columns, bright_along_columns)] = &along;
+        Self {
+            horizontal_cycles_per_pixel: dark_along_rows.frequencies.clone(),
+            horizontal_dsnu_e: scaled(dark_along_rows, to_e),
+            horizontal_prnu_percent: scaled(bright_along_rows, to_percent),
+            vertical_cycles_per_pixel: dark_along_columns.frequencies.clone(),
+            vertical_dsnu_e: scaled(dark_along_columns, to_e),
+            vertical_prnu_percent: scaled(bright_along_columns, to_percent),
+            dsnu_nonwhiteness: [nonwhite(dark, dark_along_rows), nonwhite(dark, dark_along_columns)],
+            prnu_nonwhiteness: [nonwhite(bright, bright_along_rows), nonwhite(bright, bright_along_columns)],
+            dsnu_accumulated_e: accumulated(dark.deviations_dn(), to_e),
+            prnu_accumulated_percent: accumulated(bright.deviations_dn(), to_percent),
+        }
+    }
+}
+
+/// Returns by how much halves, quarters, eighths … of the pixels are off at least: defects are at its end.
+fn accumulated(deviations_dn: Vec<f64>, scale: f64) -> Vec<(f64, f64)> {
+    let mut off: Vec<f64> = deviations_dn.into_iter().map(f64::abs).collect();
+    off.sort_unstable_by(|a, b| b.total_cmp(a));
+    let n = off.len();
+    let mut shares = Vec::new();
+    let mut count = n / 2;
+    while count >= 1 {
+        shares.push((count as f64 / n as f64, scale * off[count - 1]));
+        count /= 2;
+    }
+    shares
 }
 
 /// What a sensor's data sheet says.
@@ -157,6 +234,8 @@ pub struct NoisePoint {
     pub snr: Option<f64>,
     /// The ratio that the linear model gives for as many electrons.
     pub model_snr: Option<f64>,
+    /// The same of one frame with what differs from pixel to pixel; none without stacks.
+    pub total_snr: Option<f64>,
 }
 
 /// Puts a sensor on the simulated bench; its frames are kept as 16-bit PNG with a descriptor where a folder is given.
@@ -344,6 +423,12 @@ impl Collected {
             responsivity_dn_per_photon: counted(transfer.responsivity_dn_per_photon),
             quantum_efficiency: counted(transfer.quantum_efficiency),
             dark_noise_e: transfer.dark_noise_e,
+            dark_noise_is_limit: transfer.dark_noise_is_limit,
+            linearity_error_percent: transfer.linearity.as_ref().map(|linearity| 100.0 * linearity.mean_error),
+            largest_linearity_error_percent: transfer
+                .linearity
+                .as_ref()
+                .map(|linearity| 100.0 * linearity.largest_error),
             saturation_e: transfer.saturation_e,
             saturation_photons: counted(transfer.saturation_e / transfer.quantum_efficiency),
             threshold_e,
@@ -353,26 +438,34 @@ impl Collected {
             max_snr_db: 20.0 * transfer.max_snr().log10(),
             dsnu_e: uniformity.map(|u| u.dsnu_e),
             prnu_percent: uniformity.map(|u| 100.0 * u.prnu_fraction),
+            dsnu_parts_e: uniformity.map(|u| u.dsnu_parts_e),
+            prnu_parts_percent: uniformity.map(|u| percent(u.prnu_parts_fraction)),
+            patterns: self
+                .stacks(&transfer)
+                .map(|(dark, bright)| SpatialPatterns::of(dark, bright, transfer.gain_dn_per_e)),
             dark_current_by_mean_e_per_s: current.map(|c| c.by_mean_e_per_s),
             dark_current_by_variance_e_per_s: current.map(|c| c.by_variance_e_per_s),
             raised_black_dn: 0,
             data_sheet: None,
-            points: noise_points(&transfer, are_counted),
+            points: noise_points(&transfer, uniformity.as_ref(), are_counted),
         })
     }
 
     /// Returns the non-uniformities, where there are stacks of dark frames and of frames about half saturation.
     fn uniformity(&self, transfer: &PhotonTransfer) -> Result<Option<NonUniformity>, PipelineError> {
+        let measured =
+            self.stacks(transfer).map(|(dark, bright)| NonUniformity::measure(dark, bright, transfer.gain_dn_per_e));
+        Ok(measured.transpose()?)
+    }
+
+    /// Returns the stacks of dark frames and of frames about half saturation.
+    fn stacks(&self, transfer: &PhotonTransfer) -> Option<(&FrameStack, &FrameStack)> {
         let dark_dn = transfer.dark.mean_dn;
         let from_half =
             |s: &Measured| ((s.point.mean_dn - dark_dn) / transfer.gain_dn_per_e / transfer.saturation_e - 0.5).abs();
         let stacked = |is_dark: bool| self.series.iter().filter(move |s| s.is_dark() == is_dark && s.stack.is_some());
         let bright = stacked(false).min_by(|a, b| from_half(a).total_cmp(&from_half(b)));
-        let (Some(dark), Some(bright)) = (stacked(true).next(), bright) else { return Ok(None) };
-        match (&dark.stack, &bright.stack) {
-            (Some(dark), Some(bright)) => Ok(Some(NonUniformity::measure(dark, bright, transfer.gain_dn_per_e)?)),
-            _ => Ok(None),
-        }
+        stacked(true).next()?.stack.as_ref().zip(bright?.stack.as_ref())
     }
 
     /// Returns the dark current, where dark frames were taken at three times or more.
@@ -389,7 +482,11 @@ impl Collected {
     }
 }
 
-fn noise_points(transfer: &PhotonTransfer, are_counted: bool) -> Vec<NoisePoint> {
+fn percent(Parts { row, column, pixel }: Parts) -> Parts {
+    Parts { row: 100.0 * row, column: 100.0 * column, pixel: 100.0 * pixel }
+}
+
+fn noise_points(transfer: &PhotonTransfer, uniformity: Option<&NonUniformity>, are_counted: bool) -> Vec<NoisePoint> {
     [transfer.dark]
         .iter()
         .chain(&transfer.points)
@@ -404,6 +501,7 @@ fn noise_points(transfer: &PhotonTransfer, are_counted: bool) -> Vec<NoisePoint>
                 electrons,
                 snr: is_lit.then(|| transfer.snr(point)),
                 model_snr: (index > 0).then(|| transfer.model_snr(electrons)),
+                total_snr: uniformity.filter(|_| index > 0).map(|u| u.total_snr(transfer, electrons)),
             }
         })
         .collect()

@@ -1,16 +1,71 @@
 //! Plots of the photon transfer.
 
-use super::{Measurement, NoiseData, NoisePoint};
+use super::{Measurement, NoiseData, NoisePoint, SpatialPatterns};
 use crate::{Corner, LineChart, Scale, Series, palette};
 
 impl Measurement for NoiseData {
     fn charts(&self) -> Vec<(String, LineChart)> {
-        vec![("photon-transfer".to_owned(), self.transfer_plot()), ("snr".to_owned(), self.snr_plot())]
+        let mut charts =
+            vec![("photon-transfer".to_owned(), self.transfer_plot()), ("snr".to_owned(), self.snr_plot())];
+        if let Some(patterns) = &self.patterns {
+            charts.extend([
+                ("spectrogram-dsnu".to_owned(), patterns.spectrogram("Spectrogram of the dark", "electrons", true)),
+                ("spectrogram-prnu".to_owned(), patterns.spectrogram("Spectrogram at half saturation", "%", false)),
+                ("accumulated-dsnu".to_owned(), accumulated("DSNU, electrons", &patterns.dsnu_accumulated_e)),
+                ("accumulated-prnu".to_owned(), accumulated("PRNU, %", &patterns.prnu_accumulated_percent)),
+            ]);
+        }
+        charts
     }
 }
 
 const MEASURED: &str = palette::LINES[0];
 const MODEL: &str = palette::LINES[1];
+const TOTAL: &str = palette::LINES[2];
+
+impl SpatialPatterns {
+    fn spectrogram(&self, title: &str, unit: &str, is_dark: bool) -> LineChart {
+        let (horizontal, vertical) = match is_dark {
+            true => (&self.horizontal_dsnu_e, &self.vertical_dsnu_e),
+            false => (&self.horizontal_prnu_percent, &self.vertical_prnu_percent),
+        };
+        let line =
+            |frequencies: &[f64], values: &[f64]| frequencies.iter().copied().zip(values.iter().copied()).collect();
+        let most = horizontal.iter().chain(vertical).copied().fold(f64::MIN_POSITIVE, f64::max);
+        LineChart {
+            title: title.to_owned(),
+            x_label: "cycles per pixel".to_owned(),
+            y_label: format!("root of the power, {unit}"),
+            x_range: (0.0, 0.5),
+            y_range: (0.0, 1.1 * most),
+            series: vec![
+                series("along rows", MEASURED, line(&self.horizontal_cycles_per_pixel, horizontal), false),
+                series("along columns", MODEL, line(&self.vertical_cycles_per_pixel, vertical), false),
+            ],
+            legend: Corner::TopRight,
+            scale: Scale::Linear,
+        }
+    }
+}
+
+/// Returns the share of pixels that are off by a value or more.
+fn accumulated(label: &str, shares: &[(f64, f64)]) -> LineChart {
+    let points: Vec<(f64, f64)> =
+        shares.iter().map(|(share, off)| (*off, *share)).filter(|(off, _)| *off > 0.0).collect();
+    let (Some(first), Some(last)) = (points.first(), points.last()) else { return empty_chart() };
+    let least = 10.0_f64.powf(first.0.log10().floor());
+    let most = 10.0_f64.powf(last.0.log10().ceil()).max(10.0 * least);
+    LineChart {
+        title: "Pixels that are off by a value or more".to_owned(),
+        x_label: label.to_owned(),
+        y_label: "share of all pixels".to_owned(),
+        x_range: (least, most),
+        y_range: (10.0_f64.powf(last.1.log10().floor()), 1.0),
+        series: vec![Series { label: None, color: MEASURED.to_owned(), points, is_dashed: false }],
+        legend: Corner::TopRight,
+        scale: Scale::Logarithmic,
+    }
+}
 
 impl NoiseData {
     fn transfer_plot(&self) -> LineChart {
@@ -41,6 +96,7 @@ impl NoiseData {
         let lit = || self.points.iter().filter(|p| p.electrons > 0.0 && p.electrons <= self.saturation_e);
         let measured: Vec<(f64, f64)> = lit().filter_map(|p| Some((p.electrons, p.snr?))).collect();
         let model: Vec<(f64, f64)> = lit().filter_map(|p| Some((p.electrons, p.model_snr?))).collect();
+        let total: Vec<(f64, f64)> = lit().filter_map(|p| Some((p.electrons, p.total_snr?))).collect();
         let all = || measured.iter().chain(&model).filter(|p| p.1 > 0.0);
         let range = |of: fn(&(f64, f64)) -> f64| {
             let (low, high) = all().map(of).fold((f64::INFINITY, 0.0_f64), |(l, h), v| (l.min(v), h.max(v)));
@@ -58,7 +114,10 @@ impl NoiseData {
             series: vec![
                 series("measured", MEASURED, measured.clone(), false),
                 series("linear model", MODEL, model, true),
-            ],
+            ]
+            .into_iter()
+            .chain((!total.is_empty()).then(|| series("with fixed patterns", TOTAL, total, true)))
+            .collect(),
             legend: Corner::TopLeft,
             scale: Scale::Logarithmic,
         }

@@ -1,9 +1,9 @@
 //! Pictures opened to be measured, in linear light.
 
-use std::path::Path;
+use std::{fs::File, io::Read, path::Path};
 
 use dioptric_scene::{PictureSamples, read_picture_samples};
-use dioptric_sensor::Picture;
+use dioptric_sensor::{ColorSpace, DngFile, Picture, Tile};
 use dioptric_spectrum::{Xyz, srgb_decode, srgb_encode};
 use ndarray::{Array2, Array3};
 
@@ -26,16 +26,43 @@ pub enum CodeCurve {
 pub struct MeasuredPicture {
     /// The file.
     pub name: String,
-    /// Each channel with its name; the highest code of a file of whole numbers is 1.
+    /// Each channel with its name; the highest code of a file of whole numbers is 1, saturation of a raw file.
     pub planes: Vec<(String, Array2<f32>)>,
+    /// The mosaic of the single plane of a raw file, and the names of its filters.
+    pub mosaic: Option<(Tile, Vec<String>)>,
+}
+
+/// Returns the raw frame of a file that is a DNG, whose first picture is but a preview; `None` for other files.
+///
+/// # Errors
+/// When it begins as a DNG does and cannot be read.
+pub(crate) fn read_dng(path: &Path) -> Result<Option<DngFile>, PipelineError> {
+    let mut head = [0; 4];
+    let is_tiff = File::open(path).and_then(|mut file| file.read_exact(&mut head)).is_ok()
+        && [*b"II*\0", *b"MM\0*"].contains(&head);
+    if !is_tiff || !std::fs::read(path).is_ok_and(|bytes| DngFile::is_dng(&bytes)) {
+        return Ok(None);
+    }
+    Ok(Some(DngFile::read(path)?))
 }
 
 impl MeasuredPicture {
-    /// Opens a PNG, JPEG, TIFF or EXR file.
+    /// Opens a PNG, JPEG, TIFF or EXR file, or the raw frame of a DNG: linear, and corrected as far as the file asks before demosaicing.
     ///
     /// # Errors
     /// When the file cannot be read, is empty or holds samples that are not finite.
     pub fn open(path: &Path, curve: CodeCurve) -> Result<Self, PipelineError> {
+        if let Some(DngFile { raw, .. }) = read_dng(path)? {
+            let (planes, names) = (raw.linear(), raw.filter_names);
+            // One filter everywhere is no mosaic.
+            let tile = raw.tile.filter(|_| names.len() > 1);
+            let named = if tile.is_some() { vec!["raw".to_owned()] } else { names.clone() };
+            return Ok(Self {
+                name: path.display().to_string(),
+                planes: named.into_iter().zip(planes).collect(),
+                mosaic: tile.map(|tile| (tile, names)),
+            });
+        }
         let PictureSamples { planes, top } = read_picture_samples(path)?;
         let wrong = |reason: &str| PipelineError::Read { path: path.to_owned(), reason: reason.to_owned() };
         if planes.first().is_none_or(|(_, plane)| plane.is_empty()) {
@@ -52,7 +79,20 @@ impl MeasuredPicture {
         let scale = top.map_or(1.0, |top| 1.0 / f32::from(top));
         let linear = |v: f32| if is_coded { srgb_decode(f64::from(v * scale)) as f32 } else { v * scale };
         let planes = planes.into_iter().map(|(name, plane)| (name, plane.mapv(linear))).collect();
-        Ok(Self { name: path.display().to_string(), planes })
+        Ok(Self { name: path.display().to_string(), planes, mosaic: None })
+    }
+
+    /// Refuses a mosaic, whose pixels are not all of one filter.
+    ///
+    /// # Errors
+    /// When the picture is the frame of a raw file with a mosaic.
+    pub(crate) fn require_whole(&self) -> Result<(), PipelineError> {
+        if self.mosaic.is_none() {
+            return Ok(());
+        }
+        let reason =
+            "holds a mosaic, of whose pixels each has one filter, expected a picture: `dioptric develop` makes one";
+        Err(PipelineError::Read { path: self.name.clone().into(), reason: reason.to_owned() })
     }
 
     /// Rows and columns.
@@ -68,8 +108,9 @@ impl MeasuredPicture {
     /// Returns the three channels R, G and B, or one gray channel three times; rows × columns × 3.
     ///
     /// # Errors
-    /// When the picture has other channels.
+    /// When the picture has other channels, or is a mosaic.
     pub fn rgb(&self) -> Result<Array3<f32>, PipelineError> {
+        self.require_whole()?;
         let planes = match (self.plane("R"), self.plane("G"), self.plane("B"), self.planes.as_slice()) {
             (Some(r), Some(g), Some(b), _) => [r, g, b],
             (_, _, _, [(_, gray)]) => [gray; 3],
@@ -103,6 +144,6 @@ impl MeasuredPicture {
     /// As [`rgb`](Self::rgb).
     pub fn coded(&self) -> Result<Picture, PipelineError> {
         let codes = self.rgb()?.mapv(|v| srgb_encode(f64::from(v.clamp(0.0, 1.0))) as f32);
-        Ok(Picture { codes })
+        Ok(Picture { codes, space: ColorSpace::Srgb })
     }
 }

@@ -96,6 +96,7 @@ impl PointRequest {
             return wrong("--window", side.to_string(), "an odd number of pixels, 3 or more");
         }
         let picture = MeasuredPicture::open(path, self.curve)?;
+        picture.require_whole()?;
         let in_file = |error: dioptric_sensor::SensorError| PipelineError::Read {
             path: path.to_owned(),
             reason: error.to_string(),

@@ -101,6 +101,7 @@ impl TextureRequest {
     /// When a file cannot be read, sizes differ, a region does not lie within the picture, or there is no texture.
     pub fn measure(&self, path: &Path) -> Result<TextureMeasurement, PipelineError> {
         let picture = MeasuredPicture::open(path, self.curve)?;
+        picture.require_whole()?;
         let viewing = viewing_of(self.pixels_per_degree, picture.size())?;
         let beside = |path: &PathBuf| -> Result<MeasuredPicture, PipelineError> {
             let other = MeasuredPicture::open(path, self.curve)?;

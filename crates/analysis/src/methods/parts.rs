@@ -48,7 +48,7 @@ fn pixels(camera: &Camera) -> Result<Option<(usize, usize, f64)>, PipelineError>
             let sensor = camera.sensor.open()?;
             Some((sensor.columns, sensor.rows, sensor.pixel_pitch_um))
         }
-        FilmSpec::Scene => None,
+        FilmSpec::Scene | FilmSpec::Field => None,
     })
 }
 

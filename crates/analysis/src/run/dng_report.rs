@@ -43,6 +43,8 @@ pub struct DngReport {
     pub brightness: f64,
     /// The processing.
     pub processing: Processing,
+    /// The corrections that the file asks for and that were made, by the names of their opcodes.
+    pub opcodes: Vec<String>,
     /// What the file asks for and was not done, a sentence each.
     pub notes: Vec<String>,
 }
@@ -76,6 +78,7 @@ impl DngReport {
             color_matrix: developed.color.rows.clone(),
             brightness: developed.brightness,
             processing: processing.clone(),
+            opcodes: file.opcodes.clone(),
             notes: file.notes.clone(),
         }
     }

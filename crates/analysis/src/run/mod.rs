@@ -202,7 +202,7 @@ impl RunReport {
                 rows: place.rows,
                 pitch_um: place.pitch_um,
                 part: place.part,
-                dark_fraction: run.capture.irradiance.summary.seen.dark_fraction(),
+                dark_fraction: run.capture.irradiance.summary.dark_fraction(),
             },
             scene: SceneData {
                 name: scene.name.clone(),

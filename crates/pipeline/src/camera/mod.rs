@@ -128,6 +128,9 @@ pub struct Camera {
     /// The seed of all noise.
     #[serde(default = "one")]
     pub seed: u64,
+    /// Which chip of its kind the sensor is: the seed of what stays with it, PRNU, DSNU, columns and defects.
+    #[serde(default)]
+    pub chip_seed: u64,
     /// What is written.
     #[serde(default)]
     pub outputs: Outputs,
@@ -202,6 +205,8 @@ pub enum FilmSpec {
     /// As many pixels as the scene has samples, of such a pitch that they see the scene's field. The sensor's
     /// pixels are taken to be of this size.
     Scene,
+    /// The pixels of the sensor, as many of them as the scene's field covers.
+    Field,
     /// Pixels of the user's choice. The sensor's pixels are taken to be of this size.
     Pixels {
         /// Columns.

@@ -1,8 +1,8 @@
 //! What a command line changes of the sensor's frames and of the picture.
 
-use dioptric_sensor::{ExposureControl, NoiseSources, Processing};
+use dioptric_sensor::{Exposure, ExposureControl, GainMode, Metering, NoiseSources, Processing};
 
-use crate::{PictureOptions, PipelineError, with_analog_gain};
+use crate::{PictureOptions, PipelineError, with_analog_gain, words::with_shot};
 
 /// Changes to noise, gain and processing as words; what is `None` stays.
 #[derive(Clone, Debug, Default)]
@@ -11,6 +11,12 @@ pub struct SensorOptions {
     pub noise: Option<String>,
     /// The factor on the voltage after the pixel.
     pub analog_gain: Option<f64>,
+    /// Which readout of a dual-gain pixel, as [`GainMode::parse`] has it.
+    pub gain_mode: Option<String>,
+    /// The temperature of the chip, °C.
+    pub temperature_c: Option<f64>,
+    /// What an automatic exposure looks at, as [`Metering::parse`] has it.
+    pub metering: Option<String>,
     /// Changes to the way from the raw frame to the picture.
     pub picture: PictureOptions,
 }
@@ -32,6 +38,24 @@ impl SensorOptions {
         if let Some(gain) = self.analog_gain {
             *exposure = with_analog_gain(*exposure, gain);
             exposure.check()?;
+        }
+        if let Some(name) = &self.gain_mode {
+            let gain_mode = GainMode::parse(name)?;
+            *exposure = with_shot(*exposure, |shot| Exposure { gain_mode, ..shot });
+        }
+        if let Some(temperature_c) = self.temperature_c {
+            *exposure = with_shot(*exposure, |shot| Exposure { temperature_c, ..shot });
+            exposure.check()?;
+        }
+        if let Some(word) = &self.metering {
+            let metering = Metering::parse(word)?;
+            match exposure {
+                ExposureControl::Auto(auto) => auto.metering = metering,
+                ExposureControl::Manual(_) => {
+                    let reason = "is of an automatic exposure, but a time is given".to_owned();
+                    return Err(PipelineError::Unsuitable { what: "the metering", reason });
+                }
+            }
         }
         self.picture.apply(processing)
     }

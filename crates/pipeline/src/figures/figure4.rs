@@ -76,7 +76,7 @@ pub fn panels(camera: &Camera, progress: &dyn Progress, cancel: &Cancel) -> Resu
         let capture = kept.capture(progress, cancel)?;
         let sensor = Sensor { read_noise_v, ..capture.sensor.clone() };
         let exposure = capture.frames.exposure;
-        let noise = Noise { sources: camera.noise, ..Noise::all(camera.seed) };
+        let noise = Noise { sources: camera.noise, fixed_pattern_seed: camera.chip_seed, ..Noise::all(camera.seed) };
         let exposed = camera.frames.expose(&sensor, &at_rest(&capture.rate), &exposure, &noise)?;
         let picture = sensor.develop(exposed.developed_from(), &capture.processing)?.picture;
         Ok(Panel { name, exposure_s: exposure.time_s, picture })

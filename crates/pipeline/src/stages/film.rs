@@ -109,6 +109,10 @@ pub(super) fn place(
         Raster::Pixels(full) => binned(&full, inputs.geometry.quality),
         // As coarse as the scene is by now.
         Raster::Scene => (size_film(reference, film_distance_mm, scene)?, resolved.binning),
+        Raster::Field(sensor) => {
+            let covered = size_film(reference, film_distance_mm, scene)?;
+            binned(&covered_pixels(&sensor, &covered), inputs.geometry.quality)
+        }
     };
     let (part, film) = match inputs.crop {
         Some(crop) => {
@@ -140,6 +144,15 @@ pub(super) fn binned(full: &Film, quality: Quality) -> (Film, usize) {
     let binning = quality.film_binning(full.columns);
     let fewer = |n: usize| (n / binning).max(1);
     (Film::centered(fewer(full.rows), fewer(full.columns), full.pitch_um * binning as f64), binning)
+}
+
+/// Returns as many pixels of a sensor, about its middle, as a film covers.
+fn covered_pixels(sensor: &Film, covered: &Film) -> Film {
+    let count = |samples: usize, most: usize| {
+        let pixels = samples as f64 * covered.pitch_um / sensor.pitch_um;
+        ((pixels + 1e-6).floor() as usize).clamp(1, most)
+    };
+    Film::centered(count(covered.rows, sensor.rows), count(covered.columns, sensor.columns), sensor.pitch_um)
 }
 
 fn place_film(focus: FocusSpec, lens: &MonoLens, scene: &Scene) -> Result<f64, PipelineError> {
@@ -305,6 +318,16 @@ mod tests {
         // for the distortion between the corner, which ends the film without the shift, and the side, which ends it with.
         let shift_um = straight_um - seen_pitch_of_any_um(&aside, film_distance_mm, &view, half);
         assert_abs_diff_eq!(shift_um, 1e3 / half.x, epsilon = 2e-3 * straight_um);
+    }
+
+    #[test]
+    fn a_scene_covers_pixels_of_the_sensor_and_no_more_than_it_has() {
+        let sensor = Film::centered(1088, 1456, 3.45);
+        let covered = covered_pixels(&sensor, &Film::centered(100, 150, 10.0));
+        assert_eq!((covered.rows, covered.columns, covered.pitch_um), (289, 434, 3.45));
+        let wide = covered_pixels(&sensor, &Film::centered(4000, 6000, 10.0));
+        assert_eq!((wide.rows, wide.columns), (1088, 1456));
+        assert_eq!(covered_pixels(&sensor, &Film::centered(1, 1, 0.1)).columns, 1);
     }
 
     #[test]

@@ -10,7 +10,7 @@ use std::{
 
 use dioptric_forward::{ImagingPlan, ImagingTimes, Source};
 use dioptric_scene::{ExrSamples, Scene, SpectralHead, read_spectral_exr};
-use dioptric_spectrum::{Bands, Observer, Quantity, SpectralImage, SpectrumError, WavelengthGrid};
+use dioptric_spectrum::{Bands, Illuminant, Observer, Quantity, SpectralImage, SpectrumError, WavelengthGrid};
 use ndarray::{Array2, Array3, ArrayView3, Axis, s};
 
 use super::{
@@ -22,7 +22,7 @@ use super::{
 };
 use crate::{
     PipelineError, Stage,
-    display::{LinearRgb, SpectrumToRgb},
+    display::{LinearRgb, SpectrumToRgb, dark_fraction},
 };
 
 /// The name of the file of spectral irradiance.
@@ -73,10 +73,20 @@ pub struct IrradianceSummary {
     pub max: Vec<f64>,
     /// Mean illuminance, lux.
     pub mean_lux: f64,
-    /// All bands as an observer sees them, linear sRGB in lux; without pixels where it is that of a photodiode.
+    /// All bands as an observer sees them, linear sRGB in lux, or their sum in gray where none is visible; without pixels where it is that of a
+    /// photodiode.
     pub seen: LinearRgb,
+    /// The sum of all bands; without pixels where it is that of a photodiode.
+    total: Array2<f32>,
     /// Surfaces narrower than the pupil, where the scene has any and was imaged in layers of depth.
     pub narrow_surfaces: Option<NarrowSurfaces>,
+}
+
+impl IrradianceSummary {
+    /// Returns the share of the film's samples that get next to nothing of the mean light, visible or not.
+    pub fn dark_fraction(&self) -> f64 {
+        dark_fraction(&self.total)
+    }
 }
 
 impl Irradiance {
@@ -158,6 +168,20 @@ impl Irradiance {
     /// # Errors
     /// When the file cannot be written.
     pub fn write_exr(&self, path: &Path, samples: ExrSamples) -> Result<(), PipelineError> {
+        self.write_exr_under(None, path, samples)
+    }
+
+    /// Writes it with the light on the scene, by which whoever develops it makes white.
+    ///
+    /// # Errors
+    /// When the file cannot be written.
+    pub fn write_exr_under(
+        &self,
+        light: Option<&Illuminant>,
+        path: &Path,
+        samples: ExrSamples,
+    ) -> Result<(), PipelineError> {
+        let light = light.and_then(|light| ron::to_string(light).ok());
         if let Some((file, of_file)) = &self.stored
             && *of_file == samples
             && FileStamp::of(file.path()) == *file
@@ -172,6 +196,7 @@ impl Irradiance {
             pitch_um: Some(self.pitch_um),
             depth: None,
             view: None,
+            light: light.as_deref(),
             largest: self.summary.max.iter().fold(0.0, |a, &b| a.max(b as f32)),
             samples,
             at_once_bytes: STRIP_BYTES,
@@ -229,6 +254,7 @@ impl Irradiance {
     #[must_use]
     pub(super) fn without_seen(mut self) -> Self {
         self.summary.seen = LinearRgb::black(0, 0);
+        self.summary.total = Array2::zeros((0, 0));
         self
     }
 
@@ -373,9 +399,10 @@ impl Summing {
             max: Vec::with_capacity(grid.len()),
             mean_lux: 0.0,
             seen: LinearRgb::black(rows, columns),
+            total: Array2::zeros((rows, columns)),
             narrow_surfaces: None,
         };
-        Self { to_rgb: SpectrumToRgb::new(grid), luminous, summary }
+        Self { to_rgb: SpectrumToRgb::shown(grid), luminous, summary }
     }
 
     fn add(&mut self, band: usize, plane: &Array2<f32>) {
@@ -384,6 +411,7 @@ impl Summing {
         self.summary.max.push(max.into());
         self.summary.mean_lux += self.luminous[band] * mean;
         self.summary.seen.add(plane, self.to_rgb.of_band(band));
+        self.summary.total += plane;
     }
 }
 

@@ -297,7 +297,7 @@ impl KeptCamera {
     pub fn film_size_mm(&self, progress: &dyn Progress, cancel: &Cancel) -> Result<[f64; 2], PipelineError> {
         let film = match self.irradiance_inputs()?.plan.bank.film.raster {
             Raster::Pixels(film) => film,
-            Raster::Scene => self.lens_and_film(progress, cancel)?.1.film(),
+            Raster::Scene | Raster::Field(_) => self.lens_and_film(progress, cancel)?.1.film(),
         };
         Ok([film.columns, film.rows].map(|n| 1e-3 * film.pitch_um * n as f64))
     }

@@ -130,6 +130,8 @@ pub(crate) enum Raster {
     Pixels(Film),
     /// As many as the scene has samples.
     Scene,
+    /// As many of these as the scene's field covers.
+    Field(Film),
 }
 
 /// The point spread functions of the lens.
@@ -219,7 +221,7 @@ fn check_patch(camera: &Camera, sensor: &Sensor) -> Result<(), PipelineError> {
         (Some(crop), _) => (crop.columns, crop.rows),
         (None, FilmSpec::Sensor) => (sensor.columns, sensor.rows),
         (None, FilmSpec::Pixels { columns, rows, .. }) => (columns, rows),
-        (None, FilmSpec::Scene) => return Ok(()),
+        (None, FilmSpec::Scene | FilmSpec::Field) => return Ok(()),
     };
     let is_within = left.saturating_add(width) <= columns && top.saturating_add(height) <= rows && width * height > 0;
     if is_within {
@@ -324,13 +326,15 @@ impl SceneInputs {
 impl IrradianceInputs {
     pub(crate) fn of(camera: &Camera, given: &GivenParts, sensor: &Sensor, quality: Quality) -> Self {
         let mut scene = SceneInputs::of(camera, given, quality);
+        let of_sensor = Film::centered(sensor.rows, sensor.columns, sensor.pixel_pitch_um);
         let raster = match camera.film {
-            FilmSpec::Sensor => Raster::Pixels(Film::centered(sensor.rows, sensor.columns, sensor.pixel_pitch_um)),
+            FilmSpec::Sensor => Raster::Pixels(of_sensor),
+            FilmSpec::Field => Raster::Field(of_sensor),
             FilmSpec::Pixels { columns, rows, pitch_um } => Raster::Pixels(Film::centered(rows, columns, pitch_um)),
             FilmSpec::Scene => Raster::Scene,
         };
         let lens = LensInputs::of(camera, given);
-        if let Raster::Pixels(film) = &raster {
+        if let Raster::Pixels(film) | Raster::Field(film) = &raster {
             let is_large = given.scene.is_none() && is_large_picture(&camera.scene);
             scene.geometry.seen_by = is_large.then(|| (Box::new(lens.clone()), film.pitch_um));
         }
@@ -424,7 +428,7 @@ impl PictureInputs {
             shutter: ShutterInputs {
                 exposure: camera.exposure,
                 frames: camera.frames.clone(),
-                noise: Noise { sources: camera.noise, ..Noise::all(camera.seed) },
+                noise: Noise { sources: camera.noise, fixed_pattern_seed: camera.chip_seed, ..Noise::all(camera.seed) },
             },
         };
         Ok(Self { frames, processing: camera.processing.clone() })

@@ -179,7 +179,7 @@ impl KeptCamera {
             inputs.frames.electrons.filters.iter().filter_map(|filter| filter.note_beyond_table(irradiance.grid())),
         );
         notes.extend(electrons::note_on_angles(&sensor, &lens.lens, self.camera().movements));
-        notes.extend(note_on_dark_film(irradiance.summary.seen.dark_fraction()));
+        notes.extend(note_on_dark_film(irradiance.summary.dark_fraction()));
         if spec.motion != CameraTurn::default() {
             notes.push(
                 "frames move as through a lens without distortion that turns about its entrance pupil: straight lines stay straight and near \

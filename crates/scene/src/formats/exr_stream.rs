@@ -15,7 +15,7 @@ use exr::{
         write as write_chunks,
         writer::{ChunkWriter, ChunksWriter},
     },
-    meta::{BlockDescription, Headers, header::Header},
+    meta::{BlockDescription, Headers, MetaData, attribute::AttributeValue, header::Header},
     prelude::{ChannelDescription, LayerAttributes, LineOrder, SmallVec, Text, Vec2},
 };
 use ndarray::s;
@@ -24,7 +24,7 @@ use rayon::prelude::*;
 use super::{
     band_name, exr_attributes,
     exr_samples::{ExrSamples, Stored, check_size},
-    unusable::{open_new, unwritable},
+    unusable::{open_new, unreadable, unwritable},
 };
 use crate::{SceneError, View};
 
@@ -43,6 +43,8 @@ pub struct SpectralHead<'a> {
     pub depth: Option<&'a DepthMap>,
     /// Pinhole geometry, written as attributes.
     pub view: Option<View>,
+    /// The light on the scene, in words of whoever reads it.
+    pub light: Option<&'a str>,
     /// The largest sample of all bands, which half floats are fitted to.
     pub largest: f32,
     /// How samples are stored.
@@ -89,6 +91,22 @@ impl SpectralHead<'_> {
     }
 }
 
+/// The attribute of the light on the scene.
+const LIGHT: &str = "illuminant";
+
+/// Returns the light on the scene that the header of an EXR file states, in the words of [`SpectralHead::light`].
+///
+/// # Errors
+/// When the file cannot be read.
+pub fn read_exr_light(path: &Path) -> Result<Option<String>, SceneError> {
+    let meta = MetaData::read_from_file(path, false).map_err(|error| unreadable(path, error.to_string()))?;
+    let stated = meta.headers.iter().find_map(|header| header.own_attributes.other.get(&Text::from(LIGHT)));
+    Ok(match stated {
+        Some(AttributeValue::Text(light)) => Some(light.to_string()),
+        _ => None,
+    })
+}
+
 /// The name of the channel of depth.
 const DEPTH: &str = "Z";
 
@@ -124,6 +142,9 @@ impl Channels {
         let channels = self.by_name.iter().map(channel).collect();
         let mut attributes = LayerAttributes::default();
         exr_attributes::add_to(&mut attributes, stored.unit.text.as_deref(), head.pitch_um, head.view);
+        if let Some(light) = head.light {
+            attributes.other.insert(Text::from(LIGHT), AttributeValue::Text(Text::from(light)));
+        }
         let (rows, columns) = head.size;
         let header = Header::new(Text::from("bands"), Vec2(columns, rows), channels)
             .with_attributes(attributes)

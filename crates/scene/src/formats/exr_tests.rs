@@ -127,6 +127,7 @@ fn head(image: &SpectralImage, samples: ExrSamples) -> SpectralHead<'_> {
         pitch_um: image.pitch_um(),
         depth: None,
         view: None,
+        light: None,
         largest,
         samples,
         at_once_bytes: 1 << 20,

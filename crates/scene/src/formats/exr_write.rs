@@ -61,6 +61,7 @@ fn write_single_layer(path: &Path, image: &SpectralImage, parts: &ExrParts<'_>) 
         pitch_um: image.pitch_um().or(parts.pitch_um),
         depth: parts.depth,
         view: parts.view,
+        light: None,
         largest: largest(image.planes()),
         samples: parts.samples,
         at_once_bytes: AT_ONCE_BYTES,

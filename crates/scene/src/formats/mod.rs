@@ -29,7 +29,7 @@ pub(crate) use unusable::{check_made, unwritable};
 pub use band_folder::read_band_folder;
 pub use envi::{EnviCube, read_envi};
 pub use exr_samples::ExrSamples;
-pub use exr_stream::SpectralHead;
+pub use exr_stream::{SpectralHead, read_exr_light};
 pub use exr_write::{ExrParts, write_planes_exr, write_scene_exr, write_spectral_exr};
 pub use mat::{IsetScene, read_iset_mat};
 pub use picture::{PictureSamples, read_picture, read_picture_samples};

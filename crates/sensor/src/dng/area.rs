@@ -1,6 +1,7 @@
 //! The part of a stored frame that is shown.
 
 use super::{
+    corrections::Place,
     tags::{ACTIVE_AREA, DEFAULT_CROP_ORIGIN, DEFAULT_CROP_SIZE},
     tiff_reader::Fields,
 };
@@ -11,6 +12,9 @@ pub(super) struct Area {
     /// The first row and column of those that see light, from which mosaics and levels count.
     pub(super) active_top: usize,
     pub(super) active_left: usize,
+    /// How many see light.
+    pub(super) active_rows: usize,
+    pub(super) active_columns: usize,
     /// The first row and column that are shown, and how many.
     pub(super) top: usize,
     pub(super) left: usize,
@@ -48,11 +52,46 @@ impl Area {
         Ok(Self {
             active_top: top,
             active_left: left,
+            active_rows: height,
+            active_columns: width,
             top: top + whole(origin[1]),
             left: left + whole(origin[0]),
             rows: whole(size[1]),
             columns: whole(size[0]),
         })
+    }
+
+    /// Returns the same frame with all pixels that see light shown.
+    pub(super) fn whole(self) -> Self {
+        Self {
+            top: self.active_top,
+            left: self.active_left,
+            rows: self.active_rows,
+            columns: self.active_columns,
+            ..self
+        }
+    }
+
+    /// Rows and columns that are shown.
+    pub(super) fn size(&self) -> (usize, usize) {
+        (self.rows, self.columns)
+    }
+
+    /// Returns top, left, bottom and right of all that is shown, counted from its first pixel.
+    pub(super) fn corners(&self) -> [usize; 4] {
+        [0, 0, self.rows, self.columns]
+    }
+
+    /// Returns the same counted from the first pixel that sees light.
+    pub(super) fn shown_corners(&self) -> [usize; 4] {
+        let (down, right) = self.places_before();
+        [down, right, down + self.rows, right + self.columns]
+    }
+
+    /// Returns where what is shown lies among the pixels that see light.
+    pub(super) fn place(&self) -> Place {
+        let (top, left) = self.places_before();
+        Place { rows: self.active_rows, columns: self.active_columns, top, left }
     }
 
     /// Returns how many rows and columns of light lie before those that are shown.

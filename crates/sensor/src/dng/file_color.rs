@@ -1,6 +1,6 @@
-//! The colors of a camera as a DNG file states them: matrices for one light or two (DNG 1.4, chapter 6).
+//! The colors of a camera as a DNG file states them: matrices for one to three lights (DNG 1.6, chapter 6).
 
-use dioptric_spectrum::{ColorTemperature, Xyz, adapt_bradford};
+use dioptric_spectrum::{ColorTemperature, Illuminant, Xyz, adapt_bradford};
 use serde::Serialize;
 
 use crate::ColorMatrix;
@@ -11,7 +11,7 @@ const D50_XY: [f64; 2] = [0.3457, 0.3585];
 /// The color matrices of a file, rows by its planes.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct DngColor {
-    /// One for each calibration light, one or two.
+    /// One for each calibration light, one to three.
     pub lights: Vec<DngLight>,
     /// The factor on each plane before the matrices (`AnalogBalance`).
     pub analog_balance: Vec<f64>,
@@ -22,6 +22,8 @@ pub struct DngColor {
 pub struct DngLight {
     /// The number of the light (Exif `LightSource`).
     pub illuminant: usize,
+    /// The chromaticity of a light that the file describes itself (`IlluminantData`).
+    pub white_xy: Option<[f64; 2]>,
     /// A row a plane: the plane's signal of X, Y and Z (`ColorMatrix`).
     pub camera_from_xyz: Vec<[f64; 3]>,
     /// For X, Y and Z under D50 the factor of each balanced plane (`ForwardMatrix`); `None` where the file has none.
@@ -31,15 +33,31 @@ pub struct DngLight {
 }
 
 impl DngLight {
-    /// Returns the color temperature of the light, K; that of daylight where the number names none.
-    pub fn kelvin(&self) -> f64 {
-        kelvin_of(self.illuminant)
+    /// Returns the color temperature of the light, K; `None` where the file does not tell it.
+    pub fn kelvin(&self) -> Option<f64> {
+        match self.white_xy {
+            Some(white) => Some(ColorTemperature::of_chromaticity(white).kelvin),
+            None => kelvin_of(self.illuminant),
+        }
+    }
+
+    /// Returns how far the light is from that of a black body (Duv).
+    fn duv(&self) -> f64 {
+        let standard = match self.illuminant {
+            20 => Some(Illuminant::D55),
+            21 => Some(Illuminant::D65),
+            22 => Some(Illuminant::D75),
+            23 => Some(Illuminant::D50),
+            _ => None,
+        };
+        let white = self.white_xy.or_else(|| standard.map(|light| light.chromaticity()));
+        white.map_or(0.0, |white| ColorTemperature::of_chromaticity(white).duv)
     }
 }
 
-/// Returns the color temperature of a light by its Exif number: the middle of its range where it has one.
-fn kelvin_of(number: usize) -> f64 {
-    match number {
+/// Returns the color temperature of a light by its Exif number: the middle of its range where it has one, `None` where the number names none.
+fn kelvin_of(number: usize) -> Option<f64> {
+    Some(match number {
         3 | 17 => 2856.0,
         18 => 4874.0,
         19 => 6774.0,
@@ -52,8 +70,9 @@ fn kelvin_of(number: usize) -> f64 {
         14 | 2 => 4200.0,
         15 => 3450.0,
         16 => 2925.0,
-        _ => 5503.0,
-    }
+        1 | 4 | 9 | 20 => 5503.0,
+        _ => return None,
+    })
 }
 
 /// The matrices for one white.
@@ -68,29 +87,63 @@ impl DngColor {
         self.analog_balance.len()
     }
 
-    /// Returns the matrices for a white: between those of the two lights by the inverse of its temperature.
+    /// Returns the share of each light in the matrices for a white; the first has all where the file tells the temperature of no other.
+    fn shares(&self, white_xy: [f64; 2]) -> Vec<f64> {
+        let known: Vec<(usize, f64)> =
+            self.lights.iter().enumerate().filter_map(|(i, light)| Some((i, light.kelvin()?))).collect();
+        let mut shares = vec![0.0; self.lights.len()];
+        match known.as_slice() {
+            [] => shares[0] = 1.0,
+            &[(only, _)] => shares[only] = 1.0,
+            &[(first, from_k), (second, to_k)] => {
+                // By the inverse of the temperature, held to those of the lights.
+                let mired = 1e6 / ColorTemperature::of_chromaticity(white_xy).kelvin;
+                let [from, to] = [from_k, to_k].map(|kelvin| 1e6 / kelvin);
+                let share = if from == to { 0.0 } else { ((mired - from) / (to - from)).clamp(0.0, 1.0) };
+                (shares[first], shares[second]) = (1.0 - share, share);
+            }
+            several => {
+                let white = ColorTemperature::of_chromaticity(white_xy);
+                let [wx, wy] = place_of(white.kelvin, white.duv);
+                for &(i, kelvin) in several {
+                    let [x, y] = place_of(kelvin, self.lights[i].duv());
+                    shares[i] = 1.0 / ((x - wx).powi(2) + (y - wy).powi(2) + 1e-8);
+                }
+                normalize(&mut shares);
+                // What is far away does not count at all, and nothing jumps.
+                shares.iter_mut().for_each(|share| {
+                    let smooth = *share * *share * (3.0 - 2.0 * *share);
+                    *share = ((smooth - 0.02) / 0.98).clamp(0.0, 1.0);
+                });
+                normalize(&mut shares);
+            }
+        }
+        shares
+    }
+
+    /// Returns the matrices for a white.
     fn at(&self, white_xy: [f64; 2]) -> AtWhite {
-        let of = |light: &DngLight| AtWhite {
-            camera_from_xyz: light.camera_from_xyz.clone(),
-            xyz_d50_from_balanced: light.xyz_d50_from_balanced.clone(),
-            calibration: light.calibration.clone(),
+        let shares = self.shares(white_xy);
+        let mixed: Vec<(f64, &DngLight)> =
+            shares.into_iter().zip(&self.lights).filter(|(share, _)| *share > 0.0).collect();
+        let n = self.n_planes();
+        let sum = |of: &dyn Fn(&DngLight) -> f64| mixed.iter().map(|(share, light)| share * of(light)).sum::<f64>();
+        let forward = |i: usize, plane: usize| {
+            sum(&|light| light.xyz_d50_from_balanced.as_ref().map_or(0.0, |rows| rows[i][plane]))
         };
-        let [first, second] = self.lights.as_slice() else { return of(&self.lights[0]) };
-        let mired = 1e6 / ColorTemperature::of_chromaticity(white_xy).kelvin;
-        let [from, to] = [first, second].map(|light| 1e6 / light.kelvin());
-        let share = if from == to { 0.0 } else { ((mired - from) / (to - from)).clamp(0.0, 1.0) };
-        let share = if share.is_nan() { 0.0 } else { share };
-        let mix = |a: f64, b: f64| a + share * (b - a);
-        let mix_rows = |a: &Vec<f64>, b: &Vec<f64>| a.iter().zip(b).map(|(a, b)| mix(*a, *b)).collect::<Vec<f64>>();
-        let forward = match (&first.xyz_d50_from_balanced, &second.xyz_d50_from_balanced) {
-            (Some(a), Some(b)) => Some([0, 1, 2].map(|i| mix_rows(&a[i], &b[i]))),
-            (a, b) => a.clone().or_else(|| b.clone()),
-        };
-        let matrices = first.camera_from_xyz.iter().zip(&second.camera_from_xyz);
+        let all_forward = mixed.iter().all(|(_, light)| light.xyz_d50_from_balanced.is_some());
         AtWhite {
-            camera_from_xyz: matrices.map(|(a, b)| [0, 1, 2].map(|i| mix(a[i], b[i]))).collect(),
-            xyz_d50_from_balanced: forward,
-            calibration: first.calibration.iter().zip(&second.calibration).map(|(a, b)| mix_rows(a, b)).collect(),
+            camera_from_xyz: (0..n)
+                .map(|plane| [0, 1, 2].map(|i| sum(&|light| light.camera_from_xyz[plane][i])))
+                .collect(),
+            xyz_d50_from_balanced: if all_forward {
+                Some([0, 1, 2].map(|i| (0..n).map(|plane| forward(i, plane)).collect()))
+            } else {
+                mixed.iter().find_map(|(_, light)| light.xyz_d50_from_balanced.clone())
+            },
+            calibration: (0..n)
+                .map(|plane| (0..n).map(|j| sum(&|light| light.calibration[plane][j])).collect())
+                .collect(),
         }
     }
 
@@ -162,6 +215,16 @@ impl DngColor {
     }
 }
 
+/// Returns the place of a light among three: tint (a three-thousandth of Duv) over 200, and 1500 K over its temperature (DNG 1.6).
+fn place_of(kelvin: f64, duv: f64) -> [f64; 2] {
+    [-3000.0 * duv / 200.0, (1500.0 / kelvin).min(1.0)]
+}
+
+fn normalize(shares: &mut [f64]) {
+    let sum: f64 = shares.iter().sum();
+    shares.iter_mut().for_each(|share| *share /= sum);
+}
+
 /// Returns the matrix to linear sRGB of one to XYZ under D50, its white made (1, 1, 1).
 fn to_srgb(to_d50: &[Vec<f64>]) -> Option<ColorMatrix> {
     let white = Xyz([0, 1, 2].map(|i| to_d50[i].iter().sum()));
@@ -218,6 +281,7 @@ mod tests {
         let rows = [[0.7, -0.2, -0.05], [-0.4, 1.3, 0.15], [-0.1, 0.2, 0.6]];
         DngLight {
             illuminant,
+            white_xy: None,
             camera_from_xyz: rows.map(|row| row.map(|v| v * scale)).to_vec(),
             xyz_d50_from_balanced: forward
                 .then(|| [vec![0.6, 0.2, 0.16], vec![0.25, 0.7, 0.05], vec![0.01, 0.02, 0.79]]),
@@ -235,6 +299,29 @@ mod tests {
             let found = color.white_of(&neutral);
             assert!((found[0] - white[0]).abs() < 1e-6 && (found[1] - white[1]).abs() < 1e-6, "{white:?} {found:?}");
         }
+    }
+
+    #[test]
+    fn shares_are_those_of_the_whites_of_the_lights() {
+        let of_lights = |lights: Vec<DngLight>| DngColor { lights, analog_balance: vec![1.0; 3] };
+        let described = |xy: [f64; 2]| DngLight { white_xy: Some(xy), ..light(255, 1.0, false) };
+        let (a, d65, fl11) = ([0.447_57, 0.407_45], [0.312_72, 0.329_03], [0.3805, 0.3769]);
+        // A light that the file describes is one that it numbers.
+        for white in [a, d65, fl11, [0.35, 0.36]] {
+            let numbered = of_lights(vec![light(17, 1.0, false), light(21, 1.0, false)]).shares(white);
+            let stated = of_lights(vec![described(a), described(d65)]).shares(white);
+            assert!((numbered[0] - stated[0]).abs() < 1e-3, "{numbered:?} {stated:?}");
+        }
+        // One that it does not tell leaves the first alone.
+        assert_eq!(of_lights(vec![light(255, 1.0, false), light(0, 1.0, false)]).shares(d65), [1.0, 0.0]);
+        assert_eq!(of_lights(vec![light(255, 1.0, false), light(21, 1.0, false)]).shares(a), [0.0, 1.0]);
+        // Of three each has its own white for itself, and shares always sum to 1.
+        let three = of_lights(vec![described(a), described(d65), described(fl11)]);
+        for (i, white) in [a, d65, fl11].into_iter().enumerate() {
+            assert!(three.shares(white)[i] > 0.999, "{:?}", three.shares(white));
+        }
+        let between = three.shares([0.345, 0.352]);
+        assert!((between.iter().sum::<f64>() - 1.0).abs() < 1e-12 && between[1] > between[0], "{between:?}");
     }
 
     #[test]

@@ -1,9 +1,13 @@
 //! What a DNG file states of its camera, as far as developing needs it.
 
 use dioptric_spectrum::Illuminant;
+use ndarray::{Array2, s};
 use serde::Serialize;
 
-use super::file_color::DngColor;
+use super::{
+    corrections::{Corrections, Place},
+    file_color::DngColor,
+};
 use crate::{
     ColorCorrection, ColorMatrix, Processing, Raw, SensorError, WhiteBalance, denoise::SampleNoise,
     profile::CameraProfile,
@@ -18,6 +22,31 @@ pub struct DngProfile {
     pub color: Option<DngColor>,
     /// Its noise: none where the file states none, one for all filters, or one each.
     pub noise: Vec<DngNoise>,
+    /// What is done to demosaiced channels.
+    #[serde(skip)]
+    pub(super) corrections: Option<ChannelCorrections>,
+}
+
+/// The third list of opcodes, with where the channels lie in the image that it is for, and the part of them that is shown.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct ChannelCorrections {
+    pub(super) list: Corrections,
+    pub(super) place: Place,
+    /// Top, left, bottom and right of what is shown, in the image of the list; `None` where the channels are that.
+    pub(super) shown: Option<[usize; 4]>,
+}
+
+impl ChannelCorrections {
+    fn apply(&self, channels: Vec<Array2<f32>>, balance: &[f64]) -> Vec<Array2<f32>> {
+        let scales: Vec<f32> = balance.iter().map(|gain| *gain as f32).collect();
+        let channels = self.list.apply(channels, self.place, (&scales, f32::INFINITY), &|_, _| true);
+        let Some(shown) = self.shown else { return channels };
+        let [top, left, bottom, right] = self.list.trimmed((self.place.rows, self.place.columns));
+        let cut = [shown[0].max(top), shown[1].max(left), shown[2].min(bottom), shown[3].min(right)];
+        // What is trimmed to nothing is left as it is.
+        let [top, left, bottom, right] = if cut[0] < cut[2] && cut[1] < cut[3] { cut } else { shown };
+        channels.into_iter().map(|channel| channel.slice(s![top..bottom, left..right]).to_owned()).collect()
+    }
 }
 
 /// The variance of a sample, `scale` × x + `offset`, of light x that is 1 at saturation (`NoiseProfile`).
@@ -80,6 +109,13 @@ impl CameraProfile for DngProfile {
         let none = DngNoise { scale: LEAST_SCALE, offset: 0.0 };
         let of = |filter: usize| self.noise.get(filter).or(self.noise.first()).copied().unwrap_or(none);
         (0..self.filter_names.len()).map(|filter| of(filter).of_samples()).collect()
+    }
+
+    fn corrected(&self, channels: Vec<Array2<f32>>, balance: &[f64]) -> Vec<Array2<f32>> {
+        match &self.corrections {
+            Some(corrections) => corrections.apply(channels, balance),
+            None => channels,
+        }
     }
 }
 

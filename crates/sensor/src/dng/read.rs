@@ -3,45 +3,43 @@
 use std::{fs, path::Path};
 
 use dioptric_files::memory;
-
+use ndarray::Array2;
 use serde::Serialize;
 
 use super::{
     area::Area,
     color::FILTERS,
+    corrections::{Corrections, Place},
     file_camera,
-    file_profile::DngProfile,
+    file_profile::{ChannelCorrections, DngProfile},
     levels::FileLevels,
-    samples,
+    samples::{self, Samples},
     tags::{
         BASELINE_EXPOSURE, CFA_LAYOUT, CFA_PATTERN, CFA_PLANE_COLOR, CFA_REPEAT_PATTERN_DIM, COLOR_FILTER_ARRAY,
         DEFAULT_SCALE, DNG_VERSION, EXIF_DIRECTORY, EXPOSURE_TIME, F_NUMBER, FOCAL_LENGTH, IMAGE_DESCRIPTION,
         IMAGE_LENGTH, IMAGE_WIDTH, LENS_MODEL, LINEAR_RAW, MAKE, MODEL, NEW_SUBFILE_TYPE, OPCODE_LIST_1, OPCODE_LIST_2,
-        OPCODE_LIST_3, ORIENTATION, OWN_MAKE, PHOTOGRAPHIC_SENSITIVITY, PHOTOMETRIC_INTERPRETATION, SUB_DIRECTORIES,
+        OPCODE_LIST_3, ORIENTATION, OWN_MAKE, PHOTOGRAPHIC_SENSITIVITY, PHOTOMETRIC_INTERPRETATION,
+        PROFILE_GAIN_TABLE_MAP, PROFILE_HUE_SAT_MAP_DATA_1, PROFILE_LOOK_TABLE_DATA, PROFILE_TONE_CURVE, RGB_TABLES,
+        SUB_DIRECTORIES,
     },
     tiff_reader::{Fields, TiffReader},
 };
-use crate::{Cfa, Developed, Exposure, Processing, Raw, SensorError, Tile, WhiteBalance, process::develop_linear};
+use crate::{
+    Cfa, Developed, Exposure, Levels, Processing, Raw, RawPlane, SensorError, Tile, WhiteBalance,
+    process::develop_linear,
+};
 
 /// The longest side of a mosaic's tile that is read.
 const LONGEST_TILE: usize = 16;
-/// The opcodes by their numbers from 1 on.
-const OPCODES: [&str; 14] = [
-    "WarpRectilinear",
-    "WarpFisheye",
-    "FixVignetteRadial",
-    "FixBadPixelsConstant",
-    "FixBadPixelsList",
-    "TrimBounds",
-    "MapTable",
-    "MapPolynomial",
-    "GainMap",
-    "DeltaPerRow",
-    "DeltaPerColumn",
-    "ScalePerRow",
-    "ScalePerColumn",
-    "WarpRectilinear2",
-];
+/// Whether the corrections that a file asks for, its opcodes, are made.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum DngOpcodes {
+    /// They are, each in its place.
+    #[default]
+    Applied,
+    /// The frame is taken as the sensor gave it.
+    Ignored,
+}
 
 /// A raw frame from a DNG file, with what the file states of it.
 #[derive(Clone, Debug, PartialEq)]
@@ -62,8 +60,12 @@ pub struct DngFile {
     pub orientation: usize,
     /// The camera and how it was set.
     pub shot: DngShot,
+    /// The corrections that the file asks for and that are made, by the names of their opcodes: to the frame, or to its picture.
+    pub opcodes: Vec<String>,
     /// What the file asks for and is not done, a sentence each.
     pub notes: Vec<String>,
+    /// All pixels that see light, where the picture takes some from beyond those that are shown.
+    pub(super) with_border: Option<Raw>,
 }
 
 /// What a raw file states of the camera and of how it was set (Exif); `None` where it does not.
@@ -94,15 +96,39 @@ impl DngFile {
     /// # Errors
     /// When the file cannot be read, is no DNG, or has samples of another kind.
     pub fn read(path: &Path) -> Result<Self, SensorError> {
+        Self::read_with(path, DngOpcodes::Applied)
+    }
+
+    /// Reads a file as [`read`](Self::read) does, with or without its opcodes.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn read_with(path: &Path, opcodes: DngOpcodes) -> Result<Self, SensorError> {
         let wrong = |reason: String| SensorError::Read { path: path.to_owned(), reason };
         let length = fs::metadata(path).map_err(|e| wrong(e.to_string()))?.len();
         memory::check(length, length).map_err(|e| wrong(e.to_string()))?;
         let bytes = fs::read(path).map_err(|e| wrong(e.to_string()))?;
-        Self::from_bytes(&bytes).map_err(wrong)
+        Self::from_bytes_with(&bytes, opcodes).map_err(|reason| match other_raw_format(&bytes) {
+            Some(format) => wrong(format!(
+                "is {format}, which is not read, expected a DNG file; Adobe's DNG Converter and `dnglab convert` make one of it"
+            )),
+            None => wrong(reason),
+        })
+    }
+
+    /// Returns whether bytes begin as a DNG file does.
+    pub fn is_dng(bytes: &[u8]) -> bool {
+        let first = TiffReader::new(bytes).and_then(|(file, first)| file.fields_at(first));
+        first.is_ok_and(|first| first.has(DNG_VERSION))
     }
 
     /// Reads the bytes of a file; the error is what is wrong with it.
+    #[cfg(test)]
     pub(crate) fn from_bytes(bytes: &[u8]) -> Result<Self, String> {
+        Self::from_bytes_with(bytes, DngOpcodes::Applied)
+    }
+
+    pub(super) fn from_bytes_with(bytes: &[u8], opcodes: DngOpcodes) -> Result<Self, String> {
         let (file, first) = TiffReader::new(bytes)?;
         let first = file.fields_at(first)?;
         if !first.has(DNG_VERSION) {
@@ -113,35 +139,58 @@ impl DngFile {
             0 => None,
             place => Some(file.fields_at(place)?),
         };
-        let stored = samples::read(file, &frame)?;
+        let mut stored = samples::read(file, &frame)?;
         let area = Area::read(&frame, (stored.rows, stored.columns))?;
+        let whole = area.whole();
         let (filter_names, tile) = mosaic(&frame, stored.n_planes, &area)?;
+        let (_, whole_tile) = mosaic(&frame, stored.n_planes, &whole)?;
+        let lists = Lists::read(&frame, opcodes)?;
+        lists.correct_codes(&mut stored, whole_tile.as_ref(), &area);
         let (color, neutral) = file_camera::color(&first, filter_names.len())?;
         let noise = file_camera::noise(&frame, &first, filter_names.len())?;
         let file_levels = FileLevels::read(&frame, &stored)?;
-        let profile = DngProfile { filter_names: filter_names.clone(), color, noise };
-        let saturation_e = profile.noise.first().map_or(f64::INFINITY, |noise| 1.0 / noise.scale);
-        let (planes, levels) = file_levels.planes(&stored, &area, saturation_e);
+        let saturation_e = noise.first().map_or(f64::INFINITY, |noise| 1.0 / noise.scale);
         let number = |tag: u16| -> Result<Option<f64>, String> {
             let found = exif.as_ref().map_or(Ok(Vec::new()), |exif| exif.numbers(tag))?;
             Ok(found.first().copied().filter(|value| value.is_finite() && *value > 0.0))
         };
         let exposure_time_s = number(EXPOSURE_TIME)?;
-        let raw = Raw {
-            planes,
-            tile,
-            filter_names,
-            levels,
-            exposure: Exposure::seconds(exposure_time_s.unwrap_or(0.0)),
-            row_time_us: 0.0,
-            merged: Vec::new(),
+        let frame_of = |area: &Area, tile: Option<Tile>| {
+            let (planes, levels) = file_levels.planes(&stored, area, saturation_e);
+            let raw = Raw {
+                planes,
+                tile,
+                filter_names: filter_names.clone(),
+                levels,
+                exposure: Exposure::seconds(exposure_time_s.unwrap_or(0.0)),
+                row_time_us: 0.0,
+                merged: Vec::new(),
+            };
+            lists.correct_light(raw, area, saturation_e)
         };
+        let raw = frame_of(&area, tile);
+        let needs_border =
+            lists.third.moves() && (area != whole || lists.third.trimmed(whole.size()) != whole.corners());
+        let with_border = needs_border.then(|| frame_of(&whole, whole_tile));
+        let shown = needs_border.then(|| area.shown_corners());
+        let corrections = (!lists.third.is_empty()).then(|| {
+            let place = if needs_border { whole.place() } else { area.place() };
+            ChannelCorrections { list: lists.third.clone(), place, shown }
+        });
+        let mut notes = notes(&first, &frame)?;
+        notes.extend(lists.notes.iter().cloned());
+        if let Some(color) = &color
+            && color.lights.len() > 1
+            && color.lights.iter().any(|light| light.kelvin().is_none())
+        {
+            notes.push("a color matrix of the file is for a light that it does not tell, and is not used".to_owned());
+        }
         Ok(Self {
             raw,
             bits: stored.bits,
             stored: (stored.columns, stored.rows),
             origin: (area.left, area.top),
-            profile,
+            profile: DngProfile { filter_names, color, noise, corrections },
             neutral,
             orientation: Some(first.one_or(ORIENTATION, 1)?).filter(|n| (1..=8).contains(n)).unwrap_or(1),
             shot: DngShot {
@@ -154,7 +203,9 @@ impl DngFile {
                 focal_length_mm: number(FOCAL_LENGTH)?,
                 iso_speed: number(PHOTOGRAPHIC_SENSITIVITY)?,
             },
-            notes: notes(&first, &frame)?,
+            opcodes: lists.names,
+            notes,
+            with_border,
         })
     }
 
@@ -171,13 +222,125 @@ impl DngFile {
             }
             (white, _) => white.clone(),
         };
+        // A patch counts from the first pixel that is shown.
+        let white = match (white, &self.with_border, self.profile.corrections.as_ref().and_then(|c| c.shown)) {
+            (WhiteBalance::Patch { left, top, width, height }, Some(_), Some([down, right, ..])) => {
+                WhiteBalance::Patch { left: left + right, top: top + down, width, height }
+            }
+            (white, ..) => white,
+        };
         let processing = Processing { white, ..processing.clone() };
         self.profile.check_processing(&processing)?;
-        let linear = develop_linear(&self.profile, &self.raw, &processing, None)?;
+        let raw = self.with_border.as_ref().unwrap_or(&self.raw);
+        let linear = develop_linear(&self.profile, raw, &processing, None)?;
         let mut developed = linear.encode(processing.brightness, processing.curve, processing.space);
         developed.picture = developed.picture.oriented(self.orientation);
         Ok(developed)
     }
+}
+
+/// The three lists of opcodes of a frame.
+#[derive(Default)]
+struct Lists {
+    first: Corrections,
+    second: Corrections,
+    third: Corrections,
+    /// The names of all that are applied.
+    names: Vec<String>,
+    notes: Vec<String>,
+}
+
+impl Lists {
+    fn read(frame: &Fields<'_>, opcodes: DngOpcodes) -> Result<Self, String> {
+        let list = |tag: u16| frame.bytes(tag).map_or(Ok(Corrections::default()), Corrections::read);
+        let first = list(OPCODE_LIST_1)?.without_trimming();
+        let (second, third) = (list(OPCODE_LIST_2)?.without_trimming(), list(OPCODE_LIST_3)?);
+        let of = |names: fn(&Corrections) -> &Vec<String>| -> Vec<String> {
+            [&first, &second, &third].into_iter().flat_map(names).cloned().collect()
+        };
+        let (names, unknown) = (of(|list| &list.names), of(|list| &list.unknown));
+        if opcodes == DngOpcodes::Ignored {
+            let all: Vec<String> = names.into_iter().chain(unknown).collect();
+            let notes =
+                (!all.is_empty()).then(|| format!("the file asks for {}, which was left out as asked", all.join(", ")));
+            return Ok(Self { notes: notes.into_iter().collect(), ..Self::default() });
+        }
+        let notes =
+            (!unknown.is_empty()).then(|| format!("the file asks for {}, which is not done", unknown.join(", ")));
+        Ok(Self { first, second, third, names, notes: notes.into_iter().collect() })
+    }
+
+    /// Applies the first list to the codes as they are stored.
+    fn correct_codes(&self, stored: &mut Samples, tile: Option<&Tile>, area: &Area) {
+        if self.first.is_empty() {
+            return;
+        }
+        let (rows, columns, n) = (stored.rows, stored.columns, stored.n_planes);
+        let top = f32::from(u16::MAX);
+        let plane = |plane: usize| {
+            Array2::from_shape_fn((rows, columns), |(r, c)| {
+                f32::from(stored.codes[(r * columns + c) * n + plane]) / top
+            })
+        };
+        let planes = (0..n).map(plane).collect();
+        let place = Place { rows, columns, top: 0, left: 0 };
+        let is_same = same_filter(tile, (area.active_top, area.active_left));
+        let changed = self.first.apply(planes, place, (&[], 1.0), &is_same);
+        let highest = f32::from(((1_u32 << stored.bits) - 1) as u16);
+        for (plane, values) in changed.iter().enumerate() {
+            for ((r, c), value) in values.indexed_iter() {
+                stored.codes[(r * columns + c) * n + plane] = (value * top).round().clamp(0.0, highest) as u16;
+            }
+        }
+    }
+
+    /// Applies the second list to the light of a frame.
+    fn correct_light(&self, raw: Raw, area: &Area, saturation_e: f64) -> Raw {
+        if self.second.is_empty() {
+            return raw;
+        }
+        let planes = self.second.apply(raw.linear(), area.place(), (&[], 1.0), &same_filter(raw.tile.as_ref(), (0, 0)));
+        Raw {
+            planes: planes.into_iter().map(|plane| RawPlane::Evened(plane.as_standard_layout().into_owned())).collect(),
+            levels: Levels::of_file((0.0, 1.0, 1.0), saturation_e, None),
+            ..raw
+        }
+    }
+}
+
+/// Returns whether two pixels of a plane whose mosaic begins at a row and column have the same filter.
+fn same_filter(tile: Option<&Tile>, (top, left): (usize, usize)) -> impl Fn([usize; 2], [usize; 2]) -> bool + Sync {
+    let filter = move |[row, column]: [usize; 2]| {
+        let counted = |i: usize, first: usize, n: usize| (i + n * first.div_ceil(n) - first) % n;
+        tile.map(|tile| tile.filter_at(counted(row, top, tile.rows()), counted(column, left, tile.columns())))
+    };
+    move |a, b| filter(a) == filter(b)
+}
+
+/// Returns the name of a raw format that is no DNG, by the first bytes of a file and the maker that it names.
+fn other_raw_format(bytes: &[u8]) -> Option<&'static str> {
+    let begins = |at: usize, with: &[u8]| bytes.get(at..at + with.len()) == Some(with);
+    let by_bytes = [
+        (8, &b"CR"[..], "a Canon CR2 file"),
+        (4, b"ftypcrx", "a Canon CR3 file"),
+        (0, b"FUJIFILMCCD-RAW", "a Fujifilm RAF file"),
+        (0, b"IIU\0", "a Panasonic RW2 file"),
+        (0, b"IIRO", "an Olympus ORF file"),
+        (0, b"IIRS", "an Olympus ORF file"),
+        (0, b"MMOR", "an Olympus ORF file"),
+        (0, b"FOVb", "a Sigma X3F file"),
+        (0, b"\0MRM", "a Minolta MRW file"),
+    ];
+    if let Some((.., name)) = by_bytes.into_iter().find(|(at, with, _)| begins(*at, with)) {
+        return Some(name);
+    }
+    let (file, first) = TiffReader::new(bytes).ok()?;
+    let first = file.fields_at(first).ok()?;
+    let make = first.text(MAKE)?.to_ascii_uppercase();
+    // Pictures of these makers are TIFF files too; raw ones have their frame in a directory below the first.
+    let is_raw = !first.has(DNG_VERSION) && first.has(SUB_DIRECTORIES);
+    let by_maker = [("NIKON", "a Nikon NEF file"), ("SONY", "a Sony ARW file"), ("PENTAX", "a Pentax PEF file")];
+    by_maker.into_iter().find(|(maker, _)| is_raw && make.starts_with(maker)).map(|(_, name)| name)
 }
 
 /// Returns the directory of the largest raw frame: the first or one below it.
@@ -253,13 +416,8 @@ fn notes(first: &Fields<'_>, frame: &Fields<'_>) -> Result<Vec<String>, String> 
     if let (Some(OWN_MAKE), Some(description)) = (first.text(MAKE).as_deref(), first.text(IMAGE_DESCRIPTION)) {
         notes.push(description);
     }
-    for tag in [OPCODE_LIST_1, OPCODE_LIST_2, OPCODE_LIST_3] {
-        let names = frame.bytes(tag).map(opcodes).unwrap_or_default();
-        if !names.is_empty() {
-            notes.push(format!("the file asks for {}, which is not done", names.join(", ")));
-        }
-    }
-    let stops = first.numbers(BASELINE_EXPOSURE)?.first().copied().unwrap_or(0.0);
+    // Some writers state 0 over 0, which is none.
+    let stops = first.numbers(BASELINE_EXPOSURE)?.first().copied().filter(|stops| stops.is_finite()).unwrap_or(0.0);
     if stops != 0.0 {
         notes.push(format!(
             "the file asks for {stops} stops more brightness (BaselineExposure), which is left to `brightness`"
@@ -268,18 +426,19 @@ fn notes(first: &Fields<'_>, frame: &Fields<'_>) -> Result<Vec<String>, String> 
     if frame.numbers(DEFAULT_SCALE)?.iter().any(|scale| *scale != 1.0) {
         notes.push("the file's pixels are not square (DefaultScale), which is left as it is".to_owned());
     }
-    Ok(notes)
-}
-
-/// Returns the names of the opcodes of a list.
-fn opcodes(list: &[u8]) -> Vec<String> {
-    let number = |at: usize| Some(u32::from_be_bytes(list.get(at..at.checked_add(4)?)?.try_into().ok()?) as usize);
-    let (mut names, mut at) = (Vec::new(), 4);
-    for _ in 0..number(0).unwrap_or(0) {
-        let (Some(opcode), Some(length)) = (number(at), number(at.saturating_add(12))) else { break };
-        let name = opcode.checked_sub(1).and_then(|i| OPCODES.get(i));
-        names.push(name.map_or_else(|| format!("opcode {opcode}"), |name| (*name).to_owned()));
-        at = at.saturating_add(16).saturating_add(length);
+    let look = [
+        (PROFILE_HUE_SAT_MAP_DATA_1, "a map of hues and saturations"),
+        (PROFILE_TONE_CURVE, "a tone curve"),
+        (PROFILE_LOOK_TABLE_DATA, "a look table"),
+        (PROFILE_GAIN_TABLE_MAP, "a local map of gains"),
+        (RGB_TABLES, "tables of colors"),
+    ];
+    let look: Vec<&str> = look.into_iter().filter(|(tag, _)| first.has(*tag)).map(|(_, name)| name).collect();
+    if !look.is_empty() {
+        notes.push(format!(
+            "the file's profile has {}, which is left out: colors are those of its matrices",
+            look.join(", ")
+        ));
     }
-    names
+    Ok(notes)
 }

@@ -4,17 +4,23 @@ use dioptric_spectrum::{Illuminant, Quantity, SpectralImage, WavelengthGrid};
 use ndarray::Array2;
 
 use super::{
-    DngDetails, DngFile, DngNoise,
+    DngDetails, DngFile, DngNoise, DngOpcodes,
     lossless_jpeg::tests::{Coding, encode, uneven},
     tags::*,
     tiff_file::{Directory, Value},
 };
 use crate::{
-    Exposure, ExposureControl, Illumination, Noise, Processing, Raw, RawPlane, Response, Sensor, WhiteBalance, psnr_db,
+    Exposure, ExposureControl, Illumination, Noise, Processing, Raw, RawPlane, Response, Sensor, WhiteBalance,
+    process::develop_linear, psnr_db,
 };
 
 /// Returns a colorful frame of a sensor: patches of different spectra, and steps of brightness, with all noise.
 fn frame(sensor: &Sensor) -> Raw {
+    frame_of(sensor, 0.01)
+}
+
+/// Returns the same exposed so long, s.
+fn frame_of(sensor: &Sensor, time_s: f64) -> Raw {
     let grid = WavelengthGrid::uniform(400.0, 700.0, 20.0).unwrap();
     let d65 = Illuminant::D65.spectrum().sample_held(&grid);
     let (rows, columns) = (sensor.rows, sensor.columns);
@@ -27,7 +33,7 @@ fn frame(sensor: &Sensor) -> Raw {
     };
     let planes = (0..grid.len()).map(plane).collect();
     let image = SpectralImage::new(Quantity::Irradiance, grid, planes).unwrap();
-    let exposure = ExposureControl::Manual(Exposure::seconds(0.01));
+    let exposure = ExposureControl::Manual(Exposure::seconds(time_s));
     sensor.capture(&Illumination::on_pixels(&image), &exposure, &Noise::all(4)).unwrap().raw
 }
 
@@ -359,19 +365,301 @@ fn what_a_file_does_not_hold_is_refused() {
     assert!(file.develop(&Processing { white: light, ..usual() }).is_ok());
 }
 
+/// Returns the bytes of an opcode.
+fn opcode(number: u32, parameters: &[u8]) -> Vec<u8> {
+    let head = [number, 0x0103_0000, 1, parameters.len() as u32];
+    head.into_iter().flat_map(u32::to_be_bytes).chain(parameters.iter().copied()).collect()
+}
+
+fn list(opcodes: &[Vec<u8>]) -> Value {
+    Value::Undefined([(opcodes.len() as u32).to_be_bytes().to_vec(), opcodes.concat()].concat())
+}
+
+fn wholes(values: &[u32]) -> Vec<u8> {
+    values.iter().flat_map(|v| v.to_be_bytes()).collect()
+}
+
+fn doubles(values: &[f64]) -> Vec<u8> {
+    values.iter().flat_map(|v| v.to_be_bytes()).collect()
+}
+
+fn singles(values: &[f32]) -> Vec<u8> {
+    values.iter().flat_map(|v| v.to_be_bytes()).collect()
+}
+
+/// Returns the light of a file whose second list has these opcodes; its codes are 1000 + 100 × row + 10 × column, its black 0 and its
+/// saturation 10 000.
+fn corrected(tag: u16, opcodes: &[Vec<u8>]) -> Array2<f32> {
+    let (rows, columns) = (12, 16);
+    let code = |i: usize| (1000 + 100 * (i / columns) + 10 * (i % columns)) as u16;
+    let codes: Vec<u8> = (0..rows * columns).flat_map(|i| code(i).to_le_bytes()).collect();
+    let stored = Stored { rows: 12, columns: 16, bits: 16, ..PLAIN };
+    let mut d = stored.directory();
+    d.set(ROWS_PER_STRIP, Value::Long(vec![12]));
+    d.set(STRIP_OFFSETS, Value::Long(vec![8]));
+    d.set(STRIP_BYTE_COUNTS, Value::Long(vec![codes.len() as u32]));
+    d.set(WHITE_LEVEL, Value::Long(vec![10_000]));
+    d.set(tag, list(opcodes));
+    let file = DngFile::from_bytes(&d.into_file_behind(&codes).unwrap()).unwrap();
+    assert!(file.notes.is_empty(), "{:?}", file.notes);
+    file.raw.linear().swap_remove(0)
+}
+
+/// The light of those codes.
+fn light(row: usize, column: usize) -> f64 {
+    0.1 + 0.01 * row as f64 + 0.001 * column as f64
+}
+
+/// Top, left, bottom, right, first plane, planes, row and column pitch.
+const ALL: [u32; 8] = [0, 0, 12, 16, 0, 1, 1, 1];
+
+#[track_caller]
+fn check_corrected(tag: u16, opcodes: &[Vec<u8>], wanted: impl Fn(usize, usize) -> f64) {
+    for ((row, column), found) in corrected(tag, opcodes).indexed_iter() {
+        let wanted = wanted(row, column);
+        // Half a code of the first list's 16 bits, and rounding of the others.
+        assert!((f64::from(*found) - wanted).abs() < 6e-5, "{row}, {column}: {found} for {wanted}");
+    }
+}
+
+#[test]
+fn opcodes_of_light_follow_the_formulas_of_the_specification() {
+    let area = |area: [u32; 8], rest: &[u8]| [wholes(&area), rest.to_vec()].concat();
+    // A gain of 1 at the left and 3 at the right quarter, 2 rows of points; on every second row and column from 1, 0 on.
+    let map = [wholes(&[2, 2]), doubles(&[1.0, 0.5, 0.0, 0.25]), wholes(&[1]), singles(&[1.0, 3.0, 2.0, 4.0])].concat();
+    check_corrected(OPCODE_LIST_2, &[opcode(9, &area([1, 0, 12, 16, 0, 1, 2, 2], &map))], |row, column| {
+        let (down, right) = ((row as f64 + 0.5) / 12.0, ((column as f64 + 0.5) / 16.0 - 0.25) / 0.5);
+        let gain = 1.0 + 2.0 * right.clamp(0.0, 1.0) + down;
+        light(row, column) * if row % 2 == 1 && column % 2 == 0 { gain } else { 1.0 }
+    });
+    // The area of rows 2 to 9 and columns 4 to 7 alone.
+    let part = [2, 4, 10, 8, 0, 1, 1, 1];
+    let is_within = |row: usize, column: usize| (2..10).contains(&row) && (4..8).contains(&column);
+    let lines = |n: u32| [wholes(&[n]), singles(&(0..n).map(|i| 0.01 * i as f32).collect::<Vec<_>>())].concat();
+    check_corrected(OPCODE_LIST_2, &[opcode(10, &area(part, &lines(8)))], |row, column| {
+        light(row, column) + if is_within(row, column) { 0.01 * (row - 2) as f64 } else { 0.0 }
+    });
+    check_corrected(OPCODE_LIST_2, &[opcode(11, &area(part, &lines(4)))], |row, column| {
+        light(row, column) + if is_within(row, column) { 0.01 * (column - 4) as f64 } else { 0.0 }
+    });
+    check_corrected(OPCODE_LIST_2, &[opcode(12, &area(part, &lines(8)))], |row, column| {
+        light(row, column) * if is_within(row, column) { 0.01 * (row - 2) as f64 } else { 1.0 }
+    });
+    check_corrected(OPCODE_LIST_2, &[opcode(13, &area(part, &lines(4)))], |row, column| {
+        light(row, column) * if is_within(row, column) { 0.01 * (column - 4) as f64 } else { 1.0 }
+    });
+    let polynomial = [wholes(&[2]), doubles(&[0.02, 0.5, 0.8])].concat();
+    check_corrected(OPCODE_LIST_2, &[opcode(8, &area(ALL, &polynomial))], |row, column| {
+        let x = light(row, column);
+        0.02 + 0.5 * x + 0.8 * x * x
+    });
+    let table: Vec<u8> = (0..40_000_u32).flat_map(|code| ((code / 2 + 300) as u16).to_be_bytes()).collect();
+    let table = [wholes(&[40_000]), table].concat();
+    check_corrected(OPCODE_LIST_2, &[opcode(7, &area(ALL, &table))], |row, column| {
+        ((light(row, column) * 65_535.0 / 2.0).floor() + 300.0) / 65_535.0
+    });
+    // What is made brighter than saturation is saturated.
+    let bright = [wholes(&[1, 1]), doubles(&[1.0, 1.0, 0.0, 0.0]), wholes(&[1]), singles(&[20.0])].concat();
+    check_corrected(OPCODE_LIST_2, &[opcode(9, &area(ALL, &bright))], |_, _| 1.0);
+    let falls = doubles(&[0.5, 0.25, 0.0, 0.0, 0.1, 0.4, 0.6]);
+    check_corrected(OPCODE_LIST_2, &[opcode(3, &falls)], |row, column| {
+        let (x, y) = (column as f64 - 0.4 * 15.0, row as f64 - 0.6 * 11.0);
+        let r2 = (x * x + y * y) / ((0.6_f64 * 15.0).powi(2) + (0.6_f64 * 11.0).powi(2));
+        light(row, column) * (1.0 + 0.5 * r2 + 0.25 * r2 * r2 + 0.1 * r2.powi(5))
+    });
+    // The first list is for codes, whose top is 65 535 here: a tenth of it is two thirds of saturation.
+    let tenth = [wholes(&[1]), singles(&[0.01])].concat();
+    check_corrected(OPCODE_LIST_1, &[opcode(10, &area([3, 0, 4, 16, 0, 1, 1, 1], &tenth))], |row, column| {
+        light(row, column) + if row == 3 { 0.065_535 } else { 0.0 }
+    });
+}
+
+#[test]
+fn bad_pixels_are_mended_from_their_own_filter() {
+    // The code 1000 + 100 × 5 + 10 × 6 is at row 5, column 6; a point and a rectangle are named too.
+    let by_code = opcode(4, &wholes(&[1560, 0]));
+    let listed = opcode(5, &wholes(&[0, 1, 1, 2, 3, 8, 9, 10, 11]));
+    for tag in [OPCODE_LIST_1, OPCODE_LIST_2] {
+        let opcodes = if tag == OPCODE_LIST_1 { vec![by_code.clone(), listed.clone()] } else { vec![listed.clone()] };
+        let found = corrected(tag, &opcodes);
+        // Means of neighbors at equal distances on all sides are those of a plane itself.
+        for (row, column) in [(5, 6), (2, 3)] {
+            assert!((f64::from(found[(row, column)]) - light(row, column)).abs() < 6e-5);
+        }
+        // The rectangle has two rows and two columns: each filter has one bad pixel, and sound ones beside it.
+        for (row, column) in [(8, 9), (8, 10), (9, 9), (9, 10)] {
+            assert!((f64::from(found[(row, column)]) - light(row, column)).abs() < 0.012);
+        }
+    }
+}
+
+#[test]
+fn warps_take_light_from_where_the_specification_says() {
+    // Linear planes of a slope along columns and rows: any place has a known light.
+    let (rows, columns) = (40_usize, 60_usize);
+    let code = |row: usize, column: usize, plane: usize| (2000 + 300 * row + 200 * column + 1000 * plane) as u16;
+    let codes: Vec<u8> =
+        (0..rows * columns * 3).flat_map(|i| code(i / (3 * columns), i / 3 % columns, i % 3).to_le_bytes()).collect();
+    let stored = Stored { rows, columns, n_planes: 3, bits: 16, ..PLAIN };
+    let developed = |opcode: Vec<u8>| {
+        let mut d = stored.directory();
+        d.set(ROWS_PER_STRIP, Value::Long(vec![rows as u32]));
+        d.set(STRIP_OFFSETS, Value::Long(vec![8]));
+        d.set(STRIP_BYTE_COUNTS, Value::Long(vec![codes.len() as u32]));
+        d.set(DEFAULT_CROP_ORIGIN, Value::Short(vec![4, 2]));
+        d.set(DEFAULT_CROP_SIZE, Value::Short(vec![50, 36]));
+        d.set(OPCODE_LIST_3, list(&[opcode]));
+        let file = DngFile::from_bytes(&d.into_file_behind(&codes).unwrap()).unwrap();
+        let plain =
+            Processing { white: WhiteBalance::None, color: crate::ColorCorrection::None, ..Processing::plain() };
+        let raw = file.with_border.as_ref().unwrap_or(&file.raw);
+        develop_linear(&file.profile, raw, &plain, None).unwrap().light
+    };
+    let (center_x, center_y) = (0.45 * 59.0, 0.55 * 39.0);
+    let farthest = (0.55_f64 * 59.0).hypot(0.55 * 39.0);
+    let check = |opcode: Vec<u8>, source: &dyn Fn(f64, f64) -> [f64; 2], what: &str| {
+        let light = developed(opcode);
+        assert_eq!(light.dim(), (36, 50, 3), "{what}");
+        for (row, column) in [(3, 5), (18, 22), (30, 44), (12, 36)] {
+            let (x, y) = (((column + 4) as f64 - center_x) / farthest, ((row + 2) as f64 - center_y) / farthest);
+            let [sx, sy] = source(x, y);
+            let (from_column, from_row) = (center_x + farthest * sx, center_y + farthest * sy);
+            for plane in 0..3 {
+                let wanted = (2000.0 + 300.0 * from_row + 200.0 * from_column + 1000.0 * plane as f64) / 65_535.0;
+                let found = f64::from(light[(row, column, plane)]);
+                assert!((found - wanted).abs() < 1e-5, "{what}, {row}, {column}: {found} for {wanted}");
+            }
+        }
+    };
+    let center = [0.45, 0.55];
+    let rectilinear = [1.0, -0.06, 0.02, -0.004, 0.003, -0.002];
+    let radial = |r2: f64| 1.0 - 0.06 * r2 + 0.02 * r2 * r2 - 0.004 * r2.powi(3);
+    let brown = |x: f64, y: f64| {
+        let r2 = x * x + y * y;
+        [
+            x * radial(r2) + 0.003 * 2.0 * x * y - 0.002 * (r2 + 2.0 * x * x),
+            y * radial(r2) - 0.002 * 2.0 * x * y + 0.003 * (r2 + 2.0 * y * y),
+        ]
+    };
+    check(opcode(1, &[wholes(&[1]), doubles(&rectilinear), doubles(&center)].concat()), &brown, "WarpRectilinear");
+    let fisheye = [1.0, 0.2, -0.02, 0.0];
+    let by_angle = |x: f64, y: f64| {
+        let r = x.hypot(y);
+        let t = r.atan();
+        [x, y].map(|v| v / r * (t + 0.2 * t.powi(3) - 0.02 * t.powi(5)))
+    };
+    check(opcode(2, &[wholes(&[1]), doubles(&fisheye), doubles(&center)].concat()), &by_angle, "WarpFisheye");
+    let mut second = vec![1.0, 0.02, -0.03];
+    second.extend([0.0; 12]);
+    second.extend([0.003, -0.002, 0.0, 2.0]);
+    for reciprocal in [0, 1] {
+        let by_powers = |x: f64, y: f64| {
+            let r = x.hypot(y);
+            let sum = 1.0 + 0.02 * r - 0.03 * r * r;
+            let factor = if reciprocal == 1 { 1.0 / sum } else { sum };
+            [
+                x * factor + 0.003 * 2.0 * x * y - 0.002 * (r * r + 2.0 * x * x),
+                y * factor - 0.002 * 2.0 * x * y + 0.003 * (r * r + 2.0 * y * y),
+            ]
+        };
+        let parameters = [wholes(&[1]), doubles(&second), doubles(&center), wholes(&[reciprocal])].concat();
+        check(opcode(14, &parameters), &by_powers, "WarpRectilinear2");
+    }
+    // What is trimmed is not shown.
+    assert_eq!(developed(opcode(6, &wholes(&[5, 10, 40, 50]))).dim(), (33, 40, 3));
+}
+
+#[test]
+fn opcodes_written_here_undo_the_lens_when_read() {
+    let sensor = small("imx363");
+    // Nothing is saturated: highlights are rebuilt before the corrections of a file, and after those of tables.
+    let raw = frame_of(&sensor, 1e-3);
+    let table = |value: &dyn Fn(f64, f64) -> f64| crate::FrameTable::tabulate(21, 21, value).unwrap();
+    let r2 = |down: f64, right: f64| {
+        let (x, y) = ((right - 0.5) * 72.0, (down - 0.5) * 54.0);
+        (x * x + y * y) / (36.0_f64.powi(2) + 27.0_f64.powi(2))
+    };
+    let tables = crate::LensTables {
+        size: (54, 72),
+        distortion_px: [
+            table(&|d, r| -0.05 * r2(d, r) * (r - 0.5) * 72.0),
+            table(&|d, r| -0.05 * r2(d, r) * (d - 0.5) * 54.0),
+        ],
+        lateral_color_px: vec![[table(&|_, _| 0.0), table(&|_, _| 0.0)]; 3],
+        vignetting: vec![table(&|d, r| 1.0 + 0.6 * r2(d, r)); 3],
+    };
+    let corrections = crate::LensCorrections::ALL;
+    let details = DngDetails { corrections: Some((corrections, &tables)), ..DngDetails::of_light(Illuminant::D65) };
+    let bytes = written(&sensor, &raw, &details);
+    let color = crate::ColorCorrection::Fitted(Illuminant::D65);
+    let plain = Processing { color, denoise: Some(0.0), ..Processing::for_light(Illuminant::D65) };
+    let own = sensor
+        .develop_with(&raw, &Processing { lens_corrections: corrections, ..plain.clone() }, Some(&tables))
+        .unwrap();
+    let file = DngFile::from_bytes(&bytes).unwrap();
+    assert_eq!((file.opcodes.join(" "), file.notes.len()), ("FixVignetteRadial WarpRectilinear".to_owned(), 0));
+    let through = file.develop(&Processing { denoise: Some(0.0), ..Processing::default() }).unwrap();
+    // Tables by cubic convolution and polynomials from middles of pixels differ by hundredths of a pixel.
+    let psnr = psnr_db(&own.picture, &through.picture).unwrap();
+    let ignored = DngFile::from_bytes_with(&bytes, DngOpcodes::Ignored).unwrap();
+    assert!(ignored.opcodes.is_empty() && ignored.notes[0].contains("left out as asked"), "{:?}", ignored.notes);
+    let uncorrected = ignored.develop(&Processing { denoise: Some(0.0), ..Processing::default() }).unwrap();
+    let without = psnr_db(&own.picture, &uncorrected.picture).unwrap();
+    assert!(psnr > 35.0 && psnr > without + 12.0, "{psnr} dB, without {without}");
+}
+
 #[test]
 fn what_is_asked_for_and_not_done_is_noted() {
-    let mut opcodes = vec![0, 0, 0, 2];
-    for number in [9, 3_u32] {
-        opcodes.extend([number, 0x0103_0000, 1, 3].into_iter().flat_map(u32::to_be_bytes));
-        opcodes.extend([1, 2, 3]);
-    }
     let file = PLAIN.file(|d| {
-        d.set(OPCODE_LIST_2, Value::Undefined(opcodes));
+        d.set(OPCODE_LIST_2, list(&[opcode(99, &[1, 2, 3]), opcode(6, &wholes(&[0, 0, 4, 4]))]));
         d.set(BASELINE_EXPOSURE, Value::SignedRational(vec![(1, 4)]));
+        d.set(PROFILE_TONE_CURVE, Value::Double(vec![0.0; 4]));
     });
     let notes = DngFile::from_bytes(&file).unwrap().notes.join("; ");
-    assert!(notes.contains("GainMap, FixVignetteRadial") && notes.contains("0.25 stops"), "{notes}");
+    for word in ["opcode 99, TrimBounds, which is not done", "0.25 stops", "a tone curve"] {
+        assert!(notes.contains(word), "{word}: {notes}");
+    }
+    let nothing = PLAIN.file(|d| d.set(BASELINE_EXPOSURE, Value::SignedRational(vec![(0, 0)])));
+    assert!(DngFile::from_bytes(&nothing).unwrap().notes.is_empty());
+}
+
+#[test]
+fn broken_opcodes_are_refused_in_a_sentence() {
+    for (word, opcodes) in [
+        ("list with 4 entries", opcode(1, &wholes(&[1]))[..18].to_vec()),
+        ("cut short", opcode(3, &[1, 2, 3])),
+        ("more than its bytes hold", opcode(9, &[wholes(&ALL), wholes(&[1 << 30, 1 << 30])].concat())),
+        ("WarpRectilinear with 7 entries", opcode(1, &wholes(&[7]))),
+        ("of no plane", opcode(2, &[wholes(&[0]), doubles(&[0.5, 0.5])].concat())),
+        ("degree 9", opcode(8, &[wholes(&ALL), wholes(&[9])].concat())),
+        ("without pixels", opcode(8, &[wholes(&[5, 0, 5, 16, 0, 1, 1, 1]), wholes(&[0]), doubles(&[1.0])].concat())),
+        ("not finite", opcode(3, &doubles(&[f64::NAN; 7]))),
+    ] {
+        let reason = DngFile::from_bytes(&PLAIN.file(|d| d.set(OPCODE_LIST_3, list(&[opcodes.clone()])))).unwrap_err();
+        assert!(reason.contains(word) && !reason.contains('\n'), "{word}: {reason}");
+    }
+}
+
+#[test]
+fn other_raw_formats_are_named_with_the_way_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("shot");
+    let nikon = Stored { ..PLAIN }.file(|d| {
+        d.set(MAKE, Value::Ascii("NIKON CORPORATION".to_owned()));
+        d.set(SUB_DIRECTORIES, Value::Long(vec![8]));
+        d.remove(DNG_VERSION);
+    });
+    for (bytes, name) in [
+        (b"II*\0\x10\0\0\0CR\x02\0".to_vec(), "Canon CR2"),
+        (b"\0\0\0\x18ftypcrx \0\0".to_vec(), "Canon CR3"),
+        (b"FUJIFILMCCD-RAW 0201".to_vec(), "Fujifilm RAF"),
+        (b"IIU\0\x18\0\0\0".to_vec(), "Panasonic RW2"),
+        (nikon, "Nikon NEF"),
+    ] {
+        std::fs::write(&path, bytes).unwrap();
+        let reason = DngFile::read(&path).unwrap_err().to_string();
+        assert!(reason.contains(name) && reason.contains("DNG Converter"), "{reason}");
+    }
 }
 
 #[test]
@@ -431,6 +719,10 @@ fn mutations_are_read_or_refused() {
         d.set(LINEARIZATION_TABLE, Value::Short((0..300).collect()));
         d.set(BLACK_LEVEL_REPEAT_DIM, Value::Short(vec![2, 2]));
         d.set(BLACK_LEVEL, Value::Rational(vec![(1, 1), (2, 1), (3, 1), (4, 1)]));
+        let map = [wholes(&ALL), wholes(&[1, 2]), doubles(&[1.0, 1.0, 0.0, 0.0]), wholes(&[1]), singles(&[1.0, 2.0])];
+        d.set(OPCODE_LIST_2, list(&[opcode(9, &map.concat()), opcode(5, &wholes(&[0, 1, 0, 3, 3]))]));
+        let warp = [wholes(&[1]), doubles(&[1.0, 0.01, 0.0, 0.0, 0.0, 0.0, 0.5, 0.5])].concat();
+        d.set(OPCODE_LIST_3, list(&[opcode(1, &warp), opcode(6, &wholes(&[1, 1, 12, 20]))]));
     });
     let mut state = 1_u64;
     let mut next = |below: usize| {

@@ -83,3 +83,19 @@ pub(super) const OPCODE_LIST_2: u16 = 51009;
 pub(super) const COLUMN_INTERLEAVE_FACTOR: u16 = 52547;
 pub(super) const STRIP_OFFSETS: u16 = 273;
 pub(super) const STRIP_BYTE_COUNTS: u16 = 279;
+
+/// Fields of DNG 1.6 for the third calibration light, and what lights are.
+pub(super) const CALIBRATION_ILLUMINANT_3: u16 = 52529;
+pub(super) const CAMERA_CALIBRATION_3: u16 = 52530;
+pub(super) const COLOR_MATRIX_3: u16 = 52531;
+pub(super) const FORWARD_MATRIX_3: u16 = 52532;
+pub(super) const ILLUMINANT_DATA_1: u16 = 52533;
+pub(super) const ILLUMINANT_DATA_2: u16 = 52534;
+pub(super) const ILLUMINANT_DATA_3: u16 = 52535;
+
+/// Fields of a profile's look, which are noted.
+pub(super) const PROFILE_HUE_SAT_MAP_DATA_1: u16 = 50938;
+pub(super) const PROFILE_TONE_CURVE: u16 = 50940;
+pub(super) const PROFILE_LOOK_TABLE_DATA: u16 = 50982;
+pub(super) const PROFILE_GAIN_TABLE_MAP: u16 = 52525;
+pub(super) const RGB_TABLES: u16 = 52543;

@@ -61,6 +61,11 @@ impl Directory {
         self.fields.insert(tag, value);
     }
 
+    #[cfg(test)]
+    pub(crate) fn remove(&mut self, tag: u16) {
+        self.fields.remove(&tag);
+    }
+
     pub(crate) fn set_child(&mut self, tag: u16, child: Self) {
         self.children.insert(tag, child);
     }

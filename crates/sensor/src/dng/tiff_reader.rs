@@ -104,6 +104,11 @@ impl<'a> Fields<'a> {
         self.fields.get(&tag).map(|field| field.bytes)
     }
 
+    /// Returns the whole number that bytes of a field are, in the file's order.
+    pub(super) fn number_of(&self, bytes: &[u8]) -> u64 {
+        self.file.number(bytes)
+    }
+
     /// Returns the text of a field, without its zeros and spaces; `None` where there is none.
     pub(super) fn text(&self, tag: u16) -> Option<String> {
         let bytes = self.fields.get(&tag).filter(|field| matches!(field.kind, 1 | 2 | 7))?.bytes;

@@ -43,12 +43,13 @@ pub(super) fn show(ui: &mut Ui, camera: &mut Camera, desk: &Desk<'_>) {
 fn metering(ui: &mut Ui, auto: &mut AutoExposure) {
     let kinds = [
         (Metering::Percentile(99.0), "a percentile"),
+        (Metering::EachFilter(99.0), "a percentile of each filter"),
         (Metering::Mean, "the mean"),
         (Metering::CenterWeighted, "the mean, the center counting more"),
         (Metering::Peak, "the brightest pixel"),
     ];
     variant(ui, "metering", "What of the frame is metered", &mut auto.metering, &kinds);
-    if let Metering::Percentile(percent) = &mut auto.metering {
+    if let Metering::Percentile(percent) | Metering::EachFilter(percent) = &mut auto.metering {
         let words = "The share of pixels that do not exceed the metered signal";
         NumberField::even("percentile", "%", 0.0..=100.0, 50.0..=100.0, words).show(ui, percent);
     }

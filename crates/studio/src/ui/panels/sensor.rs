@@ -14,6 +14,7 @@ use crate::engine::Field;
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum FilmKind {
     Sensor,
+    Field,
     Scene,
     Pixels,
 }
@@ -78,17 +79,20 @@ fn film(ui: &mut Ui, camera: &mut Camera, desk: &Desk<'_>) {
     let mut kind = match camera.film {
         FilmSpec::Sensor => FilmKind::Sensor,
         FilmSpec::Scene => FilmKind::Scene,
+        FilmSpec::Field => FilmKind::Field,
         FilmSpec::Pixels { .. } => FilmKind::Pixels,
     };
     let kinds = [
         (FilmKind::Pixels, "own pixels"),
         (FilmKind::Sensor, "the sensor's pixels"),
+        (FilmKind::Field, "the sensor's pixels that the scene covers"),
         (FilmKind::Scene, "a pixel a sample of the scene"),
     ];
     if choice(ui, "film", "How large the film is, and its pixels", &mut kind, &kinds) {
         camera.film = match kind {
             FilmKind::Sensor => FilmSpec::Sensor,
             FilmKind::Scene => FilmSpec::Scene,
+            FilmKind::Field => FilmSpec::Field,
             FilmKind::Pixels => {
                 let (columns, rows, pitch_um) = whole(desk);
                 FilmSpec::Pixels { columns, rows, pitch_um }
