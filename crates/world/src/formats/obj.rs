@@ -27,6 +27,7 @@ pub fn read_obj(path: &Path) -> Result<Vec<(String, TriangleMesh)>, WorldError> 
                 normals: threes(&model.mesh.normals),
                 uvs: model.mesh.texcoords.chunks_exact(2).map(Vec2::from_slice).collect(),
                 triangles: model.mesh.indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect(),
+                ..TriangleMesh::default()
             };
             mesh.check().map_err(|e| unreadable(e.to_string()))?;
             Ok((model.name, mesh))

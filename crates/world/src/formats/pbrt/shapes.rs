@@ -4,8 +4,8 @@ use std::f64::consts::PI;
 
 use glam::{DAffine3, DVec3, Vec2, Vec3};
 
-use super::{Fault, Reader, params::Params};
-use crate::{GroupId, Material, Shape, TriangleMesh, read_ply};
+use super::{Coverage, Fault, Reader, params::Params};
+use crate::{GroupId, Material, MaterialId, Shape, SpectralCurve, Texture, TriangleMesh, read_ply};
 
 impl Reader<'_> {
     pub(super) fn shape(&mut self, kind: &str, params: &Params<'_>) -> Result<(), Fault> {
@@ -27,7 +27,7 @@ impl Reader<'_> {
                 match self.find_file(file) {
                     Some(path) => Shape::Mesh(read_ply(&path)?),
                     None => {
-                        self.builder.note(format!("Shape \"plymesh\": no file '{file}', left out"));
+                        self.builder.note_of("Shape \"plymesh\": no such file, left out", file);
                         return Ok(());
                     }
                 }
@@ -43,7 +43,7 @@ impl Reader<'_> {
                 z_max_m: number("zmax", 1.0),
             },
             _ => {
-                self.builder.note(format!("Shape \"{kind}\": not supported, left out"));
+                self.builder.note_of("shapes that aren't supported, left out", kind);
                 return Ok(());
             }
         };
@@ -58,16 +58,48 @@ impl Reader<'_> {
             }
             glow.of_faces(&faces.per_square_unit(self.metres_per_unit))
         });
-        let mut material = self.attributes.material;
-        if params.number("alpha") == Some(0.0) {
-            material = self.builder.add_material("open", Material::Open);
-        }
+        let material = self.material_of_shape(params, emission.is_some())?;
         let group = self.object.unwrap_or(GroupId::ROOT);
         let id = self.builder.add_shape_to(group, shape, place, material, emission);
         if self.attributes.is_reversed {
             self.builder.reverse(id);
         }
         Ok(())
+    }
+}
+
+impl Reader<'_> {
+    /// Returns the current material, of which so much is there as the shape's alpha says.
+    fn material_of_shape(&mut self, params: &Params<'_>, glows: bool) -> Result<MaterialId, Fault> {
+        let material = self.attributes.material;
+        if params.find("shadowalpha").is_some() {
+            self.builder.note("'shadowalpha' of shapes: shadows are those of 'alpha'");
+        }
+        let Some(param) = params.find("alpha") else { return Ok(material) };
+        let coverage = match (param.kind, param.numbers.first()) {
+            ("texture", _) => match self.part_if_any(params, &["alpha"], true)? {
+                Some(texture) => Coverage::Texture(texture),
+                None => return Ok(material),
+            },
+            (_, Some(number)) if *number >= 1.0 => return Ok(material),
+            // A lamp that isn't seen.
+            (_, Some(number)) if *number <= 0.0 && glows => {
+                return Ok(self.builder.add_material("open", Material::Open));
+            }
+            (_, number) => Coverage::Number((number.copied().unwrap_or(1.0) as f32).to_bits()),
+        };
+        if let Some(known) = self.covered.get(&(material, coverage)) {
+            return Ok(*known);
+        }
+        let texture = match coverage {
+            Coverage::Texture(texture) => texture,
+            Coverage::Number(bits) => {
+                self.builder.add_texture(Texture::Curve(SpectralCurve::constant(f32::from_bits(bits))))
+            }
+        };
+        let partly = self.builder.add_covered(material, texture);
+        self.covered.insert((material, coverage), partly);
+        Ok(partly)
     }
 }
 
@@ -147,7 +179,7 @@ fn mesh<const N: usize>(params: &Params<'_>) -> Result<(TriangleMesh, Vec<[u32; 
         }
         faces.push(corners);
     }
-    Ok((TriangleMesh { positions, normals, uvs, triangles: Vec::new() }, faces))
+    Ok((TriangleMesh { positions, normals, uvs, ..TriangleMesh::default() }, faces))
 }
 
 fn triangles(params: &Params<'_>) -> Result<TriangleMesh, Fault> {
