@@ -46,7 +46,7 @@ pub use bsdf::{Bsdf, BsdfSample};
 pub use camera::{CameraKind, WorldCamera};
 pub use curve::{Beyond, SpectralCurve};
 pub use error::WorldError;
-pub use formats::{ReadOptions, read_obj, read_ply, read_world};
+pub use formats::{ReadOptions, open_world, read_obj, read_ply, read_stl, read_world};
 pub use glam;
 pub use ids::{GroupId, InstanceId, LightId, MaterialId, ShapeId, TextureId};
 pub use image_texture::{Encoding, ImageTexture, Wrap};

@@ -37,6 +37,14 @@ pub struct World {
     is_left_handed: bool,
 }
 
+fn front_of(up: DVec3, is_left_handed: bool) -> DVec3 {
+    match (up.z.abs() > 0.5, is_left_handed) {
+        (true, _) => DVec3::NEG_Y,
+        (false, false) => DVec3::Z,
+        (false, true) => DVec3::NEG_Z,
+    }
+}
+
 /// The most surfaces that a ray passes one after another.
 const MOST_PASSED: u32 = 1 << 16;
 
@@ -241,9 +249,14 @@ impl World {
         &self.sources
     }
 
-    /// Which way is up, of length 1: by its file's convention, where that has one.
+    /// Which way is up: the axis nearest to what its first camera has as up, or its file's convention.
     pub fn up(&self) -> DVec3 {
         self.up
+    }
+
+    /// What faces the viewer: +z of a right-handed world, −z of a left-handed one, and −y where z is up.
+    pub fn front(&self) -> DVec3 {
+        front_of(self.up, self.is_left_handed)
     }
 
     /// Whether its frame is left-handed: as seen with x to the right and y up, z goes away from the viewer.
@@ -609,6 +622,41 @@ impl WorldBuilder {
         }
     }
 
+    /// Returns which way is up and whether the frame is left-handed: as its first camera stands in it, or by its file's convention.
+    fn convention(&self) -> (DVec3, bool) {
+        let Some(camera) = self.cameras.first() else { return (self.up, self.is_left_handed) };
+        let m = camera.world_from_camera.matrix3;
+        let y = m.y_axis.normalize_or(self.up);
+        // The axis that is nearest.
+        let largest = y.abs().max_element();
+        let nearest = DVec3::from_array(y.to_array().map(|v| if v.abs() == largest { v.signum() } else { 0.0 }));
+        (nearest.normalize_or(self.up), m.determinant() > 0.0)
+    }
+
+    /// Returns which way is up in the world, and what faces the viewer, as [`World::up`] and [`World::front`].
+    pub fn up_and_front(&self) -> (DVec3, DVec3) {
+        let (up, is_left_handed) = self.convention();
+        (up, front_of(up, is_left_handed))
+    }
+
+    /// Returns the greatest extent along an axis of the shapes that belong to no group, m; 0 where there are none.
+    pub fn extent_m(&self) -> f64 {
+        let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        for shape in self.shapes.iter().filter(|shape| shape.group == GroupId::ROOT) {
+            let (a, b) = match &shape.shape {
+                Shape::Mesh(mesh) => mesh.positions.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(a, b), p| {
+                    (a.min(p.as_dvec3()), b.max(p.as_dvec3()))
+                }),
+                other => Quadric::new(other.clone(), DAffine3::IDENTITY).bounds(),
+            };
+            if a.cmple(b).all() {
+                let (a, b) = crate::shape::placed_bounds(&shape.place, a, b);
+                (low, high) = (low.min(a), high.max(b));
+            }
+        }
+        if low.cmple(high).all() { (high - low).max_element() } else { 0.0 }
+    }
+
     /// Whether anything gives light.
     pub fn has_light(&self) -> bool {
         !self.lights.is_empty() || self.shapes.iter().any(|shape| shape.emission.is_some())
@@ -620,8 +668,9 @@ impl WorldBuilder {
     /// When a part names another that isn't there, a shape has no extent, or a transform can't be undone.
     pub fn build(mut self) -> Result<World, WorldError> {
         self.check()?;
+        let (up, is_left_handed) = self.convention();
         let Self { shapes, n_groups, instances, surfaces, textures, lights, cameras, .. } = self;
-        let (notes, sources, up, is_left_handed) = (self.notes.sentences(), self.sources, self.up, self.is_left_handed);
+        let (notes, sources) = (self.notes.sentences(), self.sources);
         let mut placed: Vec<PlacedShape> = shapes.into_iter().map(NewShape::placed).collect();
         let instances: Vec<Instance> = instances
             .into_iter()

@@ -9,6 +9,7 @@ mod materials;
 mod params;
 mod shapes;
 mod spectra;
+mod surfaces;
 mod textures;
 mod tokens;
 

@@ -4,25 +4,29 @@ use std::f64::consts::PI;
 
 use glam::{DAffine3, DVec3, Vec2, Vec3};
 
-use super::{Coverage, Fault, Reader, params::Params};
+use super::{Coverage, Fault, Reader, params::Params, surfaces};
 use crate::{GroupId, Material, MaterialId, Shape, SpectralCurve, Texture, TriangleMesh, read_ply};
 
 impl Reader<'_> {
     pub(super) fn shape(&mut self, kind: &str, params: &Params<'_>) -> Result<(), Fault> {
         let mut place = self.place_m()?;
         let number = |name: &str, default: f64| params.number(name).unwrap_or(default);
-        let shape = match kind {
-            "trianglemesh" => Shape::Mesh(triangles(params)?),
-            "loopsubdiv" => {
-                self.builder.note("Shape \"loopsubdiv\": its control mesh, not smoothed");
-                params.find_any(&["nlevels", "levels"]);
-                Shape::Mesh(triangles(params)?)
+        let part = surfaces::quadric(kind, params)?;
+        let is_part = part.is_some();
+        let shape = match (kind, part) {
+            (_, Some(part)) => Shape::Mesh(part),
+            ("trianglemesh", None) => Shape::Mesh(triangles(params)?),
+            ("loopsubdiv", None) => {
+                let levels = params.number_of(&["levels", "nlevels"]).unwrap_or(3.0).clamp(0.0, 10.0);
+                let control = triangles(params)?;
+                control.check().map_err(|e| e.to_string())?;
+                Shape::Mesh(surfaces::smoothed(&control, levels as u32))
             }
-            "bilinearmesh" => {
+            ("bilinearmesh", None) => {
                 self.builder.note("Shape \"bilinearmesh\": two triangles a patch");
                 Shape::Mesh(patches(params)?)
             }
-            "plymesh" => {
+            ("plymesh", None) => {
                 let file = params.text("filename").ok_or("a plymesh without filename".to_owned())?;
                 match self.find_file(file) {
                     Some(path) => Shape::Mesh(read_ply(&path)?),
@@ -32,17 +36,17 @@ impl Reader<'_> {
                     }
                 }
             }
-            "sphere" => Shape::Sphere { radius_m: number("radius", 1.0) },
-            "disk" => {
+            ("sphere", None) => Shape::Sphere { radius_m: number("radius", 1.0) },
+            ("disk", None) => {
                 place *= DAffine3::from_translation(DVec3::Z * number("height", 0.0));
                 Shape::Disc { radius_m: number("radius", 1.0), inner_radius_m: number("innerradius", 0.0) }
             }
-            "cylinder" => Shape::Cylinder {
+            ("cylinder", None) => Shape::Cylinder {
                 radius_m: number("radius", 1.0),
                 z_min_m: number("zmin", -1.0),
                 z_max_m: number("zmax", 1.0),
             },
-            _ => {
+            (_, None) => {
                 self.builder.note_of("shapes that aren't supported, left out", kind);
                 return Ok(());
             }
@@ -50,7 +54,12 @@ impl Reader<'_> {
         shape.check().map_err(|e| e.to_string())?;
         let glow = self.attributes.glow.clone();
         let emission = glow.map(|glow| {
-            let faces = FaceAreas::of(&shape, &place, if kind == "bilinearmesh" { 2 } else { 1 });
+            let triangles_a_face = match (&shape, kind) {
+                (Shape::Mesh(mesh), _) if is_part => mesh.triangles.len().max(1),
+                (_, "bilinearmesh") => 2,
+                _ => 1,
+            };
+            let faces = FaceAreas::of(&shape, &place, triangles_a_face);
             if glow.has_power() && !faces.are_alike {
                 let n = faces.n;
                 self.builder
