@@ -8,9 +8,7 @@ use dioptric_world::{
 use ndarray::Array2;
 use rayon::prelude::*;
 
-use crate::{
-    BackwardError, Camera, Panorama, Parallel, Pinhole, Placement, RadiantPoint, Subject, peeling::Surfaces,
-};
+use crate::{BackwardError, Camera, Panorama, Parallel, Pinhole, Placement, RadiantPoint, Subject, peeling::Surfaces};
 
 /// Pictures of what each pixel's middle sees through the middle of the pupil.
 #[derive(Clone, Debug)]

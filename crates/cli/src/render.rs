@@ -11,7 +11,8 @@ use dioptric_analysis::{Run, RunReport};
 use dioptric_pipeline::{
     Camera, Crop, FilmSpec, KeptCamera, LensReadOptions, LensSpec, LightPaths, PipelineError, Progress, RenderEffort,
     RenderMethod, Rendering, RenderingSummary, SceneSource, SceneSpec, SensorSpec, Silent, Stage, Staged, StopSpec,
-    WavelengthSpec, WorldRender, WorldSpec, parse_white, with_exposure_s, world_camera, write_json, write_scene, write_seen_png,
+    WavelengthSpec, WorldRender, WorldSpec, WorldView, parse_white, with_exposure_s, world_camera, write_json,
+    write_scene, write_seen_png,
 };
 use dioptric_report::write_run;
 use dioptric_spectrum::{Cancel, WavelengthGrid};
@@ -61,6 +62,11 @@ pub(crate) fn run(arguments: &RenderArgs, common: &Common) -> anyhow::Result<()>
     let world = kept.world_of_file(&clock, &cancel)?;
     let notes = world.as_ref().map_or(&[][..], |world| world.notes());
     tell(notes, common);
+    let is_of_file = matches!(&kept.camera().scene.source, SceneSource::World(spec) if spec.view == WorldView::OfFile);
+    if is_of_file && world.as_ref().is_some_and(|world| world.cameras().is_empty()) {
+        let whole = "the file has no camera: the whole of it is seen; --eye and --look-at give another view";
+        tell(&[whole.to_owned()], common);
+    }
     let mut camera = kept.camera().clone();
     // The demo's lens is that of the still life.
     let has_lens = arguments.lens.is_some() || arguments.camera_file().is_some() || world.is_none();

@@ -392,12 +392,18 @@ impl<const N: usize> Lobe<N> {
             }
             Self::Pane { rough: Some(ggx), .. } => {
                 let p = self.back_probability();
-                if is_reflection { p * facet_reflection_pdf(ggx, o, i) } else { (1.0 - p) * facet_reflection_pdf(ggx, o, across(i)) }
+                if is_reflection {
+                    p * facet_reflection_pdf(ggx, o, i)
+                } else {
+                    (1.0 - p) * facet_reflection_pdf(ggx, o, across(i))
+                }
             }
             Self::Dielectric { index, rough: Some(ggx), .. } => {
                 rough_dielectric(ggx, if o.z > 0.0 { index[0] } else { 1.0 / index[0] }, o, i).1
             }
-            Self::Coated { rough, .. } | Self::Layered { rough, .. } | Self::Substrate { rough, .. } if is_reflection => {
+            Self::Coated { rough, .. } | Self::Layered { rough, .. } | Self::Substrate { rough, .. }
+                if is_reflection =>
+            {
                 let p = self.coat_probability(o);
                 let coat = rough.as_ref().map_or(0.0, |ggx| facet_reflection_pdf(ggx, o, i));
                 p * coat + (1.0 - p) * FRAC_1_PI * i.z.abs()

@@ -219,8 +219,12 @@ impl ImageTexture {
         let (x0, y0) = (x.floor(), y.floor());
         let (fx, fy) = (x - x0, y - y0);
         let (x0, y0) = (x0 as i64, y0 as i64);
-        let [a, b, c, d] =
-            [at(x0, y0), at(x0.saturating_add(1), y0), at(x0, y0.saturating_add(1)), at(x0.saturating_add(1), y0.saturating_add(1))];
+        let [a, b, c, d] = [
+            at(x0, y0),
+            at(x0.saturating_add(1), y0),
+            at(x0, y0.saturating_add(1)),
+            at(x0.saturating_add(1), y0.saturating_add(1)),
+        ];
         std::array::from_fn(|k| (1.0 - fy) * ((1.0 - fx) * a[k] + fx * b[k]) + fy * ((1.0 - fx) * c[k] + fx * d[k]))
     }
 

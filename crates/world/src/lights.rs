@@ -354,7 +354,8 @@ mod tests {
                 let v = (v ^ (v >> 15)).wrapping_mul(0x85eb_ca77);
                 ((v ^ (v >> 13)).wrapping_mul(0xc2b2_ae3d) >> 8) as f32 / (1 << 24) as f32
             };
-            let sample = lights.sample(shapes, &at, number(1), [number(2), number(3)], &[550.0]).map(|(sample, _)| sample);
+            let sample =
+                lights.sample(shapes, &at, number(1), [number(2), number(3)], &[550.0]).map(|(sample, _)| sample);
             let value = sample.map_or(0.0, |s| f64::from(s.radiance[0] * s.direction.z.max(0.0) / s.pdf));
             sum += value / f64::from(n);
             squares += value * value / f64::from(n);

@@ -361,12 +361,7 @@ impl Surfaces<'_> {
                 if index.iter().all(|n| *n == 1.0) {
                     Lobe::Open
                 } else {
-                    Lobe::Dielectric {
-                        index,
-                        reflectance: [1.0; N],
-                        transmittance: [1.0; N],
-                        rough: rough(roughness),
-                    }
+                    Lobe::Dielectric { index, reflectance: [1.0; N], transmittance: [1.0; N], rough: rough(roughness) }
                 }
             }
             Material::Glass { reflectance, transmittance, index, roughness } => {
@@ -398,11 +393,9 @@ impl Surfaces<'_> {
                 index: index.at(wavelengths_nm),
                 rough: rough(roughness),
             },
-            Material::Substrate { base, coat, roughness } => Lobe::Substrate {
-                diffuse: share_of(*base),
-                mirrored: share_of(*coat),
-                rough: rough(roughness),
-            },
+            Material::Substrate { base, coat, roughness } => {
+                Lobe::Substrate { diffuse: share_of(*base), mirrored: share_of(*coat), rough: rough(roughness) }
+            }
             Material::MetallicRoughness { color, metallic, roughness, mirrored, edge, transmission } => {
                 let (color, metallic, alpha) = (share_of(*color), number(*metallic), number(*roughness).powi(2));
                 let (mirrored, edge) = (share_of(*mirrored), number(*edge));
@@ -489,11 +482,11 @@ impl Surfaces<'_> {
 
     /// Returns the shading frame by a picture of normals, those along u and v multiplied.
     fn with_normals(self, hit: &Hit, plain: Frame, (normals, scale): (TextureId, f32)) -> Frame {
-                let n = Vec3::from_array(self.textures.rgb(normals, &TexturePoint::from(hit)).map(|v| 2.0 * v - 1.0));
-                let n = n * Vec3::new(scale, scale, 1.0);
-                let y = plain.y * plain.y.dot(hit.dp_dv).signum();
-                let normal = (plain.x * n.x + y * n.y + plain.z * n.z.max(1e-3)).normalize_or(plain.z);
-                Frame::about_with(normal, hit.dp_du)
+        let n = Vec3::from_array(self.textures.rgb(normals, &TexturePoint::from(hit)).map(|v| 2.0 * v - 1.0));
+        let n = n * Vec3::new(scale, scale, 1.0);
+        let y = plain.y * plain.y.dot(hit.dp_dv).signum();
+        let normal = (plain.x * n.x + y * n.y + plain.z * n.z.max(1e-3)).normalize_or(plain.z);
+        Frame::about_with(normal, hit.dp_du)
     }
 
     /// Checks that materials are made of earlier ones and have few enough kinds of scattering, and finds those with gaps.

@@ -5,11 +5,7 @@ use std::sync::Arc;
 use glam::{Affine3A, Mat2, Vec2, Vec3};
 use std::f32::consts::{FRAC_1_PI, PI, TAU};
 
-use crate::{
-    Hit, ImageTexture, Pattern, SpectralCurve, TextureId,
-    pattern::Found,
-    upsample::SmoothReflectance,
-};
+use crate::{Hit, ImageTexture, Pattern, SpectralCurve, TextureId, pattern::Found, upsample::SmoothReflectance};
 
 /// A value over a surface: a spectrum where a color is asked for, a number where a number is.
 ///
@@ -179,12 +175,7 @@ impl TexturePoint {
     /// Returns a point beside this one, so far along both coordinates.
     pub(crate) fn beside(&self, (du, dv): (f32, f32), [dp_du, dp_dv]: [Vec3; 2]) -> Self {
         let by = Vec2::new(du, dv);
-        Self {
-            uv: self.uv + by,
-            second_uv: self.second_uv + by,
-            point: self.point + du * dp_du + dv * dp_dv,
-            ..*self
-        }
+        Self { uv: self.uv + by, second_uv: self.second_uv + by, point: self.point + du * dp_du + dv * dp_dv, ..*self }
     }
 }
 
@@ -218,7 +209,12 @@ pub(crate) struct Textures<'a>(pub(crate) &'a [Texture]);
 
 impl Textures<'_> {
     /// Returns the spectrum at a point; not held to any range.
-    pub(crate) fn spectral<const N: usize>(self, id: TextureId, at: &TexturePoint, wavelengths_nm: &[f32; N]) -> [f32; N] {
+    pub(crate) fn spectral<const N: usize>(
+        self,
+        id: TextureId,
+        at: &TexturePoint,
+        wavelengths_nm: &[f32; N],
+    ) -> [f32; N] {
         match &self.0[id.0 as usize] {
             Texture::Curve(curve) => curve.at(wavelengths_nm),
             Texture::Image { image, mapping, scale } => {

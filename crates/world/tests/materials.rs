@@ -131,7 +131,8 @@ fn plastic_substrate_uber_and_translucent_are_pbrts() {
         let (gloss, cos) = gloss(alpha, o, i);
         0.5 / PI + 0.25 * gloss * fresnel(cos, 1.5, 1.0)
     });
-    let substrate = r#"Material "substrate" "rgb Kd" [.5 .5 .5] "rgb Ks" [.1 .1 .1] "float uroughness" .1 "float vroughness" .1"#;
+    let substrate =
+        r#"Material "substrate" "rgb Kd" [.5 .5 .5] "rgb Ks" [.1 .1 .1] "float uroughness" .1 "float vroughness" .1"#;
     check("substrate", &third(substrate), &|o, i| {
         let m = (o + i).normalize();
         let base = |v: DVec3| 1.0 - (1.0 - 0.5 * v.z).powi(5);
@@ -181,7 +182,8 @@ fn glass_has_its_colors_and_uber_its_opacity() {
     let uber = third(r#"Material "uber" "rgb Kd" [.4 .4 .4] "rgb Ks" [0 0 0] "rgb opacity" [.25 .25 .25]"#);
     let n = 10_000;
     let place = |k: u32| Vec3::new((k % 100) as f32 / 60.0 - 0.8, (k / 100) as f32 / 60.0 - 0.8, 2.0);
-    let met = (0..n).filter(|k| uber.intersect(&Ray { origin: place(*k), direction: Vec3::NEG_Z }, 9.0).is_some()).count();
+    let met =
+        (0..n).filter(|k| uber.intersect(&Ray { origin: place(*k), direction: Vec3::NEG_Z }, 9.0).is_some()).count();
     let hidden = (0..n).filter(|k| uber.is_occluded(&Ray { origin: place(*k), direction: Vec3::NEG_Z }, 9.0)).count();
     // Four deviations of a binomial of 10,000.
     assert!((2330..2670).contains(&met) && met == hidden, "{met} {hidden}");
@@ -190,7 +192,9 @@ fn glass_has_its_colors_and_uber_its_opacity() {
 /// glTF 2.0, appendix B.
 #[test]
 fn metal_and_rough_are_those_of_gltf() {
-    let world = gltf(r#""pbrMetallicRoughness":{"baseColorFactor":[0.5,0.5,0.5,1],"metallicFactor":0.3,"roughnessFactor":0.6}"#);
+    let world = gltf(
+        r#""pbrMetallicRoughness":{"baseColorFactor":[0.5,0.5,0.5,1],"metallicFactor":0.3,"roughnessFactor":0.6}"#,
+    );
     check("metal-rough", &world, &|o, i| {
         let (gloss, cos) = gloss(0.36, o, i);
         let layer = schlick(0.04, 1.0, cos);
@@ -228,7 +232,12 @@ fn plain_plastics_of_gltf_are_as_bright_as_their_color() {
     let bsdf = world.bsdf(&hit, Vec3::Z, &[550.0]);
     let n = 40_000;
     let sum: f64 = (0..n)
-        .filter_map(|k| bsdf.sample((k as f32 * 0.618_034).fract(), [((k % 200) as f32 + 0.5) / 200.0, ((k / 200) as f32 + 0.5) / 200.0]))
+        .filter_map(|k| {
+            bsdf.sample(
+                (k as f32 * 0.618_034).fract(),
+                [((k % 200) as f32 + 0.5) / 200.0, ((k / 200) as f32 + 0.5) / 200.0],
+            )
+        })
         .map(|sample| f64::from(sample.weight[0]) / f64::from(n))
         .sum();
     assert!((0.495..0.525).contains(&sum), "{sum}");
@@ -239,12 +248,17 @@ fn plain_plastics_of_gltf_are_as_bright_as_their_color() {
 fn alpha_and_volume_of_gltf_are_followed() {
     let met = |world: &World| {
         let place = |k: u32| Vec3::new((k % 100) as f32 / 60.0 - 0.8, (k / 100) as f32 / 60.0 - 0.8, 2.0);
-        (0..10_000).filter(|k| world.intersect(&Ray { origin: place(*k), direction: Vec3::NEG_Z }, 9.0).is_some()).count()
+        (0..10_000)
+            .filter(|k| world.intersect(&Ray { origin: place(*k), direction: Vec3::NEG_Z }, 9.0).is_some())
+            .count()
     };
     let with = |mode: &str, alpha: &str| {
         gltf(&format!(r#""alphaMode":"{mode}","pbrMetallicRoughness":{{"baseColorFactor":[1,1,1,{alpha}]}}"#))
     };
-    assert_eq!((met(&with("OPAQUE", "0.4")), met(&with("MASK", "0.4")), met(&with("MASK", "0.6"))), (10_000, 0, 10_000));
+    assert_eq!(
+        (met(&with("OPAQUE", "0.4")), met(&with("MASK", "0.4")), met(&with("MASK", "0.6"))),
+        (10_000, 0, 10_000)
+    );
     assert!((3804..4196).contains(&met(&with("BLEND", "0.4"))));
     let volume = gltf(
         r#""extensions":{"KHR_materials_transmission":{"transmissionFactor":1},
@@ -268,9 +282,8 @@ fn shared(name: &str) -> World {
 #[test]
 fn alpha_and_interfaces_of_pbrt_are_passed() {
     let leaf = shared("alpha.pbrt");
-    let met = |x: f32, y: f32| {
-        leaf.intersect(&Ray { origin: Vec3::new(x, y, -3.0), direction: Vec3::Z }, 9.0).is_some()
-    };
+    let met =
+        |x: f32, y: f32| leaf.intersect(&Ray { origin: Vec3::new(x, y, -3.0), direction: Vec3::Z }, 9.0).is_some();
     let n_met = (0..400).filter(|k| met((k % 20) as f32 / 10.5 - 0.9, (k / 20) as f32 / 10.5 - 0.9)).count();
     assert!((20..380).contains(&n_met), "{n_met} of 400");
     assert_eq!(leaf.notes(), [""; 0]);

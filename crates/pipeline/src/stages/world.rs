@@ -103,7 +103,10 @@ pub(super) fn read(inputs: &WorldInputs, watch: &Watch<'_>) -> Result<World, Pip
         }
         None => {}
     }
-    let is_gltf = inputs.file.extension().is_some_and(|kind| kind.eq_ignore_ascii_case("gltf") || kind.eq_ignore_ascii_case("glb"));
+    let is_gltf = inputs
+        .file
+        .extension()
+        .is_some_and(|kind| kind.eq_ignore_ascii_case("gltf") || kind.eq_ignore_ascii_case("glb"));
     let extent_m = builder.extent_m();
     if !is_gltf && inputs.unit_m == 1.0 && extent_m > MOST_LIKELY_M {
         builder.note(format!(
@@ -144,7 +147,8 @@ pub(super) fn view(
     has_room((rows, columns), bands.grid.len(), n_layers)?;
     let half_tangents = 0.5 * DVec2::new(columns as f64, rows as f64) / view.focal_px;
     let pixels = PixelGrid::new(columns, rows);
-    let pinhole = Pinhole { placement: placement(world, spec, geometry.field_of_view_deg)?, pixels, half_tangents, layer: 0 };
+    let pinhole =
+        Pinhole { placement: placement(world, spec, geometry.field_of_view_deg)?, pixels, half_tangents, layer: 0 };
     let (effort, samples_per_pass) = match spec.method {
         // As few as reach every band.
         RenderMethod::Backward => (RenderEffort::Samples(1), 1),

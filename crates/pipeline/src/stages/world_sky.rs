@@ -19,22 +19,39 @@ const ROWS: usize = 128;
 const GROUND: f64 = 0.2;
 
 /// Adds a sky to a world whose `up` and `front` are known.
-pub(super) fn add_sky(builder: &mut WorldBuilder, sky: &WorldSky, up: DVec3, front: DVec3) -> Result<(), PipelineError> {
+pub(super) fn add_sky(
+    builder: &mut WorldBuilder,
+    sky: &WorldSky,
+    up: DVec3,
+    front: DVec3,
+) -> Result<(), PipelineError> {
     let right = up.cross(front).normalize_or(DVec3::X);
     let world_from_sky = DMat3::from_cols(front, right, up);
     match sky {
-        WorldSky::Even(radiance) => builder.add_light(Light::Sky { radiance: SpectralCurve::constant(*radiance as f32) }),
+        WorldSky::Even(radiance) => {
+            builder.add_light(Light::Sky { radiance: SpectralCurve::constant(*radiance as f32) })
+        }
         WorldSky::Picture(path) => {
             let image = ImageTexture::read(path, Encoding::Srgb, Wrap::Repeat)?;
             builder.add_source(path);
             let mapping = SkyMapping::LatLong;
-            builder.add_light(Light::SkyImage(SkyImage { image: Arc::new(image), mapping, world_from_sky, scale: 1.0 }));
+            builder.add_light(Light::SkyImage(SkyImage {
+                image: Arc::new(image),
+                mapping,
+                world_from_sky,
+                scale: 1.0,
+            }));
         }
         WorldSky::Day { elevation_deg, azimuth_deg, turbidity } => {
             let day = Day::new(elevation_deg.to_radians(), azimuth_deg.to_radians(), *turbidity);
             let image = ImageTexture::from_linear(2 * ROWS, day.picture(), Wrap::Repeat)?;
             let mapping = SkyMapping::LatLong;
-            builder.add_light(Light::SkyImage(SkyImage { image: Arc::new(image), mapping, world_from_sky, scale: 1.0 }));
+            builder.add_light(Light::SkyImage(SkyImage {
+                image: Arc::new(image),
+                mapping,
+                world_from_sky,
+                scale: 1.0,
+            }));
             builder.add_light(Light::Distant {
                 direction: -(world_from_sky * day.sun),
                 irradiance: SpectralCurve::new(&day.sunlight(), Beyond::Zero),
@@ -59,9 +76,27 @@ impl Day {
     fn new(elevation_rad: f64, azimuth_rad: f64, turbidity: f64) -> Self {
         let t = turbidity;
         let perez = [
-            [0.1787 * t - 1.4630, -0.3554 * t + 0.4275, -0.0227 * t + 5.3251, 0.1206 * t - 2.5771, -0.0670 * t + 0.3703],
-            [-0.0193 * t - 0.2592, -0.0665 * t + 0.0008, -0.0004 * t + 0.2125, -0.0641 * t - 0.8989, -0.0033 * t + 0.0452],
-            [-0.0167 * t - 0.2608, -0.0950 * t + 0.0092, -0.0079 * t + 0.2102, -0.0441 * t - 1.6537, -0.0109 * t + 0.0529],
+            [
+                0.1787 * t - 1.4630,
+                -0.3554 * t + 0.4275,
+                -0.0227 * t + 5.3251,
+                0.1206 * t - 2.5771,
+                -0.0670 * t + 0.3703,
+            ],
+            [
+                -0.0193 * t - 0.2592,
+                -0.0665 * t + 0.0008,
+                -0.0004 * t + 0.2125,
+                -0.0641 * t - 0.8989,
+                -0.0033 * t + 0.0452,
+            ],
+            [
+                -0.0167 * t - 0.2608,
+                -0.0950 * t + 0.0092,
+                -0.0079 * t + 0.2102,
+                -0.0441 * t - 1.6537,
+                -0.0109 * t + 0.0529,
+            ],
         ];
         let s = FRAC_PI_2 - elevation_rad;
         let chi = (4.0 / 9.0 - t / 120.0) * (PI - 2.0 * s);
@@ -81,7 +116,11 @@ impl Day {
             [0.15346, -0.26756, 0.06670, 0.26688],
         ]);
         let at_zenith = perez.map(|of| function(of, 0.0, s));
-        let sun = DVec3::new(elevation_rad.cos() * azimuth_rad.cos(), elevation_rad.cos() * azimuth_rad.sin(), elevation_rad.sin());
+        let sun = DVec3::new(
+            elevation_rad.cos() * azimuth_rad.cos(),
+            elevation_rad.cos() * azimuth_rad.sin(),
+            elevation_rad.sin(),
+        );
         let zenith = std::array::from_fn(|k| [luminance.max(0.0), x, y][k] / at_zenith[k]);
         Self { sun, turbidity, perez, zenith }
     }
@@ -135,11 +174,9 @@ impl Day {
         }
         let grid = dioptric_spectrum::WavelengthGrid::uniform(380.0, 780.0, 5.0).expect("a valid range");
         let sun = dioptric_spectrum::Observer::Cie1931.xyz(&grid, &self.sunlight().sample_or_zero(&grid)).0;
-        let ground: [f64; 3] =
-            std::array::from_fn(|k| GROUND / PI * (illuminance[k] + sun[k] * self.sun.z.max(0.0)));
-        let rgb = |xyz: [f64; 3]| {
-            dioptric_spectrum::Xyz(xyz).to_linear_srgb().map(|v| (v.max(0.0) / CD_M2_OF_WHITE) as f32)
-        };
+        let ground: [f64; 3] = std::array::from_fn(|k| GROUND / PI * (illuminance[k] + sun[k] * self.sun.z.max(0.0)));
+        let rgb =
+            |xyz: [f64; 3]| dioptric_spectrum::Xyz(xyz).to_linear_srgb().map(|v| (v.max(0.0) / CD_M2_OF_WHITE) as f32);
         sky.into_iter().chain(std::iter::repeat_n(ground, ROWS * ROWS)).map(rgb).collect()
     }
 }

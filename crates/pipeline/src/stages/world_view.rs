@@ -52,7 +52,8 @@ pub fn world_camera(world: &World, spec: &WorldSpec, fov_deg: Option<f64>) -> Re
             let number = which.parse::<usize>().ok().and_then(|number| number.checked_sub(1));
             let found = cameras.iter().find(|camera| camera.name == *which).or_else(|| cameras.get(number?));
             found.cloned().ok_or_else(|| {
-                let named = cameras.iter().enumerate().map(|(index, camera)| format!("{} '{}'", index + 1, camera.name));
+                let named =
+                    cameras.iter().enumerate().map(|(index, camera)| format!("{} '{}'", index + 1, camera.name));
                 let known: Vec<String> = named.take(12).collect();
                 let known = if known.is_empty() { "which has none".to_owned() } else { known.join(", ") };
                 wrong(format!("'{which}' is no camera of {}: {known}", spec.file.display()))
@@ -69,7 +70,9 @@ pub fn world_camera(world: &World, spec: &WorldSpec, fov_deg: Option<f64>) -> Re
             };
             let place = looking(eye_m, look_at_m - eye_m, up, world.is_left_handed());
             place.map(|place| at("a place", place)).ok_or_else(|| {
-                wrong(format!("from {eye_m} to {look_at_m} with {up} up: expected two places, and an up across the view"))
+                wrong(format!(
+                    "from {eye_m} to {look_at_m} with {up} up: expected two places, and an up across the view"
+                ))
             })
         }
     }

@@ -13,9 +13,7 @@ use dioptric_spectrum::Cancel;
 use glam::{DAffine3, DVec3};
 
 pub use self::{obj::read_obj, ply::read_ply, stl::read_stl};
-use crate::{
-    Material, MaterialId, Shape, SpectralCurve, Texture, TriangleMesh, World, WorldBuilder, WorldError,
-};
+use crate::{Material, MaterialId, Shape, SpectralCurve, Texture, TriangleMesh, World, WorldBuilder, WorldError};
 
 /// How a world file is read.
 #[derive(Clone, Copy, Debug, PartialEq)]

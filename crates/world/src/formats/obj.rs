@@ -312,9 +312,8 @@ struct Words {
 
 /// Words that are read, or change no picture: ambient light, the choice of a program's shading, its reflection of surroundings.
 const OF_COLORS: [&str; 12] = ["kd", "ka", "ks", "ke", "ns", "ni", "d", "tr", "tf", "illum", "pr", "pm"];
-const OF_PICTURES: [&str; 12] = [
-    "map_kd", "map_d", "map_ke", "map_bump", "bump", "norm", "map_pr", "map_pm", "map_ks", "map_ns", "map_ka", "refl",
-];
+const OF_PICTURES: [&str; 12] =
+    ["map_kd", "map_d", "map_ke", "map_bump", "bump", "norm", "map_pr", "map_pm", "map_ks", "map_ns", "map_ka", "refl"];
 
 impl Library {
     fn read(&mut self, folder: &Path, name: &str) -> Result<(), WorldError> {
@@ -389,7 +388,9 @@ impl Library {
             (None, Some(tr)) => 1.0 - at(tr, 0, 0.0),
             (None, None) => 1.0,
         };
-        let even = |builder: &mut WorldBuilder, value: f32| builder.add_texture(Texture::Curve(SpectralCurve::constant(value)));
+        let even = |builder: &mut WorldBuilder, value: f32| {
+            builder.add_texture(Texture::Curve(SpectralCurve::constant(value)))
+        };
         let material = if is_matte {
             Material::Matte { reflectance: diffuse }
         } else {
@@ -403,13 +404,20 @@ impl Library {
             };
             let layer = if words.numbers.contains_key("pr") { 0.04 } else { 0.04 * largest.min(1.0) };
             let curve = SpectralCurve::constant(layer);
-            let of_picture = |library: &mut Self, word: &str, factor: f32| match library.picture(&words, word, Encoding::Linear) {
-                Some(image) => {
-                    let mapping = UvMapping::IDENTITY;
-                    library.builder.add_texture(Texture::Channel { image, channel: 0, mapping, scale: factor.max(1.0), offset: 0.0 })
-                }
-                None => even(&mut library.builder, factor),
-            };
+            let of_picture =
+                |library: &mut Self, word: &str, factor: f32| match library.picture(&words, word, Encoding::Linear) {
+                    Some(image) => {
+                        let mapping = UvMapping::IDENTITY;
+                        library.builder.add_texture(Texture::Channel {
+                            image,
+                            channel: 0,
+                            mapping,
+                            scale: factor.max(1.0),
+                            offset: 0.0,
+                        })
+                    }
+                    None => even(&mut library.builder, factor),
+                };
             Material::MetallicRoughness {
                 color: diffuse,
                 metallic: of_picture(self, "map_pm", metallic),
@@ -464,7 +472,11 @@ impl Library {
         match ImageTexture::read(path, encoding, Wrap::Repeat) {
             Ok(image) => Some(std::sync::Arc::new(image)),
             Err(_) => {
-                let what = if path.is_file() { "pictures that can't be read, left out" } else { "pictures that aren't there, left out" };
+                let what = if path.is_file() {
+                    "pictures that can't be read, left out"
+                } else {
+                    "pictures that aren't there, left out"
+                };
                 self.builder.note_of(what, &path.file_name().unwrap_or_default().to_string_lossy());
                 None
             }
@@ -557,7 +569,11 @@ mod tests {
         // Latin-1, and UTF-16.
         let named = read_text(b"o W\xfcrfel\nv 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\n").unwrap();
         assert_eq!(named[0].0, "Würfel");
-        let wide: Vec<u8> = [0xfeff].into_iter().chain("v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\n".encode_utf16()).flat_map(u16::to_be_bytes).collect();
+        let wide: Vec<u8> = [0xfeff]
+            .into_iter()
+            .chain("v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\n".encode_utf16())
+            .flat_map(u16::to_be_bytes)
+            .collect();
         assert_eq!(read_text(&wide).unwrap()[0].1.triangles.len(), 1);
     }
 
@@ -578,7 +594,8 @@ mod tests {
             "mtllib m.mtl\nv -1 -1 0\nv 1 -1 0\nv 0 1 0\nv -1 -1 -1\nv 1 -1 -1\nv 0 1 -1\nusemtl red paint\nf 4 5 6\nusemtl half\nf 1 2 3\nusemtl gone\nf 1 2 3\n",
         );
         let path = folder.path().join("a.obj");
-        let world = crate::read_world(&path, &crate::ReadOptions::default(), &dioptric_spectrum::Cancel::new()).unwrap();
+        let world =
+            crate::read_world(&path, &crate::ReadOptions::default(), &dioptric_spectrum::Cancel::new()).unwrap();
         assert_eq!(world.material_names().collect::<Vec<_>>()[..2], ["red paint", "half"]);
         let notes = world.notes().join("\n");
         assert!(notes.contains("gone") && notes.contains("foo"), "{notes}");

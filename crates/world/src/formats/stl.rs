@@ -45,7 +45,8 @@ pub fn read_stl(path: &Path) -> Result<TriangleMesh, WorldError> {
 fn binary(bytes: &[u8]) -> Vec<Vec3> {
     let mut corners = Vec::new();
     for triangle in bytes[HEADER + 4..].chunks_exact(TRIANGLE) {
-        let number = |at: usize| f32::from_le_bytes([triangle[at], triangle[at + 1], triangle[at + 2], triangle[at + 3]]);
+        let number =
+            |at: usize| f32::from_le_bytes([triangle[at], triangle[at + 1], triangle[at + 2], triangle[at + 3]]);
         corners.extend([12, 24, 36].map(|at| Vec3::new(number(at), number(at + 4), number(at + 8))));
     }
     corners
@@ -59,7 +60,10 @@ fn text(text: &str) -> Result<Vec<Vec3>, (usize, String)> {
             Some("vertex") => {
                 let numbers: Vec<f32> = words.map_while(|word| word.parse().ok()).collect();
                 let &[x, y, z] = numbers.as_slice() else {
-                    return Err((index + 1, format!("'{}': expected a vertex of three numbers", line.trim().escape_debug())));
+                    return Err((
+                        index + 1,
+                        format!("'{}': expected a vertex of three numbers", line.trim().escape_debug()),
+                    ));
                 };
                 corners.push(Vec3::new(x, y, z));
             }
@@ -111,7 +115,9 @@ mod tests {
         binary.extend(2_u32.to_le_bytes());
         for triangle in 0..2 {
             binary.extend([0; 12]);
-            mesh.corners(triangle).iter().for_each(|c| c.to_array().iter().for_each(|v| binary.extend(v.to_le_bytes())));
+            mesh.corners(triangle)
+                .iter()
+                .for_each(|c| c.to_array().iter().for_each(|v| binary.extend(v.to_le_bytes())));
             binary.extend([0; 2]);
         }
         assert_eq!(read(&binary).unwrap(), mesh);

@@ -99,7 +99,9 @@ impl<'a> Source<'a> {
     pub(super) fn rows(&self, accessor: usize) -> Result<Rows, String> {
         let wrong = |what: String| format!("accessor {accessor} {what}");
         let accessors = list(self.root, "accessors");
-        let of = accessors.get(accessor).ok_or_else(|| wrong(format!("is named, of which there are {}", accessors.len())))?;
+        let of = accessors
+            .get(accessor)
+            .ok_or_else(|| wrong(format!("is named, of which there are {}", accessors.len())))?;
         let component = of.get("componentType").and_then(Value::as_u64).and_then(Component::of);
         let component = component.ok_or_else(|| wrong("has no componentType that is known".to_owned()))?;
         let width = match of.get("type").and_then(Value::as_str) {

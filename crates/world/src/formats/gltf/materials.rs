@@ -95,8 +95,7 @@ impl Reader<'_> {
         name: &str,
         (color, pbr, is_glossy): (TextureId, Option<&Value>, bool),
     ) -> Result<MaterialId, WorldError> {
-        let index_of_refraction =
-            number_or(extension(material, "KHR_materials_ior"), "ior", 1.5).max(1.0);
+        let index_of_refraction = number_or(extension(material, "KHR_materials_ior"), "ior", 1.5).max(1.0);
         let straight = (((index_of_refraction - 1.0) / (index_of_refraction + 1.0)).powi(2)) as f32;
         let (mut mirrored, mut edge) = (self.even(straight), self.even(1.0));
         let (metallic, roughness);
@@ -115,9 +114,8 @@ impl Reader<'_> {
                 None => self.even(1.0 - gloss),
             };
         } else {
-            let factors = [("roughnessFactor", 1), ("metallicFactor", 2)].map(|(word, channel)| {
-                (number_or(pbr, word, 1.0) as f32, channel)
-            });
+            let factors = [("roughnessFactor", 1), ("metallicFactor", 2)]
+                .map(|(word, channel)| (number_or(pbr, word, 1.0) as f32, channel));
             let picture = self.picture(pbr, "metallicRoughnessTexture", Holds::Numbers)?;
             let of = factors.map(|(factor, channel)| match &picture {
                 Some(picture) => self.builder.add_texture(picture.channel(channel, factor)),
@@ -213,7 +211,12 @@ impl Reader<'_> {
     }
 
     /// Says how much of a material is there.
-    fn cover(&mut self, material: &Value, id: MaterialId, (opaque, picture, has_colors): (f32, Option<&Picture>, bool)) {
+    fn cover(
+        &mut self,
+        material: &Value,
+        id: MaterialId,
+        (opaque, picture, has_colors): (f32, Option<&Picture>, bool),
+    ) {
         let mode = material.get("alphaMode").and_then(Value::as_str).unwrap_or("OPAQUE");
         if mode == "OPAQUE" {
             return;
@@ -244,7 +247,8 @@ impl Reader<'_> {
     /// Returns the glow of a material, and lays its picture over it.
     fn glow(&mut self, material: &Value, id: MaterialId, color: TextureId) -> Result<Option<Emission>, WorldError> {
         let is_two_sided = material.get("doubleSided").and_then(Value::as_bool).unwrap_or(false);
-        let unit = "glTF says no unit of glow: 1 is taken as 1 W m⁻² sr⁻¹ nm⁻¹, as bright as white under an even sky of 1";
+        let unit =
+            "glTF says no unit of glow: 1 is taken as 1 W m⁻² sr⁻¹ nm⁻¹, as bright as white under an even sky of 1";
         if extension(material, "KHR_materials_unlit").is_some() {
             self.builder.note(unit);
             self.builder.set_glow(id, color);
@@ -284,7 +288,8 @@ impl Reader<'_> {
         let textures = list(self.root, "textures");
         let number = index(info, "index").unwrap_or(usize::MAX);
         let texture = textures.get(number);
-        let texture = texture.ok_or_else(|| self.fault(format!("texture {number}, of which there are {}", textures.len())))?;
+        let texture =
+            texture.ok_or_else(|| self.fault(format!("texture {number}, of which there are {}", textures.len())))?;
         let webp = extension(texture, "EXT_texture_webp").and_then(|of| index(of, "source"));
         let Some(source) = webp.or_else(|| index(texture, "source")) else {
             self.builder.note_of("textures without a picture that can be read, left out", &number.to_string());
@@ -334,7 +339,8 @@ impl Reader<'_> {
         Ok(match read {
             Ok(image) => Some(Arc::new(image)),
             Err(reason) => {
-                let name = image.get("name").and_then(Value::as_str).map_or_else(|| format!("image {number}"), str::to_owned);
+                let name =
+                    image.get("name").and_then(Value::as_str).map_or_else(|| format!("image {number}"), str::to_owned);
                 self.builder.note_of("pictures that can't be read, left out", &format!("{name} ({reason})"));
                 None
             }

@@ -57,7 +57,8 @@ impl Reader<'_> {
     /// Returns where each joint of a skin takes the vertices: from the frame in which they are written into the world.
     fn joints(&self, skin: usize) -> Result<Vec<DAffine3>, WorldError> {
         let skins = list(self.root, "skins");
-        let skin = skins.get(skin).ok_or_else(|| self.fault(format!("skin {skin}, of which there are {}", skins.len())))?;
+        let skin =
+            skins.get(skin).ok_or_else(|| self.fault(format!("skin {skin}, of which there are {}", skins.len())))?;
         let inverse = index(skin, "inverseBindMatrices").map(|accessor| self.rows(accessor)).transpose()?;
         let inverse = |joint: usize| {
             let row = inverse.as_ref()?.rows().nth(joint)?;
@@ -127,7 +128,8 @@ impl Reader<'_> {
             self.builder.note("meshes without positions, left out");
             return Ok(None);
         };
-        let mut mesh = TriangleMesh { positions: positions.first().map(Vec3::from_array).collect(), ..TriangleMesh::default() };
+        let mut mesh =
+            TriangleMesh { positions: positions.first().map(Vec3::from_array).collect(), ..TriangleMesh::default() };
         let n = mesh.positions.len();
         let of_all = |rows: Option<Rows>| rows.filter(|rows| rows.len() == n);
         if let Some(normals) = of_all(rows(self, "NORMAL")?) {
@@ -143,7 +145,8 @@ impl Reader<'_> {
             mesh.colors = colors.first().map(color).collect();
         }
         for name in attributes.keys() {
-            let is_read = ["POSITION", "NORMAL", "TANGENT", "TEXCOORD_0", "TEXCOORD_1", "COLOR_0"].contains(&name.as_str())
+            let is_read = ["POSITION", "NORMAL", "TANGENT", "TEXCOORD_0", "TEXCOORD_1", "COLOR_0"]
+                .contains(&name.as_str())
                 || name.starts_with("JOINTS_")
                 || name.starts_with("WEIGHTS_")
                 || name.starts_with('_');

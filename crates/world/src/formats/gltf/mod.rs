@@ -47,8 +47,7 @@ const BASE64: GeneralPurpose = GeneralPurpose::new(
 );
 
 /// Extensions that geometry can't be read without.
-const OF_GEOMETRY: [&str; 3] =
-    ["EXT_meshopt_compression", "KHR_draco_mesh_compression", "KHR_meshopt_compression"];
+const OF_GEOMETRY: [&str; 3] = ["EXT_meshopt_compression", "KHR_draco_mesh_compression", "KHR_meshopt_compression"];
 
 /// Reads the default scene.
 pub(super) fn read(path: &Path, place: DAffine3, cancel: &Cancel) -> Result<WorldBuilder, WorldError> {
@@ -67,7 +66,8 @@ pub(super) fn read(path: &Path, place: DAffine3, cancel: &Cancel) -> Result<Worl
     }
     let required = list(&root, "extensionsRequired").iter().filter_map(Value::as_str);
     if let Some(name) = required.into_iter().find(|name| OF_GEOMETRY.contains(name)) {
-        let reason = format!("it needs the extension {name}, which isn't supported; expected a file exported without it");
+        let reason =
+            format!("it needs the extension {name}, which isn't supported; expected a file exported without it");
         return Err(unreadable(reason));
     }
     let mut reader = Reader {
@@ -229,7 +229,9 @@ impl Reader<'_> {
             return Err(self.fault(format!("nodes nested deeper than {MAX_DEPTH}")));
         }
         let nodes = list(self.root, "nodes");
-        let node = nodes.get(number).ok_or_else(|| self.fault(format!("node {number}, of which there are {}", nodes.len())))?;
+        let node = nodes
+            .get(number)
+            .ok_or_else(|| self.fault(format!("node {number}, of which there are {}", nodes.len())))?;
         let place = parent * local(node);
         if self.globals.insert(number, place).is_some() {
             return Err(self.fault(format!("node {number} has two parents")));
@@ -262,7 +264,9 @@ impl Reader<'_> {
     /// Lights of glTF shine along −z, in candela or lux; their colors are those of daylight D65 tinted.
     fn light(&mut self, number: usize, place: DAffine3) -> Result<(), WorldError> {
         let lights = extension(self.root, "KHR_lights_punctual").map_or(&[][..], |of| list(of, "lights"));
-        let light = lights.get(number).ok_or_else(|| self.fault(format!("light {number}, of which there are {}", lights.len())))?;
+        let light = lights
+            .get(number)
+            .ok_or_else(|| self.fault(format!("light {number}, of which there are {}", lights.len())))?;
         let color = numbers::<3>(light, "color").unwrap_or([1.0; 3]).map(|v| v as f32);
         let intensity = number_or(Some(light), "intensity", 1.0);
         // A unit of `from_rgb_light` is 683 lm/W over the area below the photopic curve, 106.857 nm.
@@ -295,7 +299,9 @@ impl Reader<'_> {
     /// Cameras of glTF look along −z with y up.
     fn camera(&mut self, index: usize, node: &Value, place: DAffine3) -> Result<(), WorldError> {
         let cameras = list(self.root, "cameras");
-        let camera = cameras.get(index).ok_or_else(|| self.fault(format!("camera {index}, of which there are {}", cameras.len())))?;
+        let camera = cameras
+            .get(index)
+            .ok_or_else(|| self.fault(format!("camera {index}, of which there are {}", cameras.len())))?;
         let name = |of: &Value| of.get("name").and_then(Value::as_str).map(str::to_owned);
         let kind = camera.get("type").and_then(Value::as_str).unwrap_or("");
         // Without the scale of its parents, but for a parallel view.
@@ -306,7 +312,10 @@ impl Reader<'_> {
                 let vertical = number(of, "yfov").filter(|fov| *fov > 0.0 && *fov < std::f64::consts::PI);
                 let half_tan = (0.5 * vertical.unwrap_or(0.8)).tan() * aspect.min(1.0);
                 let fov_deg = 2.0 * half_tan.atan().to_degrees();
-                (CameraKind::Perspective { fov_deg, lens_radius_m: 0.0, focus_distance_m: 1.0, screen_window: None }, aspect)
+                (
+                    CameraKind::Perspective { fov_deg, lens_radius_m: 0.0, focus_distance_m: 1.0, screen_window: None },
+                    aspect,
+                )
             }
             ("orthographic", _, Some(of)) => {
                 let x = number_or(Some(of), "xmag", 1.0).abs() * scale.x.abs();
@@ -314,7 +323,10 @@ impl Reader<'_> {
                 (CameraKind::Orthographic { screen_window: [-x, x, -y, y] }, x / y)
             }
             _ => {
-                self.builder.note_of("cameras of a type that isn't known, left out", if kind.is_empty() { "none" } else { kind });
+                self.builder.note_of(
+                    "cameras of a type that isn't known, left out",
+                    if kind.is_empty() { "none" } else { kind },
+                );
                 return Ok(());
             }
         };

@@ -183,6 +183,8 @@ mod shared {
     #[test]
     fn skins_hang_on_their_joints() {
         let (low, high) = read("16_skin.gltf").bounds().unwrap();
-        assert!(low.abs_diff_eq(DVec3::new(-1.0, -1.0, 0.0), 1e-4) && high.abs_diff_eq(DVec3::new(1.0, 1.0, 0.0), 1e-4));
+        assert!(
+            low.abs_diff_eq(DVec3::new(-1.0, -1.0, 0.0), 1e-4) && high.abs_diff_eq(DVec3::new(1.0, 1.0, 0.0), 1e-4)
+        );
     }
 }

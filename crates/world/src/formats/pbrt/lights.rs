@@ -157,7 +157,10 @@ impl Reader<'_> {
         let (columns, rows) = image.size();
         let mapping = match self.version {
             Version::Four if columns != rows => {
-                self.builder.note_of("pictures of the sky that aren't square, read as rows of equal height above the horizon", name);
+                self.builder.note_of(
+                    "pictures of the sky that aren't square, read as rows of equal height above the horizon",
+                    name,
+                );
                 SkyMapping::LatLong
             }
             Version::Four => SkyMapping::EqualArea,

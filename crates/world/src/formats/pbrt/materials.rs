@@ -64,8 +64,10 @@ impl Reader<'_> {
                 Material::Matte { reflectance }
             }
         };
-        if is_fourth && matches!(kind, "matte" | "plastic" | "uber" | "substrate" | "glass" | "translucent" | "mirror") {
-            let sentence = format!("materials of kind '{kind}', which pbrt's fourth version doesn't have: as its third");
+        if is_fourth && matches!(kind, "matte" | "plastic" | "uber" | "substrate" | "glass" | "translucent" | "mirror")
+        {
+            let sentence =
+                format!("materials of kind '{kind}', which pbrt's fourth version doesn't have: as its third");
             self.builder.note_of(&sentence, name);
         }
         let relief = self.relief(params)?;
@@ -211,7 +213,10 @@ impl Reader<'_> {
         };
         let of = |name: &&str| self.materials.get(*name).copied();
         let &[Some(a), Some(b)] = names.iter().map(of).collect::<Vec<_>>().as_slice() else {
-            self.builder.note_of("materials of kind 'mix' of others that weren't named before, an even 0.5 in their place", &names.join(" and "));
+            self.builder.note_of(
+                "materials of kind 'mix' of others that weren't named before, an even 0.5 in their place",
+                &names.join(" and "),
+            );
             return Ok(Material::Matte { reflectance: self.even(0.5) });
         };
         let amount = self.part(params, &["amount"], true, 0.5)?;

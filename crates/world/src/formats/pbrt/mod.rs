@@ -201,7 +201,9 @@ impl<'c> Reader<'c> {
                 let name = text(directive, tokens)?;
                 match self.places.get(name) {
                     Some(place) => self.attributes.place = *place,
-                    None => self.builder.note_of("CoordSysTransform: no such coordinate system, nothing is moved", name),
+                    None => {
+                        self.builder.note_of("CoordSysTransform: no such coordinate system, nothing is moved", name)
+                    }
                 }
             }
             "ActiveTransform" => {

@@ -202,7 +202,8 @@ fn divided(positions: &[DVec3], triangles: &[[u32; 3]]) -> (Vec<DVec3>, Vec<[u32
             None => {
                 let ring = &rings.around[v];
                 let share = if ring.is_empty() { 0.0 } else { share_of_neighbor(ring.len()) };
-                (1.0 - ring.len() as f64 * share) * positions[v] + share * ring.iter().map(|&w| positions[w]).sum::<DVec3>()
+                (1.0 - ring.len() as f64 * share) * positions[v]
+                    + share * ring.iter().map(|&w| positions[w]).sum::<DVec3>()
             }
         })
         .collect();
@@ -259,7 +260,8 @@ mod tests {
             let mesh = of(kind, words).unwrap();
             mesh.check().unwrap();
             assert!((area(&mesh) / expected - 1.0).abs() < 1e-3, "{kind} {words}: {} {expected}", area(&mesh));
-            let along: f32 = mesh.positions.iter().zip(&mesh.normals).map(|(p, n)| p.truncate().dot(n.truncate())).sum();
+            let along: f32 =
+                mesh.positions.iter().zip(&mesh.normals).map(|(p, n)| p.truncate().dot(n.truncate())).sum();
             assert!(kind == "disk" || along.abs() > 1.0, "{kind}: {along}");
         }
     }
@@ -268,9 +270,21 @@ mod tests {
     #[test]
     fn smoothed_meshes_tend_to_their_limit() {
         let mut cube = TriangleMesh { positions: Vec::new(), ..TriangleMesh::default() };
-        cube.positions = (0..8).map(|k| Vec3::new((k & 1) as f32, (k >> 1 & 1) as f32, (k >> 2) as f32) * 2.0 - 1.0).collect();
+        cube.positions =
+            (0..8).map(|k| Vec3::new((k & 1) as f32, (k >> 1 & 1) as f32, (k >> 2) as f32) * 2.0 - 1.0).collect();
         cube.triangles = vec![
-            [0, 2, 3], [0, 3, 1], [4, 5, 7], [4, 7, 6], [0, 1, 5], [0, 5, 4], [2, 6, 7], [2, 7, 3], [0, 4, 6], [0, 6, 2], [1, 3, 7], [1, 7, 5],
+            [0, 2, 3],
+            [0, 3, 1],
+            [4, 5, 7],
+            [4, 7, 6],
+            [0, 1, 5],
+            [0, 5, 4],
+            [2, 6, 7],
+            [2, 7, 3],
+            [0, 4, 6],
+            [0, 6, 2],
+            [1, 3, 7],
+            [1, 7, 5],
         ];
         let ball = smoothed(&cube, 4);
         assert_eq!(ball.triangles.len(), 12 * 256);

@@ -213,7 +213,8 @@ impl Reader<'_> {
                 Some(Coordinates::Plane(Affine3A::from_mat4(DMat4::from(frame).as_mat4())))
             }
             Some(other) => {
-                self.builder.note_of(&format!("textures of mapping '{other}': not supported, they follow u and v"), name);
+                self.builder
+                    .note_of(&format!("textures of mapping '{other}': not supported, they follow u and v"), name);
                 None
             }
         };
