@@ -23,8 +23,11 @@ impl Reader<'_> {
                 Shape::Mesh(surfaces::smoothed(&control, levels as u32))
             }
             ("bilinearmesh", None) => {
-                self.builder.note("Shape \"bilinearmesh\": two triangles a patch");
-                Shape::Mesh(patches(params)?)
+                let mesh = patches(params)?;
+                if !are_parallelograms(&mesh) {
+                    self.builder.note("Shape \"bilinearmesh\": two triangles a patch");
+                }
+                Shape::Mesh(mesh)
             }
             ("plymesh", None) => {
                 let file = params.text("filename").ok_or("a plymesh without filename".to_owned())?;
@@ -194,6 +197,15 @@ fn mesh<const N: usize>(params: &Params<'_>) -> Result<(TriangleMesh, Vec<[u32; 
 fn triangles(params: &Params<'_>) -> Result<TriangleMesh, Fault> {
     let (mesh, triangles) = mesh::<3>(params)?;
     Ok(TriangleMesh { triangles, ..mesh })
+}
+
+/// Whether two triangles each are the patches that a mesh was made from.
+fn are_parallelograms(mesh: &TriangleMesh) -> bool {
+    mesh.triangles.chunks_exact(2).all(|pair| {
+        let [a, b, d] = pair[0].map(|v| mesh.positions[v as usize]);
+        let c = mesh.positions[pair[1][2] as usize];
+        (a + d - b - c).length() <= 1e-5 * (b - c).length()
+    })
 }
 
 /// Patches have their corners row by row: (0, 0), (1, 0), (0, 1), (1, 1).

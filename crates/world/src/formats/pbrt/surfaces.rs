@@ -1,9 +1,6 @@
 //! Curved shapes of pbrt files that are met as many small triangles: parts of quadrics, and smoothed meshes.
 
-use std::{
-    collections::HashMap,
-    f64::consts::{PI, TAU},
-};
+use std::{collections::HashMap, f64::consts::TAU};
 
 use glam::{DVec2, DVec3, Vec2, Vec3};
 
@@ -229,6 +226,8 @@ fn divided(positions: &[DVec3], triangles: &[[u32; 3]]) -> (Vec<DVec3>, Vec<[u32
 
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::PI;
+
     use super::*;
     use crate::formats::pbrt::tokens::Tokens;
 
