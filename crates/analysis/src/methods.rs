@@ -54,13 +54,14 @@ pub struct MethodRow {
     pub wavelength_nm: f64,
     /// The difference of the totals, as a share.
     pub total: f64,
-    /// One standard error of it, from the noise of the rays from the film.
+    /// One standard error of it, from the noise of the rays from the film; not a number after a single pass, whose noise
+    /// nobody knows.
     pub total_error: f64,
     /// The mean absolute difference of pixels off depth edges, as a share of the mean of the picture.
     pub off_edges: f64,
     /// The same in the band of depth edges; none where there are no edges.
     pub edge_band: Option<f64>,
-    /// The mean absolute difference that the noise of the rays from the film makes alone.
+    /// The mean absolute difference that the noise of the rays from the film makes alone; not a number after a single pass.
     pub noise: f64,
     /// What moves and blurs the one picture into the other, off depth edges.
     #[serde(flatten)]
@@ -130,6 +131,10 @@ impl MethodComparison {
         }
         let n_edge = is_edge.iter().filter(|&&is| is).count();
         let (forward_seen, backward_seen) = (LinearRgb::of_image(forward), LinearRgb::of_image(&backward.picture));
+        let is_of_one_pass = rows.iter().any(|row| row.noise.is_nan());
+        let one_pass = is_of_one_pass.then(|| {
+            "the noise is not known: a single pass shows no spread; more samples, as --samples 64, tell it".to_owned()
+        });
         let beyond_view_fraction = beyond_view_fraction(forward.planes(), backward.picture.planes());
         let is_beyond = (beyond_view_fraction > LEAST_BEYOND_VIEW).then(|| {
             format!(
@@ -144,7 +149,7 @@ impl MethodComparison {
             edge_fraction: n_edge as f64 / is_edge.len() as f64,
             parts_of_pixels: 1,
             beyond_view_fraction,
-            notes: is_beyond.into_iter().collect(),
+            notes: one_pass.into_iter().chain(is_beyond).collect(),
             rows,
             backward: backward_seen,
             forward: forward_seen,
@@ -201,6 +206,11 @@ impl MethodRow {
         });
         let share = |[sum, n]: [f64; 2]| if n > 0.0 { sum / n / mean } else { 0.0 };
         let variance: f64 = error.iter().map(|&v| f64::from(v).powi(2)).sum();
+        // Where noise isn't known all pixels weigh alike.
+        let fit = match variance.is_nan() {
+            false => fit(forward, (backward, error), is_edge),
+            true => Fit { errors: [f64::NAN; 5], ..fit(forward, (backward, &Array2::zeros(error.dim())), is_edge) },
+        };
         Self {
             wavelength_nm,
             total: sum(forward) / of_backward - 1.0,
@@ -209,7 +219,7 @@ impl MethodRow {
             edge_band: (zones[1][1] > 0.0).then(|| share(zones[1])),
             // The mean of a normal number's absolute value is √(2/π) of its deviation.
             noise: std::f64::consts::FRAC_2_PI.sqrt() * sum(error) / n / mean,
-            fit: fit(forward, (backward, error), is_edge),
+            fit,
         }
     }
 }
@@ -268,6 +278,11 @@ mod tests {
         // Single precision.
         assert!((row.off_edges - 0.01).abs() < 1e-5 && (row.edge_band.unwrap() - 0.05).abs() < 1e-5, "{row:?}");
         assert!((row.total - (0.01 * 5.0 + 0.05) / 6.0).abs() < 1e-5, "{row:?}");
+        // After one pass the noise is unknown, and not 0; the differences stand.
+        let unknown = Array2::from_elem((20, 30), f32::NAN);
+        let blind = MethodRow::of(550.0, &forward, (&truth, &unknown), &is_edge);
+        assert!(blind.noise.is_nan() && blind.total_error.is_nan() && blind.fit.errors.iter().all(|e| e.is_nan()));
+        assert!(blind.off_edges == row.off_edges && blind.fit.gain.is_finite(), "{blind:?}");
     }
 
     #[test]

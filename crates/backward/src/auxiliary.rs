@@ -8,7 +8,7 @@ use dioptric_world::{
 use ndarray::Array2;
 use rayon::prelude::*;
 
-use crate::{BackwardError, Camera, Pinhole, RadiantPoint, Subject, peeling::Surfaces};
+use crate::{BackwardError, Camera, Panorama, Parallel, Pinhole, Placement, RadiantPoint, Subject, peeling::Surfaces};
 
 /// Pictures of what each pixel's middle sees through the middle of the pupil.
 #[derive(Clone, Debug)]
@@ -59,6 +59,8 @@ pub fn auxiliary<'a>(
         let rays: Vec<Option<Ray>> = match camera {
             Camera::Pinhole(view) => pixels.iter().map(|&pixel| Some(view.ray(pixel, [0.5; 2]))).collect(),
             Camera::ThinLens(lens) => pixels.iter().map(|&pixel| Some(lens.view.ray(pixel, [0.5; 2]))).collect(),
+            Camera::Panorama(all) => pixels.iter().map(|&pixel| Some(all.ray(pixel, [0.5; 2]))).collect(),
+            Camera::Parallel(window) => pixels.iter().map(|&pixel| Some(window.ray(pixel, [0.5; 2]))).collect(),
             Camera::Lens(lens) => lens.chief_rays(&pixels),
         };
         let look = |ray: Option<Ray>| Seen::along(subject, ray, (center_m, axis), grid);
@@ -116,9 +118,16 @@ fn projection_center(camera: &Camera) -> (DVec3, DVec3) {
     let view = match camera {
         Camera::Pinhole(view) => view,
         Camera::ThinLens(lens) => &lens.view,
+        Camera::Panorama(Panorama { placement, .. }) | Camera::Parallel(Parallel { placement, .. }) => {
+            return center_and_axis(placement);
+        }
         Camera::Lens(lens) => return lens.projection_center(),
     };
-    let place = view.placement.world_from_camera;
+    center_and_axis(&view.placement)
+}
+
+fn center_and_axis(placement: &Placement) -> (DVec3, DVec3) {
+    let place = placement.world_from_camera;
     (place.translation, place.transform_vector3(DVec3::Z).normalize())
 }
 

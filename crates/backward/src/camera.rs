@@ -1,8 +1,8 @@
-//! Cameras: a pinhole, a thin lens by formula, and any lens of `dioptric-optics`.
+//! Cameras: a pinhole, a thin lens by formula, a panorama, a parallel projection, and any lens of `dioptric-optics`.
 
 use dioptric_spectrum::Quantity;
 use dioptric_world::{
-    Ray,
+    Ray, SkyMapping,
     glam::{DVec2, DVec3, Vec3},
 };
 
@@ -15,8 +15,34 @@ pub enum Camera {
     Pinhole(Pinhole),
     /// A thin lens by formula: its picture is of the mean radiance over the lens.
     ThinLens(ThinLens),
+    /// All directions from a point: its picture is of spectral radiance.
+    Panorama(Panorama),
+    /// A parallel projection: its picture is of spectral radiance.
+    Parallel(Parallel),
     /// A lens: its picture is of spectral irradiance on the film.
     Lens(Box<LensCamera>),
+}
+
+/// All directions from the camera's origin, the poles above and below.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Panorama {
+    /// Where it stands.
+    pub placement: Placement,
+    /// The picture.
+    pub pixels: PixelGrid,
+    /// Which direction is where in the picture; the mapping's z is up, its y the axis.
+    pub mapping: SkyMapping,
+}
+
+/// Rays along the axis through a window of the plane z = 0.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Parallel {
+    /// Where it stands.
+    pub placement: Placement,
+    /// The picture.
+    pub pixels: PixelGrid,
+    /// The part of the plane that is seen, `[x min, x max, y min, y max]`, m.
+    pub window_m: [f64; 4],
 }
 
 /// A pinhole at the camera's origin.
@@ -68,6 +94,8 @@ impl Camera {
         match self {
             Self::Pinhole(pinhole) => pinhole.pixels,
             Self::ThinLens(lens) => lens.view.pixels,
+            Self::Panorama(panorama) => panorama.pixels,
+            Self::Parallel(parallel) => parallel.pixels,
             Self::Lens(lens) => lens.pixels(),
         }
     }
@@ -78,6 +106,8 @@ impl Camera {
         match self {
             Self::Pinhole(view) => Self::Pinhole(Pinhole { pixels, ..view }),
             Self::ThinLens(lens) => Self::ThinLens(ThinLens { view: Pinhole { pixels, ..lens.view }, ..lens }),
+            Self::Panorama(panorama) => Self::Panorama(Panorama { pixels, ..panorama }),
+            Self::Parallel(parallel) => Self::Parallel(Parallel { pixels, ..parallel }),
             Self::Lens(lens) => Self::Lens(Box::new(lens.with_pixels(pixels))),
         }
     }
@@ -85,7 +115,7 @@ impl Camera {
     /// What the samples of the picture are.
     pub fn quantity(&self) -> Quantity {
         match self {
-            Self::Pinhole(_) | Self::ThinLens(_) => Quantity::Radiance,
+            Self::Pinhole(_) | Self::ThinLens(_) | Self::Panorama(_) | Self::Parallel(_) => Quantity::Radiance,
             Self::Lens(_) => Quantity::Irradiance,
         }
     }
@@ -93,7 +123,7 @@ impl Camera {
     /// The distance between pixels on the film, µm, where there is one.
     pub fn pitch_um(&self) -> Option<f64> {
         match self {
-            Self::Pinhole(_) | Self::ThinLens(_) => None,
+            Self::Pinhole(_) | Self::ThinLens(_) | Self::Panorama(_) | Self::Parallel(_) => None,
             Self::Lens(lens) => Some(lens.pitch_um()),
         }
     }
@@ -117,7 +147,16 @@ impl Camera {
                 }
                 &lens.view
             }
-            Self::Lens(_) => return Ok(()),
+            Self::Parallel(Parallel { window_m: [left, right, bottom, top], .. }) => {
+                let is_sound = left < right && bottom < top && (right - left + top - bottom).is_finite();
+                let found = || format!("{left} to {right}, {bottom} to {top} m");
+                let expected = "a finite one, its smaller numbers first";
+                return match is_sound {
+                    true => Ok(()),
+                    false => Err(BackwardError::setting("the window of a parallel projection", found(), expected)),
+                };
+            }
+            Self::Panorama(_) | Self::Lens(_) => return Ok(()),
         };
         let tangents = view.half_tangents;
         match tangents.min_element() > 0.0 && tangents.is_finite() {
@@ -142,6 +181,20 @@ impl Camera {
                 out.is_shared = true;
                 for &PixelSample { pixel, random } in samples {
                     out.push(lens.ray(pixel, random.camera()), 1.0);
+                }
+            }
+            Self::Panorama(panorama) => {
+                out.is_shared = true;
+                for &PixelSample { pixel, random } in samples {
+                    let [x, y, ..] = random.camera();
+                    out.push(panorama.ray(pixel, [x, y]), 1.0);
+                }
+            }
+            Self::Parallel(parallel) => {
+                out.is_shared = true;
+                for &PixelSample { pixel, random } in samples {
+                    let [x, y, ..] = random.camera();
+                    out.push(parallel.ray(pixel, [x, y]), 1.0);
                 }
             }
             Self::Lens(lens) => lens.rays(samples, nodes, out),
@@ -178,6 +231,23 @@ impl Pinhole {
     /// Returns the ray of a place in a pixel.
     pub(crate) fn ray(&self, pixel: usize, in_pixel: [f64; 2]) -> Ray {
         world_ray(&self.placement, DVec3::ZERO, self.towards(pixel, in_pixel))
+    }
+}
+
+impl Panorama {
+    /// Returns the ray of a place in a pixel.
+    pub(crate) fn ray(&self, pixel: usize, in_pixel: [f64; 2]) -> Ray {
+        let d = self.mapping.direction_at(self.pixels.share(pixel, in_pixel)).as_dvec3();
+        world_ray(&self.placement, DVec3::ZERO, DVec3::new(d.x, d.z, d.y))
+    }
+}
+
+impl Parallel {
+    /// Returns the ray of a place in a pixel.
+    pub(crate) fn ray(&self, pixel: usize, in_pixel: [f64; 2]) -> Ray {
+        let [s, t] = self.pixels.share(pixel, in_pixel);
+        let [left, right, bottom, top] = self.window_m;
+        world_ray(&self.placement, DVec3::new(left + s * (right - left), top + t * (bottom - top), 0.0), DVec3::Z)
     }
 }
 

@@ -60,13 +60,15 @@ impl Film {
         picture
     }
 
-    /// Returns the picture so far, and the standard error of each of its samples.
+    /// Returns the picture so far, and the standard error of each of its samples: not a number where a pixel has had fewer
+    /// passes than two, whose spread says nothing.
     pub(crate) fn develop(&self, quantity: Quantity, grid: &WavelengthGrid) -> (SpectralImage, SpectralImage) {
         let mut error = SpectralImage::zeros(quantity, grid.clone(), self.rows, self.columns);
         for (band, mut errors) in error.planes_mut().enumerate() {
             for (pixel, error) in errors.iter_mut().enumerate() {
                 let (_, variance) = self.mean_and_variance(pixel, band);
-                *error = (variance / f64::from(self.n_passes[pixel].max(1))).sqrt() as f32;
+                let n_passes = self.n_passes[pixel];
+                *error = if n_passes > 1 { (variance / f64::from(n_passes)).sqrt() as f32 } else { f32::NAN };
             }
         }
         (self.picture(quantity, grid), error)
@@ -133,6 +135,10 @@ mod tests {
         // The sample variance is 14/3; over four passes.
         assert!((error.planes()[0][(0, 1)] - (14.0_f32 / 12.0).sqrt()).abs() < 1e-6);
         assert_eq!(picture.planes()[0][(0, 0)], 0.0);
+        // Unknown is not 0.
+        assert!(error.planes()[0][(0, 0)].is_nan());
+        film.add(0, &[5.0]);
+        assert!(film.develop(Quantity::Irradiance, &grid).1.planes()[0][(0, 0)].is_nan());
     }
 
     /// A film twice as wide, the other half dark, needs the passes of the lit half and none beyond.

@@ -94,6 +94,11 @@ impl Integrator<'_> {
                 }
                 return sum;
             }
+            // A medium that it fills has taken its share on the way.
+            let throughput = match self.world.transmittance(&hit, &ray, wavelengths_nm) {
+                Some(left) => std::array::from_fn(|i| throughput[i] * left[i]),
+                None => throughput,
+            };
             // The surface may shine.
             let glow = self.world.emission(&hit, -ray.direction, wavelengths_nm);
             if glow.iter().any(|&l| l > 0.0) {

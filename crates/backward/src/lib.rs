@@ -35,7 +35,7 @@ mod world_camera;
 pub use ndarray;
 
 pub use auxiliary::{Auxiliary, auxiliary, layered_depth};
-pub use camera::{Camera, Pinhole, ThinLens};
+pub use camera::{Camera, Panorama, Parallel, Pinhole, ThinLens};
 pub use error::BackwardError;
 pub use integrator::LightPaths;
 pub use lens_camera::{LensCamera, LensCameraSettings, LensOrigin};

@@ -5,8 +5,8 @@ use dioptric_optics::{Lens, OpticsError, glam::DVec2};
 use dioptric_world::{CameraKind, WorldCamera, glam::DVec3};
 
 use crate::{
-    BackwardError, Bands, Camera, LensCamera, LensCameraSettings, LensOrigin, Pinhole, PixelGrid, Placement, Subject,
-    ThinLens, camera::world_ray,
+    BackwardError, Bands, Camera, LensCamera, LensCameraSettings, LensOrigin, Panorama, Parallel, Pinhole, PixelGrid,
+    Placement, Subject, ThinLens, camera::world_ray,
 };
 
 /// The paper's stand-in for dispersion: a straight line through each index at 550 nm, per nm.
@@ -39,10 +39,14 @@ impl Camera {
                     false => Self::Pinhole(view),
                 })
             }
-            CameraKind::Orthographic { .. } => Err(BackwardError::setting(
+            CameraKind::Orthographic { screen_window } => {
+                Ok(Self::Parallel(Parallel { placement, pixels, window_m: *screen_window }))
+            }
+            CameraKind::Panorama { mapping } => Ok(Self::Panorama(Panorama { placement, pixels, mapping: *mapping })),
+            CameraKind::Other { kind } => Err(BackwardError::setting(
                 "the camera of the world",
-                "a parallel projection",
-                "a pinhole, a thin lens or a lens",
+                format!("'{kind}', which isn't supported"),
+                "another view of the world, such as --frame",
             )),
             CameraKind::Lens {
                 file,

@@ -15,7 +15,7 @@ use crate::{
     measure_args::MeasureCommand,
     picture_args::PictureArgs,
     ranges,
-    render_args::{CompareArgs, LightFieldArgs, RenderArgs},
+    render_args::{CompareArgs, LightFieldArgs, RenderArgs, WorldCommand},
     show::ShowArgs,
     sweep::SweepArgs,
     video_args::TurnArgs,
@@ -99,6 +99,9 @@ pub(crate) enum Command {
     Psf(PsfArgs),
     /// Renders a three-dimensional world: rays from the film through the lens, then sensor and picture
     Render(Box<RenderArgs>),
+    /// Describes worlds
+    #[command(subcommand)]
+    World(WorldCommand),
     /// Renders the world of a camera file both ways and compares: rays from the film, and the view blurred
     Compare(CompareArgs),
     /// Takes a light field apart: views of the parts of the pupil, refocused pictures, depth

@@ -46,14 +46,15 @@ fn table(comparison: &MethodComparison) -> Result<String, std::fmt::Error> {
     );
     for row in &comparison.rows {
         let band = row.edge_band.map_or_else(|| "–".to_owned(), |share| format!("{:.2}", 100.0 * share));
+        let known = |share: f64| if share.is_nan() { "–".to_owned() } else { format!("{:.2}", 100.0 * share) };
         writeln!(
             text,
-            "{:>8.1}  {:>+6.2} ± {:<5.2}  {:>12.2}  {band:>12}  {:>8.2}  {:>+9.3}  {:>+8.3}  {:>+9.3}  {:>+9.3}",
+            "{:>8.1}  {:>+6.2} ± {:<5}  {:>12.2}  {band:>12}  {:>8}  {:>+9.3}  {:>+8.3}  {:>+9.3}  {:>+9.3}",
             row.wavelength_nm,
             100.0 * row.total,
-            100.0 * row.total_error,
+            known(row.total_error),
             100.0 * row.off_edges,
-            100.0 * row.noise,
+            known(row.noise),
             row.fit.right_px,
             row.fit.down_px,
             100.0 * row.fit.magnification,

@@ -42,9 +42,10 @@ const EXAMPLES: &[(&str, &[&str])] = &[
         "render",
         &[
             "dioptric render world.pbrt --lens dgauss-50mm --f-number 4 --seconds 60 --out rendered/",
-            "dioptric render world.glb --fov-deg 40 --pixels 640x480 --noise 0.02",
+            "dioptric render world.glb --frame --sky day --pixels 640x480 --noise 0.02",
         ],
     ),
+    ("world info", &["dioptric world info world.glb"]),
     ("compare", &["dioptric compare camera.ron --samples 64 --out both/"]),
     ("lightfield", &["dioptric lightfield camera.ron --refocus-m 0.5,1 --out light/"]),
     ("sense", &["dioptric sense irradiance.exr --sensor imx363 --exposure-s 0.01 --out shot/"]),

@@ -35,6 +35,7 @@ mod trace;
 mod video;
 mod video_args;
 mod words;
+mod world;
 
 #[cfg(test)]
 mod documentation;
@@ -85,6 +86,7 @@ fn dispatch(Cli { command, common }: Cli) -> anyhow::Result<()> {
         Command::Video(arguments) => video::run(&arguments, &common),
         Command::Psf(arguments) => psf::run(&arguments, &common),
         Command::Render(arguments) => render::run(&arguments, &common),
+        Command::World(command) => world::run(&command, &common),
         Command::Compare(arguments) => compare::run(&arguments, &common),
         Command::LightField(arguments) => light_field::run(&arguments, &common),
         Command::Sense(arguments) => sense::run(&arguments, &common),

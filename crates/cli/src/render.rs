@@ -11,7 +11,8 @@ use dioptric_analysis::{Run, RunReport};
 use dioptric_pipeline::{
     Camera, Crop, FilmSpec, KeptCamera, LensReadOptions, LensSpec, LightPaths, PipelineError, Progress, RenderEffort,
     RenderMethod, Rendering, RenderingSummary, SceneSource, SceneSpec, SensorSpec, Silent, Stage, Staged, StopSpec,
-    WavelengthSpec, WorldRender, WorldSpec, parse_white, with_exposure_s, write_json, write_scene, write_seen_png,
+    WavelengthSpec, WorldRender, WorldSpec, WorldView, parse_white, with_exposure_s, world_camera, write_json,
+    write_scene, write_seen_png,
 };
 use dioptric_report::write_run;
 use dioptric_spectrum::{Cancel, WavelengthGrid};
@@ -50,6 +51,10 @@ pub(crate) fn run(arguments: &RenderArgs, common: &Common) -> anyhow::Result<()>
     if let Some(seconds) = arguments.seconds.filter(|seconds| !(seconds.is_finite() && *seconds > 0.0)) {
         bail!("--seconds is {seconds}, expected a finite number above 0");
     }
+    if arguments.world.to_str().is_none() {
+        // The report could not name it.
+        bail!("{}: its name is not in UTF-8, expected one that is", arguments.world.display());
+    }
     let (clock, cancel) = (Clock::new(common.quiet), Cancel::new());
     let kept = KeptCamera::new(camera_of(arguments, common)?);
     kept.camera().validate()?;
@@ -57,17 +62,24 @@ pub(crate) fn run(arguments: &RenderArgs, common: &Common) -> anyhow::Result<()>
     let world = kept.world_of_file(&clock, &cancel)?;
     let notes = world.as_ref().map_or(&[][..], |world| world.notes());
     tell(notes, common);
+    let is_of_file = matches!(&kept.camera().scene.source, SceneSource::World(spec) if spec.view == WorldView::OfFile);
+    if is_of_file && world.as_ref().is_some_and(|world| world.cameras().is_empty()) {
+        let whole = "the file has no camera: the whole of it is seen; --eye and --look-at give another view";
+        tell(&[whole.to_owned()], common);
+    }
     let mut camera = kept.camera().clone();
     // The demo's lens is that of the still life.
-    let has_lens = arguments.lens.is_some() || arguments.camera.is_some() || world.is_none();
-    let own = world.as_ref().and_then(|world| world.cameras().first());
-    let own_has_lens = match own {
-        Some(own) if arguments.camera.is_none() => camera.take_from_world(own)?,
-        None if !has_lens => bail!("{}: has no camera, expected one, or --lens", arguments.world.display()),
+    let has_lens = arguments.lens.is_some() || arguments.camera_file().is_some() || world.is_none();
+    let own = match (&world, &camera.scene.source) {
+        (Some(world), SceneSource::World(spec)) => Some(world_camera(world, spec, arguments.fov_deg)?),
+        _ => None,
+    };
+    let own_has_lens = match &own {
+        Some(own) if arguments.camera_file().is_none() => camera.take_from_world(own)?,
         _ => false,
     };
     if !has_lens && !own_has_lens {
-        let (Some(world), Some(own), SceneSource::World(spec)) = (&world, own, &camera.scene.source) else {
+        let (Some(world), Some(own), SceneSource::World(spec)) = (&world, &own, &camera.scene.source) else {
             bail!("{}: has no camera, expected one, or --lens", arguments.world.display());
         };
         let grid = camera.wavelengths.grid()?.map_or_else(|| WavelengthGrid::uniform(400.0, 700.0, 10.0), Ok)?;
@@ -127,11 +139,14 @@ fn cropped(render: WorldRender, arguments: &RenderArgs) -> anyhow::Result<WorldR
 
 /// Returns the camera of the file or the demo before the world, with what the command line changes but for lens and film.
 fn camera_of(arguments: &RenderArgs, common: &Common) -> anyhow::Result<Camera> {
-    let mut camera = arguments.camera.as_deref().map_or_else(Camera::demo, Camera::read)?;
+    let mut camera = arguments.camera_file().map_or_else(Camera::demo, Camera::read)?;
     let size = arguments.pixels.as_deref().map(parse_size).transpose()?;
     let of_file = WorldSpec::of_file(arguments.world.clone());
     let spec = WorldSpec {
         unit_m: arguments.unit_m,
+        view: arguments.view.view(arguments.camera_of_world()),
+        sky: arguments.view.sky.clone(),
+        lamps: arguments.view.light.clone(),
         effort: effort(arguments),
         // How finely the still life is lit does not hang on the film, unless that has its pixels.
         size: size.filter(|_| !of_file.is_still_life() || camera.film == FilmSpec::Scene),
@@ -144,7 +159,7 @@ fn camera_of(arguments: &RenderArgs, common: &Common) -> anyhow::Result<Camera> 
         field_of_view_deg: arguments.fov_deg,
         ..SceneSpec::of_file(arguments.world.clone())
     };
-    if arguments.camera.is_none() {
+    if arguments.camera_file().is_none() {
         camera.name = stem_of(&arguments.world);
     }
     camera.seed = common.seed.unwrap_or(camera.seed);

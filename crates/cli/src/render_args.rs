@@ -1,9 +1,9 @@
 //! The words of `dioptric render`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use clap::{Args, ValueEnum};
-use dioptric_pipeline::{Crop, Diffraction};
+use clap::{Args, Subcommand, ValueEnum};
+use dioptric_pipeline::{Crop, Diffraction, WorldLamp, WorldSky, WorldView, parse_numbers};
 
 use crate::lens_args::{BandArgs, FilmArgs, LensStateArgs};
 
@@ -34,11 +34,12 @@ impl From<RayDiffraction> for Diffraction {
 /// A world, and the camera that renders it.
 #[derive(Debug, Args)]
 pub(crate) struct RenderArgs {
-    /// World to render: .pbrt, .gltf, .glb, .obj or .ply; or still-life, the built-in scene of the demo
+    /// World to render: .pbrt, .gltf, .glb, .obj, .ply or .stl; or still-life, the built-in scene of the demo
     pub(crate) world: PathBuf,
-    /// Camera file, whose scene the world takes the place of [default: the camera of the world's file]
-    #[arg(long, value_name = "CAMERA.ron", help_heading = "Lens")]
-    pub(crate) camera: Option<PathBuf>,
+    /// Camera file (.ron), whose scene the world takes the place of; or a camera of the world's file, by its name or its number from 1
+    /// [default: the first one of the world's file]
+    #[arg(long, value_name = "CAMERA", help_heading = "Lens")]
+    pub(crate) camera: Option<String>,
     /// Lens in place of the camera's: a file, the name of a built-in one, thin:50mm:f2 or pinhole:0.1mm
     #[arg(long, value_name = "LENS", help_heading = "Lens")]
     pub(crate) lens: Option<String>,
@@ -72,6 +73,8 @@ pub(crate) struct RenderArgs {
     /// What the picture makes white, as for `run` [default: scene, the light on what is seen]
     #[arg(long, value_name = "WHITE", help_heading = "Exposure and picture")]
     pub(crate) white: Option<String>,
+    #[command(flatten)]
+    pub(crate) view: ViewArgs,
     /// Length of the file's unit, m
     #[arg(long, value_name = "M", default_value_t = 1.0, help_heading = "World")]
     pub(crate) unit_m: f64,
@@ -98,6 +101,109 @@ pub(crate) struct RenderArgs {
     /// Folder for the results
     #[arg(long, short, value_name = "DIR", default_value = "dioptric-render", help_heading = "Results")]
     pub(crate) out: PathBuf,
+}
+
+/// From where a world is seen, and what lights it besides its own lights.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "World")]
+pub(crate) struct ViewArgs {
+    /// Sees the whole world, a quarter round from its front and from above [default where its file has no camera]
+    #[arg(long, conflicts_with = "eye")]
+    pub(crate) frame: bool,
+    /// Where the camera stands, m
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse_point, allow_hyphen_values = true)]
+    pub(crate) eye: Option<(f64, f64, f64)>,
+    /// What is in the middle of the picture, m [default: the middle of the world]
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse_point, allow_hyphen_values = true, requires = "eye")]
+    pub(crate) look_at: Option<(f64, f64, f64)>,
+    /// What is up in the picture [default: what is up in the world]
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse_point, allow_hyphen_values = true, requires = "eye")]
+    pub(crate) up: Option<(f64, f64, f64)>,
+    /// Light from beyond: even:RADIANCE (W m⁻² sr⁻¹ nm⁻¹), day:ELEVATION,AZIMUTH,TURBIDITY (degrees; day alone is day:45,30,3), or a picture
+    /// of all directions, its rows by height [default: even:1 where nothing else gives light]
+    #[arg(long, value_name = "SKY", value_parser = parse_sky)]
+    pub(crate) sky: Option<WorldSky>,
+    /// Lamps at a place, m, of a luminous flux, lm, and the color of daylight
+    #[arg(long, value_name = "X,Y,Z,LM", value_parser = parse_lamp, allow_hyphen_values = true)]
+    pub(crate) light: Vec<WorldLamp>,
+}
+
+impl ViewArgs {
+    /// Returns the view that is asked for; `camera` is the name or the number of one of the file's.
+    pub(crate) fn view(&self, camera: Option<&str>) -> WorldView {
+        match (self.eye, camera) {
+            _ if self.frame => WorldView::Whole,
+            (Some(eye_m), _) => WorldView::From { eye_m, look_at_m: self.look_at, up: self.up },
+            (None, Some(camera)) => WorldView::Camera(camera.to_owned()),
+            (None, None) => WorldView::OfFile,
+        }
+    }
+}
+
+impl RenderArgs {
+    /// The camera file, where one is named.
+    pub(crate) fn camera_file(&self) -> Option<&Path> {
+        let camera = self.camera.as_deref().map(Path::new)?;
+        let is_file = camera.extension().is_some_and(|kind| kind.eq_ignore_ascii_case("ron")) || camera.is_file();
+        is_file.then_some(camera)
+    }
+
+    /// The camera of the world's file, where one is named.
+    pub(crate) fn camera_of_world(&self) -> Option<&str> {
+        self.camera.as_deref().filter(|_| self.camera_file().is_none())
+    }
+}
+
+fn parse_point(text: &str) -> Result<(f64, f64, f64), String> {
+    match parse_numbers("a point", text).map_err(|e| e.to_string())?.as_slice() {
+        &[x, y, z] => Ok((x, y, z)),
+        found => Err(format!("{} numbers, expected X,Y,Z", found.len())),
+    }
+}
+
+fn parse_lamp(text: &str) -> Result<WorldLamp, String> {
+    match parse_numbers("a lamp", text).map_err(|e| e.to_string())?.as_slice() {
+        &[x, y, z, lumens] => Ok(WorldLamp { at_m: (x, y, z), lumens }),
+        found => Err(format!("{} numbers, expected X,Y,Z,LM: a place in m and lumens", found.len())),
+    }
+}
+
+fn parse_sky(text: &str) -> Result<WorldSky, String> {
+    let numbers = |text: &str| match text {
+        "" => Ok(Vec::new()),
+        text => parse_numbers("a sky", text).map_err(|e| e.to_string()),
+    };
+    let (word, rest) = text.split_once(':').unwrap_or((text, ""));
+    match word {
+        "even" => match numbers(rest)?.as_slice() {
+            [] => Ok(WorldSky::Even(1.0)),
+            &[radiance] => Ok(WorldSky::Even(radiance)),
+            _ => Err("expected even:RADIANCE".to_owned()),
+        },
+        "day" => {
+            let n = numbers(rest)?;
+            let at = |place: usize, usual: f64| n.get(place).copied().unwrap_or(usual);
+            if n.len() > 3 {
+                return Err("expected day:ELEVATION,AZIMUTH,TURBIDITY".to_owned());
+            }
+            Ok(WorldSky::Day { elevation_deg: at(0, 45.0), azimuth_deg: at(1, 30.0), turbidity: at(2, 3.0) })
+        }
+        _ if Path::new(text).extension().is_some() => Ok(WorldSky::Picture(PathBuf::from(text))),
+        _ => Err("expected even:RADIANCE, day:ELEVATION,AZIMUTH,TURBIDITY or a picture".to_owned()),
+    }
+}
+
+/// Something to do with worlds.
+#[derive(Debug, Subcommand)]
+pub(crate) enum WorldCommand {
+    /// Describes the file of a world: size, cameras, lights, materials, and what of it isn't understood
+    Info {
+        /// World: .pbrt, .gltf, .glb, .obj, .ply or .stl
+        world: PathBuf,
+        /// Length of the file's unit, m
+        #[arg(long, value_name = "M", default_value_t = 1.0)]
+        unit_m: f64,
+    },
 }
 
 /// A world that is rendered both ways.

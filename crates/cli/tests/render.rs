@@ -254,6 +254,55 @@ fn noise_and_time_end_a_rendering() {
     assert!(folder.path().join("seconds/picture.png").exists());
 }
 
+/// A mesh alone, without camera, light or material, gives a picture at once, and says what stands in for each.
+#[test]
+fn a_mesh_alone_gives_a_picture() {
+    let folder = folder();
+    let solid = "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 9 0 0\nvertex 0 9 0\nendloop\nendfacet\nendsolid a\n";
+    fs::write(folder.path().join("part.stl"), solid).unwrap();
+    let words =
+        ["render", "part.stl", "--pixels", "30x20", "--samples", "8", "--wavelengths-nm", "450,550,650", "-o", "out"];
+    let said = Command::new(env!("CARGO_BIN_EXE_dioptric")).args(words).current_dir(folder.path()).output().unwrap();
+    let said = String::from_utf8_lossy(&said.stderr).into_owned();
+    for word in ["no camera", "gives light", "without a material"] {
+        assert!(said.contains(word), "{word}: {said}");
+    }
+    let picture = read_picture(&folder.path().join("out/picture.png")).to_rgb8();
+    assert!(picture.pixels().filter(|p| p.0 != [255; 3]).count() > 20, "the triangle stands before the sky");
+    // Seen by what the words say, and from beyond the other side of it nothing but the lamp's light is lost.
+    let aside =
+        ["--eye", "-3,-4,9", "--look-at", "2,2,0", "--up", "0,1,0", "--light", "3,3,5,800", "--sky", "day:30,200"];
+    output(folder.path(), &[&words[..8], &["-o", "aside", "--quiet"], &aside].concat());
+    let text = output(folder.path(), &["world", "info", "part.stl", "--json"]);
+    let info: serde_json::Value = serde_json::from_str(&text).unwrap();
+    assert_eq!((&info["n_primitives"], &info["cameras"]), (&1.into(), &serde_json::json!([])));
+    assert_eq!(info["bounds_m"][1][0], 9.0);
+}
+
+/// What goes on is the content of all files: one that was touched or moved goes on, one of which an included material changed does not.
+#[test]
+fn resume_goes_by_contents() {
+    let folder = folder();
+    let parts = |at: &str, gray: &str| {
+        fs::create_dir_all(folder.path().join(at)).unwrap();
+        let text = WORLD.replace("Material \"diffuse\" \"rgb reflectance\" [ 0.5 0.5 0.5 ]", "Include \"paint.pbrt\"");
+        assert_ne!(text, WORLD);
+        fs::write(folder.path().join(at).join("wall.pbrt"), text).unwrap();
+        let paint = format!("Material \"diffuse\" \"rgb reflectance\" [ {gray} {gray} {gray} ]\n");
+        fs::write(folder.path().join(at).join("paint.pbrt"), paint).unwrap();
+    };
+    let words = |at: &'static str, samples: &'static str, more: &'static [&'static str]| {
+        [&["render", at, "--samples", samples, "-o", "out"], BANDS, more].concat()
+    };
+    parts("a", "0.5");
+    output(folder.path(), &words("a/wall.pbrt", "8", &[]));
+    // Written anew, elsewhere, with the same words.
+    parts("b", "0.5");
+    output(folder.path(), &words("b/wall.pbrt", "16", &["--resume"]));
+    parts("b", "0.6");
+    check_error(folder.path(), &words("b/wall.pbrt", "24", &["--resume"]), &["another rendering"]);
+}
+
 #[test]
 fn bad_worlds_end_in_a_sentence() {
     let folder = folder();
@@ -262,9 +311,10 @@ fn bad_worlds_end_in_a_sentence() {
     check_error(folder.path(), &pixels, &["--pixels is '24by16', expected WxH"]);
     check_error(folder.path(), &["render", "wall.pbrt", "--lens", "none", "--quiet"], &["none"]);
     fs::write(folder.path().join("bare.pbrt"), WORLD.replace("Camera \"perspective\" \"float fov\" 20\n", "")).unwrap();
-    check_error(folder.path(), &["render", "bare.pbrt", "--quiet"], &["bare.pbrt", "no camera", "--lens"]);
-    let lens = [&["render", "bare.pbrt"], LENS, BANDS].concat();
-    check_error(folder.path(), &lens, &["field_of_view_deg"]);
+    let camera = ["render", "bare.pbrt", "--quiet", "--camera", "left"];
+    check_error(folder.path(), &camera, &["bare.pbrt", "'left'", "which has none"]);
+    check_error(folder.path(), &["render", "wall.pbrt", "--eye", "1,2", "--quiet"], &["--eye", "X,Y,Z"]);
+    check_error(folder.path(), &["render", "wall.pbrt", "--sky", "night", "--quiet"], &["--sky", "even:RADIANCE"]);
     fs::write(folder.path().join("broken.pbrt"), "WorldBegin\nShape \"sphere\" [\n").unwrap();
     check_error(folder.path(), &["render", "broken.pbrt", "--quiet"], &["broken.pbrt", "2"]);
 }

@@ -6,7 +6,7 @@ mod tagged;
 
 use std::{
     fs,
-    io::{self, Cursor},
+    io::{self, BufRead, Cursor, Seek},
     path::Path,
 };
 
@@ -40,19 +40,30 @@ pub fn size_of(path: &Path) -> Result<(usize, usize), ImageError> {
 /// # Errors
 /// When the file cannot be read, is no such picture, or takes more memory than it may.
 pub fn read_within(path: &Path, beside_bytes: u64) -> Result<DynamicImage, ImageError> {
-    let mut reader = ImageReader::open(path)?.with_guessed_format()?;
+    let n_bytes = fs::metadata(path)?.len();
+    decoded(ImageReader::open(path)?.with_guessed_format()?, n_bytes, beside_bytes)
+}
+
+/// Reads a picture from the bytes of a file, as [`read_within`] does.
+///
+/// # Errors
+/// When they are no such picture, or it takes more memory than it may.
+pub fn decode_within(bytes: &[u8], beside_bytes: u64) -> Result<DynamicImage, ImageError> {
+    decoded(ImageReader::new(Cursor::new(bytes)).with_guessed_format()?, bytes.len() as u64, beside_bytes)
+}
+
+fn decoded<R: BufRead + Seek>(
+    mut reader: ImageReader<R>,
+    n_bytes: u64,
+    beside_bytes: u64,
+) -> Result<DynamicImage, ImageError> {
     reader.limits(Limits::no_limits());
     let decoder = reader.into_decoder()?;
     let (columns, rows) = decoder.dimensions();
     let beside = beside_bytes.saturating_mul(u64::from(columns)).saturating_mul(u64::from(rows));
-    check(decoder.total_bytes().saturating_add(beside), path)?;
-    DynamicImage::from_decoder(decoder)
-}
-
-/// Checks that what a picture takes is allowed.
-fn check(bytes: u64, path: &Path) -> Result<(), ImageError> {
     let too_large = |error| ImageError::IoError(io::Error::other(error));
-    memory::check(bytes, fs::metadata(path)?.len()).map_err(too_large)
+    memory::check(decoder.total_bytes().saturating_add(beside), n_bytes).map_err(too_large)?;
+    DynamicImage::from_decoder(decoder)
 }
 
 /// Reads a picture of any format that is compiled in, whatever memory it takes within the limits: one of the program's own.

@@ -42,7 +42,7 @@ pub use camera::{
     BlurSpec, BorderSpec, Camera, CameraTurn, Crop, DualPixelSpec, Exposed, FilmSpec, FilterSpec, FlatSize, FocusSpec,
     FramesSpec, LensReadOptions, LensSpec, LightFieldSpec, Movements, PhotodiodeReads, Photodiodes,
     REFERENCE_WAVELENGTH_NM, RenderEffort, RenderMethod, RetiredBank, SceneSource, SceneSpec, SensorOptions,
-    SensorSpec, StopSpec, TurnPath, VideoSpec, WavelengthSpec, WorldSpec, nearest_to_reference_nm,
+    SensorSpec, StopSpec, TurnPath, VideoSpec, WavelengthSpec, WorldLamp, WorldSky, WorldSpec, WorldView, nearest_to_reference_nm,
 };
 pub use capture_files::{irradiance_files, write_capture, write_frames_and_depth, write_irradiance, write_scene};
 pub use develop::DevelopedFile;
@@ -63,10 +63,10 @@ pub use schema::{CAMERA_SCHEMA, CAMERA_TEMPLATE, SENSOR_SCHEMA};
 pub use sense::{SenseRequest, Sensed};
 pub use shown::{ShowRequest, ShownPicture, open_display};
 pub use stages::{
-    AberrationSummary, Capture, FilmPart, FilmPlace, FrameSet, Given, GivenParts, IRRADIANCE_FILE, Irradiance,
-    IrradianceSummary, KeptCamera, LensAberrations, NarrowSurfaces, PaintReach, RESUME_FILE, RenderingSummary,
-    ResolvedLens, ResolvedScene, Resumed, SceneSummary, StageCounts, Video, VideoFrame, VideoFrameFacts, WorldRender,
-    has_kept_bands, write_seen_png,
+    AberrationSummary, CameraSummary, Capture, FilmPart, FilmPlace, FrameSet, Given, GivenParts, IRRADIANCE_FILE,
+    Irradiance, IrradianceSummary, KeptCamera, LensAberrations, NarrowSurfaces, PaintReach, RESUME_FILE,
+    RenderingSummary, ResolvedLens, ResolvedScene, Resumed, SceneSummary, StageCounts, Video, VideoFrame,
+    VideoFrameFacts, WorldRender, WorldSummary, has_kept_bands, world_camera, write_seen_png,
 };
 pub use video_files::{VideoFacts, write_video_frame};
 pub use words::{parse_illuminant, parse_white, with_analog_gain, with_auto_exposure, with_exposure_s};

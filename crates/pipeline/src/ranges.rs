@@ -59,6 +59,13 @@ const RANGES: &[(Range, &[&str])] = &[
     (of(1e-9, 1e9, "lux"), &["illuminance_lux"]),
     (of(1e-9, 1e9, "cd/m²"), &["mean_luminance_cd_m2", "white_cd_m2"]),
     (of(1e-9, 1e9, "m"), &["unit_m"]),
+    (of(-1e9, 1e9, "m"), &["eye_m", "look_at_m", "at_m"]),
+    (of(-1e9, 1e9, ""), &["up"]),
+    (of(1e-12, 1e12, "W m⁻² sr⁻¹ nm⁻¹"), &["Even"]),
+    (of(0.0, 90.0, "degrees"), &["elevation_deg"]),
+    (of(-360.0, 360.0, "degrees"), &["azimuth_deg"]),
+    (of(1.7, 10.0, ""), &["turbidity"]),
+    (of(1e-9, 1e12, "lm"), &["lumens"]),
     (of(10.0, 1e6, "nm"), &["first_nm", "last_nm", "ListNm", "wavelength_nm", "wavelengths_nm"]),
     (of(1e-3, 1e6, "nm"), &["step_nm"]),
     // The lens.

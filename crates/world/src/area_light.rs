@@ -105,8 +105,13 @@ impl AreaLight {
         }
     }
 
-    /// Returns direction, distance, density over solid angle and whether the outside is seen; of one triangle, or of one that
-    /// is drawn by area.
+    /// Its shape.
+    pub(crate) fn shape(&self) -> u32 {
+        self.shape
+    }
+
+    /// Returns direction, distance, density over solid angle and whether the outside is seen, and the triangle of a mesh; of
+    /// one triangle, or of one that is drawn by area.
     pub(crate) fn sample(
         &self,
         shapes: &[PlacedShape],
@@ -114,9 +119,9 @@ impl AreaLight {
         triangle: Option<usize>,
         u_part: f32,
         u: [f32; 2],
-    ) -> Option<(Vec3, f32, f32, bool)> {
+    ) -> Option<(Vec3, f32, f32, bool, Option<u32>)> {
         let placed = &shapes[self.shape as usize];
-        let (point, normal, area_pdf) = match &placed.kind {
+        let (point, normal, area_pdf, triangle) = match &placed.kind {
             PlacedKind::Mesh(mesh) => {
                 let area = triangle.map_or(self.parts.total(), |triangle| triangle_area(mesh.corners(triangle)));
                 let triangle = triangle.unwrap_or_else(|| self.parts.pick(u_part).0);
@@ -124,11 +129,17 @@ impl AreaLight {
                 let [a, b, c] = corners;
                 let [b1, b2] = on_triangle(u);
                 let normal = mesh.outward_normal(triangle, corners);
-                ((1.0 - b1 - b2) * a + b1 * b + b2 * c, normal, (1.0 / area) as f32)
+                ((1.0 - b1 - b2) * a + b1 * b + b2 * c, normal, (1.0 / area) as f32, Some(triangle as u32))
             }
             PlacedKind::Quadric(quadric) => match quadric.cone_to(from) {
-                Some(sphere) => return Some(sphere.sample(u, placed.is_reversed)),
-                None => quadric.sample_area(u),
+                Some(sphere) => {
+                    let (direction, distance_m, pdf, is_front) = sphere.sample(u, placed.is_reversed);
+                    return Some((direction, distance_m, pdf, is_front, None));
+                }
+                None => {
+                    let (point, normal, area_pdf) = quadric.sample_area(u);
+                    (point, normal, area_pdf, None)
+                }
             },
         };
         let normal = if placed.is_reversed { -normal } else { normal };
@@ -137,7 +148,7 @@ impl AreaLight {
         let direction = to / distance_m;
         let cosine = normal.dot(direction);
         let pdf = area_pdf * distance_m * distance_m / cosine.abs();
-        (pdf.is_finite() && pdf > 0.0).then_some((direction, distance_m, pdf, cosine < 0.0))
+        (pdf.is_finite() && pdf > 0.0).then_some((direction, distance_m, pdf, cosine < 0.0, triangle))
     }
 
     /// The density with which `sample` draws the point of a hit, given the same choice of a triangle.

@@ -19,22 +19,85 @@ pub struct Bsdf<const N: usize> {
     frame: Frame,
     geometric_normal: Vec3,
     outgoing: Vec3,
-    /// Kinds of scattering and the share of the surface that each has; shares sum to 1.
-    lobes: [(f32, Lobe<N>); MAX_LOBES],
+    /// Kinds of scattering, each with its factor.
+    lobes: [(Factor, Lobe<N>); MAX_LOBES],
     n_lobes: usize,
+    /// The sum of the chances.
+    chances: f32,
+}
+
+/// What a kind of scattering counts in a sum, and how often it is drawn.
+#[derive(Clone, Copy, Debug)]
+struct Factor {
+    /// What its values are multiplied by: the share of the surface that it has.
+    share: f32,
+    /// How often it is drawn, in proportion to the others.
+    chance: f32,
 }
 
 /// The most kinds of scattering that a mixture of materials can have.
-pub(crate) const MAX_LOBES: usize = 4;
+pub(crate) const MAX_LOBES: usize = 8;
 
 /// One kind of scattering. Roughness `None` is a mirror.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Lobe<const N: usize> {
-    Diffuse { reflectance: [f32; N], transmittance: [f32; N] },
-    Mirror { reflectance: [f32; N], rough: Option<Ggx> },
-    Metal { n: [f32; N], k: [f32; N], rough: Option<Ggx> },
-    Dielectric { index: [f32; N], rough: Option<Ggx> },
-    Coated { diffuse: [f32; N], index: [f32; N], inside: [f32; N], rough: Option<Ggx> },
+    Diffuse {
+        reflectance: [f32; N],
+        transmittance: [f32; N],
+    },
+    /// Oren & Nayar (1994) by their two constants.
+    RoughDiffuse {
+        reflectance: [f32; N],
+        constants: [f32; 2],
+    },
+    Mirror {
+        reflectance: [f32; N],
+        rough: Option<Ggx>,
+    },
+    /// A boundary of which only what it mirrors is followed, times a color.
+    Glossy {
+        reflectance: [f32; N],
+        index: [f32; N],
+        rough: Option<Ggx>,
+    },
+    Metal {
+        n: [f32; N],
+        k: [f32; N],
+        rough: Option<Ggx>,
+    },
+    Dielectric {
+        index: [f32; N],
+        reflectance: [f32; N],
+        transmittance: [f32; N],
+        rough: Option<Ggx>,
+    },
+    /// A pane whose two sides are one surface: light goes on straight, or about so where it is rough.
+    Pane {
+        reflectance: [f32; N],
+        transmittance: [f32; N],
+        rough: Option<Ggx>,
+    },
+    Coated {
+        diffuse: [f32; N],
+        index: [f32; N],
+        inside: [f32; N],
+        rough: Option<Ggx>,
+    },
+    /// A diffuse base below a mirroring layer by Schlick's formula (glTF 2.0, appendix B): `mirrored` at right angles,
+    /// `edge` at grazing ones; the base loses what a layer of `lost` at both mirrors.
+    Layered {
+        diffuse: [f32; N],
+        mirrored: [f32; N],
+        edge: f32,
+        lost: [f32; 2],
+        rough: Option<Ggx>,
+    },
+    /// A diffuse base below a glossy coat, which gains what the base loses (Ashikhmin & Shirley 2000).
+    Substrate {
+        diffuse: [f32; N],
+        mirrored: [f32; N],
+        rough: Option<Ggx>,
+    },
     Open,
 }
 
@@ -63,18 +126,43 @@ struct Mirrored<const N: usize> {
 
 impl<const N: usize> Bsdf<N> {
     pub(crate) fn new(frame: Frame, geometric_normal: Vec3, outgoing: Vec3) -> Self {
-        Self { frame, geometric_normal, outgoing, lobes: [(0.0, Lobe::Open); MAX_LOBES], n_lobes: 0 }
+        let none = (Factor { share: 0.0, chance: 0.0 }, Lobe::Open);
+        Self { frame, geometric_normal, outgoing, lobes: [none; MAX_LOBES], n_lobes: 0, chances: 0.0 }
     }
 
-    /// Adds a kind of scattering; what would be one too many takes the place of the last.
+    /// Adds a kind of scattering of a share of the surface, which is drawn as often.
     pub(crate) fn push(&mut self, share: f32, lobe: Lobe<N>) {
-        if share > 0.0 {
-            self.n_lobes = (self.n_lobes + 1).min(MAX_LOBES);
-            self.lobes[self.n_lobes - 1] = (share, lobe);
+        self.push_with(Factor { share, chance: share }, lobe);
+    }
+
+    /// Adds a kind of scattering to others of the same share of the surface: it is drawn by the light that it gives back.
+    pub(crate) fn push_term(&mut self, share: f32, lobe: Lobe<N>) {
+        let cos = self.frame.to_local(self.outgoing).z;
+        let albedo = lobe.albedo(cos).iter().sum::<f32>() / N as f32;
+        if albedo > 0.0 {
+            self.push_with(Factor { share, chance: share * albedo.clamp(0.02, 1.0) }, lobe);
         }
     }
 
-    fn lobes(&self) -> &[(f32, Lobe<N>)] {
+    /// What would be one too many takes the place of the last.
+    fn push_with(&mut self, factor: Factor, lobe: Lobe<N>) {
+        if factor.share > 0.0 {
+            if self.n_lobes == MAX_LOBES {
+                self.n_lobes -= 1;
+                self.chances -= self.lobes[self.n_lobes].0.chance;
+            }
+            self.lobes[self.n_lobes] = (factor, lobe);
+            self.n_lobes += 1;
+            self.chances += factor.chance;
+        }
+    }
+
+    /// Divides all shares by a number.
+    pub(crate) fn divide(&mut self, by: f32) {
+        self.lobes[..self.n_lobes].iter_mut().for_each(|(factor, _)| factor.share /= by);
+    }
+
+    fn lobes(&self) -> &[(Factor, Lobe<N>)] {
         &self.lobes[..self.n_lobes]
     }
 
@@ -84,7 +172,7 @@ impl<const N: usize> Bsdf<N> {
     pub fn eval(&self, incident: Vec3) -> [f32; N] {
         let Some((o, i)) = self.local(incident) else { return [0.0; N] };
         let mut sum = [0.0; N];
-        for (share, lobe) in self.lobes() {
+        for (Factor { share, .. }, lobe) in self.lobes() {
             let value = lobe.eval(o, i);
             sum = std::array::from_fn(|lane| sum[lane] + share * value[lane]);
         }
@@ -94,7 +182,7 @@ impl<const N: usize> Bsdf<N> {
     /// Returns the density, 1/sr, with which [`sample`](Self::sample) draws a direction, mirror directions left out.
     pub fn pdf(&self, incident: Vec3) -> f32 {
         let Some((o, i)) = self.local(incident) else { return 0.0 };
-        self.lobes().iter().map(|(share, lobe)| share * lobe.pdf(o, i)).sum()
+        self.lobes().iter().map(|(factor, lobe)| factor.chance * lobe.pdf(o, i)).sum::<f32>() / self.chances
     }
 
     /// Draws the direction that light comes from; `None` where the light ends here.
@@ -102,16 +190,16 @@ impl<const N: usize> Bsdf<N> {
     /// The numbers are in [0, 1). Of a dispersive surface ([`is_dispersive`](Self::is_dispersive)) the direction is that
     /// of the first wavelength.
     pub fn sample(&self, u_lobe: f32, u: [f32; 2]) -> Option<BsdfSample<N>> {
-        let (mut rest, mut chosen) = (u_lobe, None);
-        for (share, lobe) in self.lobes() {
-            let is_chosen = rest < *share;
-            chosen = Some((*share, lobe, (rest / share).clamp(0.0, ONE_MINUS_EPSILON)));
+        let (mut rest, mut chosen) = (u_lobe * self.chances, None);
+        for (factor, lobe) in self.lobes() {
+            let is_chosen = rest < factor.chance;
+            chosen = Some((factor, lobe, (rest / factor.chance).clamp(0.0, ONE_MINUS_EPSILON)));
             if is_chosen {
                 break;
             }
-            rest -= share;
+            rest -= factor.chance;
         }
-        let (share, lobe, u_lobe) = chosen?;
+        let (factor, lobe, u_lobe) = chosen?;
         let o = self.frame.to_local(self.outgoing);
         if o.z == 0.0 {
             return None;
@@ -120,8 +208,9 @@ impl<const N: usize> Bsdf<N> {
             let Mirrored { incident, value, probability, is_dispersed } = lobe.mirrored(o, u_lobe)?;
             let incident = self.frame.to_world(incident).normalize();
             self.local(incident)?;
-            let weight = value.map(|v| v / probability);
-            return Some(BsdfSample { incident, weight, pdf: share * probability, is_delta: true, is_dispersed });
+            let chance = factor.chance / self.chances;
+            let weight = value.map(|v| v * factor.share / (chance * probability));
+            return Some(BsdfSample { incident, weight, pdf: chance * probability, is_delta: true, is_dispersed });
         }
         let incident = self.frame.to_world(lobe.draw(o, u_lobe, u)?).normalize();
         let pdf = self.pdf(incident);
@@ -138,8 +227,16 @@ impl<const N: usize> Bsdf<N> {
     /// Whether light is only mirrored or refracted, so that sampling lights finds nothing.
     pub fn is_delta(&self) -> bool {
         self.lobes().iter().all(|(_, lobe)| match lobe {
-            Lobe::Diffuse { .. } | Lobe::Coated { .. } => false,
-            Lobe::Mirror { rough, .. } | Lobe::Metal { rough, .. } | Lobe::Dielectric { rough, .. } => rough.is_none(),
+            Lobe::Diffuse { .. }
+            | Lobe::RoughDiffuse { .. }
+            | Lobe::Coated { .. }
+            | Lobe::Layered { .. }
+            | Lobe::Substrate { .. } => false,
+            Lobe::Mirror { rough, .. }
+            | Lobe::Glossy { rough, .. }
+            | Lobe::Metal { rough, .. }
+            | Lobe::Dielectric { rough, .. }
+            | Lobe::Pane { rough, .. } => rough.is_none(),
             Lobe::Open => true,
         })
     }
@@ -154,21 +251,32 @@ impl<const N: usize> Bsdf<N> {
 
     /// Returns the share of the light that the surface gives back in all directions, roughly: for albedo pictures.
     pub fn albedo(&self) -> [f32; N] {
-        let cos = self.frame.to_local(self.outgoing).z.abs();
+        let cos = self.frame.to_local(self.outgoing).z;
         let mut sum = [0.0; N];
-        for (share, lobe) in self.lobes() {
+        for (Factor { share, .. }, lobe) in self.lobes() {
             let albedo = lobe.albedo(cos);
             sum = std::array::from_fn(|lane| sum[lane] + share * albedo[lane]);
         }
         sum
     }
 
+    /// The cosine between the direction that light leaves in and the shading normal, of whichever side.
+    pub(crate) fn cosine(&self) -> f32 {
+        self.frame.to_local(self.outgoing).z.abs()
+    }
+
     /// The normal of the side from which light can be scattered towards `outgoing`; `None` where it can from both.
     pub fn lit_side(&self) -> Option<Vec3> {
         let is_opaque = |lobe: &Lobe<N>| match lobe {
             Lobe::Diffuse { transmittance, .. } => transmittance.iter().all(|&t| t == 0.0),
-            Lobe::Mirror { .. } | Lobe::Metal { .. } | Lobe::Coated { .. } => true,
-            Lobe::Dielectric { .. } | Lobe::Open => false,
+            Lobe::RoughDiffuse { .. }
+            | Lobe::Mirror { .. }
+            | Lobe::Glossy { .. }
+            | Lobe::Metal { .. }
+            | Lobe::Coated { .. }
+            | Lobe::Layered { .. }
+            | Lobe::Substrate { .. } => true,
+            Lobe::Dielectric { .. } | Lobe::Pane { .. } | Lobe::Open => false,
         };
         let n = self.geometric_normal;
         let towards = if n.dot(self.outgoing) < 0.0 { -n } else { n };
@@ -201,16 +309,56 @@ impl<const N: usize> Lobe<N> {
                 let of = if is_reflection { reflectance } else { transmittance };
                 of.map(|r| r * FRAC_1_PI * i.z.abs())
             }
+            Self::RoughDiffuse { reflectance, constants: [a, b] } if is_reflection => {
+                let (sin_o, sin_i) = (o.truncate().length(), i.truncate().length());
+                // The cosine between the two azimuths.
+                let along = o.truncate().dot(i.truncate()) / (sin_o * sin_i).max(f32::MIN_POSITIVE);
+                let steeper = o.z.abs().max(i.z.abs()).max(1e-6);
+                let shape = a + b * along.max(0.0) * sin_o * sin_i / steeper;
+                reflectance.map(|r| r * shape * FRAC_1_PI * i.z.abs())
+            }
             Self::Mirror { reflectance, rough: Some(ggx) } if is_reflection => {
                 let (common, _) = facet_reflection(ggx, o, i);
                 reflectance.map(|r| r * common)
+            }
+            Self::Glossy { reflectance, index, rough: Some(ggx) } if is_reflection => {
+                let (common, cos) = facet_reflection(ggx, o, i);
+                std::array::from_fn(|lane| reflectance[lane] * common * fresnel::dielectric(cos, index[lane]))
+            }
+            Self::Pane { reflectance, transmittance, rough: Some(ggx) } => {
+                let (of, i) = if is_reflection { (reflectance, i) } else { (transmittance, across(i)) };
+                let (common, _) = facet_reflection(ggx, o, i);
+                of.map(|share| share * common)
+            }
+            Self::Layered { diffuse, mirrored, edge, lost, rough } if is_reflection => {
+                let (common, cos) = match rough {
+                    Some(ggx) => facet_reflection(ggx, o, i),
+                    None => (0.0, half_cosine(o, i)),
+                };
+                let tail = fresnel::schlick_tail(cos);
+                let below = FRAC_1_PI * i.z.abs() * (1.0 - fresnel::between(lost[0], lost[1], tail));
+                std::array::from_fn(|lane| {
+                    diffuse[lane] * below + common * fresnel::between(mirrored[lane], *edge, tail)
+                })
+            }
+            Self::Substrate { diffuse, mirrored, rough } if is_reflection => {
+                let base = substrate_base(o.z.abs(), i.z.abs()) * i.z.abs();
+                let (gloss, tail) = substrate_gloss(rough.as_ref(), o, i);
+                std::array::from_fn(|lane| {
+                    let coat = fresnel::between(mirrored[lane], 1.0, tail);
+                    diffuse[lane] * (1.0 - mirrored[lane]) * base + gloss * coat
+                })
             }
             Self::Metal { n, k, rough: Some(ggx) } if is_reflection => {
                 let (common, cos) = facet_reflection(ggx, o, i);
                 std::array::from_fn(|lane| common * fresnel::conductor(cos, n[lane], k[lane]))
             }
-            Self::Dielectric { index, rough: Some(ggx) } => {
-                index.map(|n| rough_dielectric(ggx, if o.z > 0.0 { n } else { 1.0 / n }, o, i).0)
+            Self::Dielectric { index, reflectance, transmittance, rough: Some(ggx) } => {
+                let tint = if is_reflection { reflectance } else { transmittance };
+                std::array::from_fn(|lane| {
+                    let eta = if o.z > 0.0 { index[lane] } else { 1.0 / index[lane] };
+                    tint[lane] * rough_dielectric(ggx, eta, o, i).0
+                })
             }
             Self::Coated { diffuse, index, inside, rough } if is_reflection => {
                 let (common, cos) = rough.as_ref().map_or((0.0, 1.0), |ggx| facet_reflection(ggx, o, i));
@@ -234,13 +382,28 @@ impl<const N: usize> Lobe<N> {
                 let p = self.diffuse_reflection_probability();
                 (if is_reflection { p } else { 1.0 - p }) * FRAC_1_PI * i.z.abs()
             }
-            Self::Mirror { rough: Some(ggx), .. } | Self::Metal { rough: Some(ggx), .. } if is_reflection => {
+            Self::RoughDiffuse { .. } if is_reflection => FRAC_1_PI * i.z.abs(),
+            Self::Mirror { rough: Some(ggx), .. }
+            | Self::Glossy { rough: Some(ggx), .. }
+            | Self::Metal { rough: Some(ggx), .. }
+                if is_reflection =>
+            {
                 facet_reflection_pdf(ggx, o, i)
             }
-            Self::Dielectric { index, rough: Some(ggx) } => {
+            Self::Pane { rough: Some(ggx), .. } => {
+                let p = self.back_probability();
+                if is_reflection {
+                    p * facet_reflection_pdf(ggx, o, i)
+                } else {
+                    (1.0 - p) * facet_reflection_pdf(ggx, o, across(i))
+                }
+            }
+            Self::Dielectric { index, rough: Some(ggx), .. } => {
                 rough_dielectric(ggx, if o.z > 0.0 { index[0] } else { 1.0 / index[0] }, o, i).1
             }
-            Self::Coated { rough, .. } if is_reflection => {
+            Self::Coated { rough, .. } | Self::Layered { rough, .. } | Self::Substrate { rough, .. }
+                if is_reflection =>
+            {
                 let p = self.coat_probability(o);
                 let coat = rough.as_ref().map_or(0.0, |ggx| facet_reflection_pdf(ggx, o, i));
                 p * coat + (1.0 - p) * FRAC_1_PI * i.z.abs()
@@ -252,9 +415,15 @@ impl<const N: usize> Lobe<N> {
     /// Whether the number means a mirror direction.
     fn is_delta_for(&self, u_lobe: f32, o: Vec3) -> bool {
         match self {
-            Self::Diffuse { .. } => false,
-            Self::Mirror { rough, .. } | Self::Metal { rough, .. } | Self::Dielectric { rough, .. } => rough.is_none(),
-            Self::Coated { rough, .. } => rough.is_none() && u_lobe < self.coat_probability(o),
+            Self::Diffuse { .. } | Self::RoughDiffuse { .. } => false,
+            Self::Mirror { rough, .. }
+            | Self::Glossy { rough, .. }
+            | Self::Metal { rough, .. }
+            | Self::Dielectric { rough, .. }
+            | Self::Pane { rough, .. } => rough.is_none(),
+            Self::Coated { rough, .. } | Self::Layered { rough, .. } | Self::Substrate { rough, .. } => {
+                rough.is_none() && u_lobe < self.coat_probability(o)
+            }
             Self::Open => true,
         }
     }
@@ -275,8 +444,15 @@ impl<const N: usize> Lobe<N> {
             Self::Diffuse { .. } => {
                 Some(diffuse(if u_lobe < self.diffuse_reflection_probability() { side } else { -side }))
             }
-            Self::Mirror { rough, .. } | Self::Metal { rough, .. } => mirrored(rough.as_ref()?),
-            Self::Dielectric { index, rough } => {
+            Self::RoughDiffuse { .. } => Some(diffuse(side)),
+            Self::Mirror { rough, .. } | Self::Glossy { rough, .. } | Self::Metal { rough, .. } => {
+                mirrored(rough.as_ref()?)
+            }
+            Self::Pane { rough, .. } => {
+                let i = mirrored(rough.as_ref()?)?;
+                Some(if u_lobe < self.back_probability() { i } else { across(i) })
+            }
+            Self::Dielectric { index, rough, .. } => {
                 let ggx = rough.as_ref()?;
                 let eta = if o.z > 0.0 { index[0] } else { 1.0 / index[0] };
                 let m = side * ggx.sample_seen(side * o, u);
@@ -287,7 +463,7 @@ impl<const N: usize> Lobe<N> {
                     refract(o, m, eta).filter(|i| i.z * o.z < 0.0)
                 }
             }
-            Self::Coated { rough, .. } => match rough {
+            Self::Coated { rough, .. } | Self::Layered { rough, .. } | Self::Substrate { rough, .. } => match rough {
                 Some(ggx) if u_lobe < self.coat_probability(o) => mirrored(ggx),
                 _ => Some(diffuse(side)),
             },
@@ -302,17 +478,37 @@ impl<const N: usize> Lobe<N> {
         let all = |value| Some(Mirrored { incident: back, value, probability: 1.0, is_dispersed: false });
         match self {
             Self::Mirror { reflectance, .. } => all(*reflectance),
+            Self::Glossy { reflectance, index, .. } => {
+                all(std::array::from_fn(|lane| reflectance[lane] * fresnel::dielectric(cos, index[lane])))
+            }
+            Self::Pane { reflectance, transmittance, .. } => {
+                let p = self.back_probability();
+                let (incident, value, probability) =
+                    if u_lobe < p { (back, *reflectance, p) } else { (-o, *transmittance, 1.0 - p) };
+                Some(Mirrored { incident, value, probability, is_dispersed: false })
+            }
+            Self::Layered { mirrored, edge, .. } => {
+                let tail = fresnel::schlick_tail(cos);
+                let value = mirrored.map(|at_right_angles| fresnel::between(at_right_angles, *edge, tail));
+                Some(Mirrored { incident: back, value, probability: self.coat_probability(o), is_dispersed: false })
+            }
+            Self::Substrate { mirrored, .. } => {
+                let tail = fresnel::schlick_tail(cos);
+                let value = mirrored.map(|at_right_angles| fresnel::between(at_right_angles, 1.0, tail));
+                Some(Mirrored { incident: back, value, probability: self.coat_probability(o), is_dispersed: false })
+            }
             Self::Metal { n, k, .. } => all(std::array::from_fn(|lane| fresnel::conductor(cos, n[lane], k[lane]))),
             Self::Coated { index, .. } => {
                 let value = index.map(|n| fresnel::dielectric(cos, n));
                 let probability = self.coat_probability(o);
                 Some(Mirrored { incident: back, value, probability, is_dispersed: false })
             }
-            Self::Dielectric { index, .. } => {
+            Self::Dielectric { index, reflectance, transmittance, .. } => {
                 let eta = index.map(|n| if o.z > 0.0 { n } else { 1.0 / n });
                 let value = eta.map(|eta| fresnel::dielectric(cos, eta));
                 let probability = value[0];
                 if u_lobe < probability {
+                    let value = std::array::from_fn(|lane| reflectance[lane] * value[lane]);
                     return Some(Mirrored { incident: back, value, probability, is_dispersed: false });
                 }
                 let incident = refract(o, Vec3::Z * o.z.signum(), eta[0])?;
@@ -320,23 +516,48 @@ impl<const N: usize> Lobe<N> {
                 // Radiance over n² is what goes through unchanged.
                 let value = std::array::from_fn(|lane| match is_dispersed && lane > 0 {
                     true => 0.0,
-                    false => (1.0 - value[lane]) / (eta[lane] * eta[lane]),
+                    false => transmittance[lane] * (1.0 - value[lane]) / (eta[lane] * eta[lane]),
                 });
                 Some(Mirrored { incident, value, probability: 1.0 - probability, is_dispersed })
             }
             Self::Open => Some(Mirrored { incident: -o, value: [1.0; N], probability: 1.0, is_dispersed: false }),
-            Self::Diffuse { .. } => None,
+            Self::Diffuse { .. } | Self::RoughDiffuse { .. } => None,
         }
     }
 
+    /// The share of light that is given back in all directions, roughly, for light that leaves at this cosine.
     fn albedo(&self, cos: f32) -> [f32; N] {
+        let (is_outside, cos) = (cos > 0.0, cos.abs());
         match self {
             Self::Diffuse { reflectance, transmittance } => {
                 std::array::from_fn(|lane| reflectance[lane] + transmittance[lane])
             }
-            Self::Mirror { reflectance, .. } => *reflectance,
+            Self::RoughDiffuse { reflectance, .. } | Self::Mirror { reflectance, .. } => *reflectance,
+            Self::Glossy { reflectance, index, .. } => {
+                std::array::from_fn(|lane| reflectance[lane] * fresnel::dielectric(cos, index[lane]))
+            }
             Self::Metal { n, k, .. } => std::array::from_fn(|lane| fresnel::conductor(cos, n[lane], k[lane])),
-            Self::Dielectric { .. } | Self::Open => [1.0; N],
+            Self::Dielectric { index, reflectance, transmittance, .. } => std::array::from_fn(|lane| {
+                let mirrored = fresnel::dielectric(cos, if is_outside { index[lane] } else { 1.0 / index[lane] });
+                fresnel::between(transmittance[lane], reflectance[lane], mirrored)
+            }),
+            Self::Pane { reflectance, transmittance, .. } => {
+                std::array::from_fn(|lane| reflectance[lane] + transmittance[lane])
+            }
+            Self::Layered { diffuse, mirrored, edge, lost, .. } => {
+                let tail = fresnel::schlick_tail(cos);
+                let below = 1.0 - fresnel::between(lost[0], lost[1], tail);
+                std::array::from_fn(|lane| diffuse[lane] * below + fresnel::between(mirrored[lane], *edge, tail))
+            }
+            // The integral of the base over all directions is 1 - (1 - cos o/2)^5 times its reflectance.
+            Self::Substrate { diffuse, mirrored, .. } => {
+                let tail = fresnel::schlick_tail(cos);
+                let base = 1.0 - (1.0 - 0.5 * cos).powi(5);
+                std::array::from_fn(|lane| {
+                    diffuse[lane] * (1.0 - mirrored[lane]) * base + fresnel::between(mirrored[lane], 1.0, tail)
+                })
+            }
+            Self::Open => [1.0; N],
             Self::Coated { diffuse, index, inside, .. } => std::array::from_fn(|lane| {
                 let mirrored = fresnel::dielectric(cos, index[lane]);
                 mirrored
@@ -351,13 +572,64 @@ impl<const N: usize> Lobe<N> {
         if t <= 0.0 { 1.0 } else { r / (r + t) }
     }
 
+    /// The share of draws of a pane that come back.
+    fn back_probability(&self) -> f32 {
+        let Self::Pane { reflectance, transmittance, .. } = self else { return 1.0 };
+        let (r, t): (f32, f32) = (reflectance.iter().sum(), transmittance.iter().sum());
+        if t <= 0.0 { 1.0 } else { r / (r + t) }
+    }
+
     /// The share of draws that go to a coat's mirror rather than to what is below it.
     fn coat_probability(&self, o: Vec3) -> f32 {
-        let Self::Coated { diffuse, index, .. } = self else { return 0.0 };
-        let mirrored = fresnel::dielectric(o.z.abs(), index[0]);
-        let below = (1.0 - mirrored) * diffuse.iter().sum::<f32>() / N as f32;
-        (mirrored / (mirrored + below)).clamp(0.05, 0.95)
+        let (cos, mean) = (o.z.abs(), |values: &[f32; N]| values.iter().sum::<f32>() / N as f32);
+        let (mirrored, below) = match self {
+            Self::Coated { diffuse, index, .. } => {
+                let mirrored = fresnel::dielectric(cos, index[0]);
+                (mirrored, (1.0 - mirrored) * mean(diffuse))
+            }
+            Self::Layered { diffuse, mirrored, edge, lost, .. } => {
+                let tail = fresnel::schlick_tail(cos);
+                let left = 1.0 - fresnel::between(lost[0], lost[1], tail);
+                (fresnel::between(mean(mirrored), *edge, tail), mean(diffuse) * left)
+            }
+            Self::Substrate { diffuse, mirrored, .. } => {
+                let tail = fresnel::schlick_tail(cos);
+                (fresnel::between(mean(mirrored), 1.0, tail), mean(diffuse) * (1.0 - mean(mirrored)))
+            }
+            _ => return 0.0,
+        };
+        match (mirrored > 0.0, below > 0.0) {
+            (true, true) => (mirrored / (mirrored + below)).clamp(0.05, 0.95),
+            (true, false) => 1.0,
+            _ => 0.0,
+        }
     }
+}
+
+/// Returns a direction on the other side of the surface.
+fn across(i: Vec3) -> Vec3 {
+    Vec3::new(i.x, i.y, -i.z)
+}
+
+/// The cosine between either direction and the half between them.
+fn half_cosine(o: Vec3, i: Vec3) -> f32 {
+    (o + i).try_normalize().map_or(1.0, |half| o.dot(half))
+}
+
+/// The base below a coat after Ashikhmin & Shirley (2000), 28/(23 pi) (1 - (1 - cos o/2)^5) (1 - (1 - cos i/2)^5), which
+/// its reflectances multiply.
+fn substrate_base(cos_o: f32, cos_i: f32) -> f32 {
+    let seen = |cos: f32| 1.0 - (1.0 - 0.5 * cos).powi(5);
+    28.0 / 23.0 * FRAC_1_PI * seen(cos_o) * seen(cos_i)
+}
+
+/// The coat after Ashikhmin & Shirley (2000), D cos i / (4 (o.m) max(cos o, cos i)), and the tail of its reflectance on the
+/// small mirrors; 0 for a smooth one.
+fn substrate_gloss(rough: Option<&Ggx>, o: Vec3, i: Vec3) -> (f32, f32) {
+    let (o, i) = upright(o, i);
+    let (Some(ggx), Some(m)) = (rough, (o + i).try_normalize()) else { return (0.0, 0.0) };
+    let cos = o.dot(m);
+    (ggx.density(m) * i.z / (4.0 * cos * o.z.max(i.z)), fresnel::schlick_tail(cos))
 }
 
 /// Returns D G / (4 cos o), the part of a rough mirror's value (cosine of `i` included) that all wavelengths share, and
@@ -429,16 +701,27 @@ mod tests {
         Lobe::Coated { diffuse: [diffuse], index: [1.5], inside, rough }
     }
 
+    fn glass(index: f32, rough: Option<Ggx>) -> Lobe<1> {
+        Lobe::Dielectric { index: [index], reflectance: [1.0], transmittance: [1.0], rough }
+    }
+
     fn lobes() -> Vec<Lobe<1>> {
         let rough = Ggx::new(0.4, 0.25);
         vec![
             Lobe::Diffuse { reflectance: [0.6], transmittance: [0.3] },
             Lobe::Mirror { reflectance: [0.9], rough },
             Lobe::Metal { n: [0.2], k: [3.0], rough },
-            Lobe::Dielectric { index: [1.5], rough },
+            glass(1.5, rough),
             coated(0.7, rough),
             coated(0.7, None),
-            Lobe::Dielectric { index: [1.5], rough: None },
+            Lobe::RoughDiffuse { reflectance: [0.6], constants: [0.8, 0.3] },
+            Lobe::Glossy { reflectance: [0.8], index: [1.5], rough },
+            Lobe::Pane { reflectance: [0.2], transmittance: [0.7], rough },
+            Lobe::Layered { diffuse: [0.5], mirrored: [0.1], edge: 0.9, lost: [0.04, 1.0], rough },
+            Lobe::Layered { diffuse: [0.5], mirrored: [0.1], edge: 0.9, lost: [0.04, 1.0], rough: None },
+            Lobe::Substrate { diffuse: [0.5], mirrored: [0.1], rough },
+            Lobe::Substrate { diffuse: [0.5], mirrored: [0.1], rough: None },
+            glass(1.5, None),
             Lobe::Open,
         ]
     }
@@ -527,7 +810,7 @@ mod tests {
     /// bounds only show that no kind of light is left out.
     #[test]
     fn white_furnace_stays_white() {
-        let glass = |rough| Lobe::Dielectric { index: [1.5], rough };
+        let glass = |rough| glass(1.5, rough);
         let white_metal = |rough| Lobe::Mirror { reflectance: [1.0], rough };
         let (mild, rough) = (Ggx::new(0.2, 0.2), Ggx::new(0.6, 0.6));
         let cases = [
@@ -557,7 +840,7 @@ mod tests {
     fn rough_boundaries_lose_what_is_masked() {
         let (mild, rough) = (Ggx::new(0.2, 0.2), Ggx::new(0.6, 0.6));
         let metal = |rough| Lobe::Mirror { reflectance: [1.0], rough };
-        let glass = |rough| Lobe::Dielectric { index: [1.5], rough };
+        let glass = |rough| glass(1.5, rough);
         for (lobe, cosines, expected) in [
             (metal(mild), [0.95, 0.6, 0.3], [0.9448, 0.9109, 0.8616]),
             (metal(rough), [0.95, 0.6, 0.3], [0.5928, 0.6233, 0.7074]),
@@ -576,7 +859,7 @@ mod tests {
     #[test]
     fn smooth_glass_follows_snell() {
         let o = direction(0.6, 0.0);
-        let bsdf = of(Lobe::Dielectric { index: [1.5], rough: None }, o);
+        let bsdf = of(glass(1.5, None), o);
         let sample = bsdf.sample(0.99, [0.5; 2]).unwrap();
         assert!(sample.is_delta && sample.incident.z < 0.0);
         assert!((sample.incident.x + 0.8 / 1.5).abs() < 1e-6);
@@ -588,7 +871,10 @@ mod tests {
     #[test]
     fn dispersion_keeps_the_first_wavelength() {
         let mut bsdf = Bsdf::new(Frame { x: Vec3::X, y: Vec3::Y, z: Vec3::Z }, Vec3::Z, direction(0.6, 0.0));
-        bsdf.push(1.0, Lobe::Dielectric { index: [1.5, 1.6], rough: None });
+        bsdf.push(
+            1.0,
+            Lobe::Dielectric { index: [1.5, 1.6], reflectance: [1.0; 2], transmittance: [1.0; 2], rough: None },
+        );
         assert!(bsdf.is_dispersive());
         let through = bsdf.sample(0.99, [0.5; 2]).unwrap();
         assert!(through.is_dispersed && through.weight[1] == 0.0 && through.weight[0] > 0.0);

@@ -2,6 +2,8 @@
 
 use glam::DAffine3;
 
+use crate::SkyMapping;
+
 /// A camera that came with a world, for `dioptric-backward` to build.
 ///
 /// In its own frame it looks along +z with x to the right and y up, as pbrt's do (a left-handed frame unless the
@@ -36,6 +38,16 @@ pub enum CameraKind {
     Orthographic {
         /// Part of the plane that is seen, `[x min, x max, y min, y max]`, m.
         screen_window: [f64; 4],
+    },
+    /// All directions from a point: as pbrt has it, y is the axis of a picture by angles and the poles lie above and below.
+    Panorama {
+        /// Which direction is where in the picture.
+        mapping: SkyMapping,
+    },
+    /// A camera that is not supported.
+    Other {
+        /// What the file calls it.
+        kind: String,
     },
     /// A lens of a file, or the ideal lens of the paper's `idealDiffraction` camera.
     Lens {

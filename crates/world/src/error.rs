@@ -27,7 +27,7 @@ pub enum WorldError {
         reason: String,
     },
     /// A file whose name does not determine its kind.
-    #[error("{}: expected a .pbrt, .gltf, .glb, .obj or .ply file", file.display())]
+    #[error("{}: expected a .pbrt, .gltf, .glb, .obj, .ply or .stl file", file.display())]
     UnknownKind {
         /// The file.
         file: PathBuf,

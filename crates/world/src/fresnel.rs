@@ -29,6 +29,16 @@ pub(crate) fn conductor(cos: f32, n: f32, k: f32) -> f32 {
     0.5 * (parallel + across)
 }
 
+/// Returns (1 − cos)⁵, by which Schlick's formula goes from the reflectance at right angles to that at grazing ones.
+pub(crate) fn schlick_tail(cos: f32) -> f32 {
+    (1.0 - cos.clamp(0.0, 1.0)).powi(5)
+}
+
+/// Returns the value so far between two.
+pub(crate) fn between(at_right_angles: f32, at_edge: f32, tail: f32) -> f32 {
+    at_right_angles + (at_edge - at_right_angles) * tail
+}
+
 /// Returns the share of even light from all directions outside that a boundary mirrors: ∫ 2 μ F(μ) dμ.
 pub(crate) fn diffuse_reflectance(eta: f32) -> f32 {
     const N: usize = 200;

@@ -1,6 +1,6 @@
 //! Pictures laid over surfaces.
 
-use std::path::Path;
+use std::{io::Cursor, path::Path, sync::Arc};
 
 use dioptric_spectrum::srgb_decode;
 use glam::Vec2;
@@ -12,6 +12,8 @@ use crate::{WorldError, upsample::SmoothReflectance};
 pub enum Wrap {
     /// The picture again.
     Repeat,
+    /// The picture again, every other time turned about its edge.
+    Mirror,
     /// Its edge, drawn out.
     Clamp,
     /// Nothing: black.
@@ -36,12 +38,22 @@ pub enum Encoding {
 pub struct ImageTexture {
     columns: usize,
     rows: usize,
-    texels: Texels,
-    wrap: Wrap,
+    texels: Arc<Texels>,
+    /// Along u and along v.
+    wraps: [Wrap; 2],
+    /// Whether a point has the color of its sample, with nothing between samples.
+    is_stepped: bool,
 }
 
 #[derive(Clone, Debug, PartialEq)]
-enum Texels {
+struct Texels {
+    rgb: Colors,
+    /// None where all is opaque.
+    alpha: Option<Alpha>,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+enum Colors {
     /// Codes and the light that each stands for.
     Bytes {
         rgb: Vec<[u8; 3]>,
@@ -50,11 +62,17 @@ enum Texels {
     Linear(Vec<[f32; 3]>),
 }
 
+#[derive(Clone, Debug, PartialEq)]
+enum Alpha {
+    Bytes(Vec<u8>),
+    Linear(Vec<f32>),
+}
+
 /// The largest picture that is read, samples.
 const MAX_SAMPLES: u64 = 1 << 28;
 
 /// What a texel takes beside the sample of the file that it is made from, bytes.
-const TEXEL_BYTES: u64 = 12;
+const TEXEL_BYTES: u64 = 16;
 
 impl ImageTexture {
     /// Reads a PNG, JPEG, TGA, TIFF or EXR file; EXR is linear whatever `encoding` is.
@@ -71,28 +89,55 @@ impl ImageTexture {
             return Err(WorldError::LacksFeature { file: path.to_owned(), feature: "jpeg" });
         }
         let picture = dioptric_pictures::read_within(path, TEXEL_BYTES).map_err(|e| unreadable(e.to_string()))?;
+        Self::of_picture(&picture, encoding, wrap).map_err(unreadable)
+    }
+
+    /// Reads a picture that is held within another file, of the kinds that [`read`](Self::read) takes.
+    pub(crate) fn of_bytes(bytes: &[u8], encoding: Encoding, wrap: Wrap) -> Result<Self, String> {
+        let reader = image::ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| e.to_string())?;
+        match reader.format() {
+            None => return Err("expected a PNG, JPEG, TGA, TIFF, WebP or EXR picture".to_owned()),
+            Some(image::ImageFormat::Jpeg) if cfg!(not(feature = "jpeg")) => {
+                return Err("this build cannot read JPEG, expected one with the feature 'jpeg'".to_owned());
+            }
+            Some(_) => {}
+        }
+        let picture = dioptric_pictures::decode_within(bytes, TEXEL_BYTES).map_err(|e| e.to_string())?;
+        Self::of_picture(&picture, encoding, wrap)
+    }
+
+    fn of_picture(picture: &image::DynamicImage, encoding: Encoding, wrap: Wrap) -> Result<Self, String> {
+        use image::DynamicImage as D;
         let (columns, rows) = (picture.width() as usize, picture.height() as usize);
         if columns == 0 || rows == 0 || columns as u64 * rows as u64 > MAX_SAMPLES {
-            return Err(unreadable(format!("{columns} x {rows} samples: expected 1 to 2²⁸")));
+            return Err(format!("{columns} x {rows} samples: expected 1 to 2²⁸"));
         }
-        let texels = match picture {
-            image::DynamicImage::ImageRgb32F(_) | image::DynamicImage::ImageRgba32F(_) => {
+        let has_alpha = picture.color().has_alpha();
+        let (rgb, alpha) = match picture {
+            D::ImageRgb32F(_) | D::ImageRgba32F(_) => {
                 let finite = |v: f32| if v.is_finite() { v.max(0.0) } else { 0.0 };
-                Texels::Linear(picture.to_rgb32f().pixels().map(|p| p.0.map(finite)).collect())
+                let rgb = Colors::Linear(picture.to_rgb32f().pixels().map(|p| p.0.map(finite)).collect());
+                let alpha = || Alpha::Linear(picture.to_rgba32f().pixels().map(|p| finite(p.0[3])).collect());
+                (rgb, has_alpha.then(alpha))
             }
-            image::DynamicImage::ImageLuma16(_)
-            | image::DynamicImage::ImageLumaA16(_)
-            | image::DynamicImage::ImageRgb16(_)
-            | image::DynamicImage::ImageRgba16(_) => {
+            D::ImageLuma16(_) | D::ImageLumaA16(_) | D::ImageRgb16(_) | D::ImageRgba16(_) => {
                 let light = |v: u16| encoding.light(f64::from(v) / 65535.0);
-                Texels::Linear(picture.to_rgb16().pixels().map(|p| p.0.map(light)).collect())
+                let rgb = Colors::Linear(picture.to_rgb16().pixels().map(|p| p.0.map(light)).collect());
+                let alpha =
+                    || Alpha::Linear(picture.to_rgba16().pixels().map(|p| f32::from(p.0[3]) / 65535.0).collect());
+                (rgb, has_alpha.then(alpha))
             }
-            _ => Texels::Bytes {
-                rgb: picture.to_rgb8().pixels().map(|p| p.0).collect(),
-                light: Box::new(std::array::from_fn(|code| encoding.light(code as f64 / 255.0))),
-            },
+            _ => {
+                let rgb = Colors::Bytes {
+                    rgb: picture.to_rgb8().pixels().map(|p| p.0).collect(),
+                    light: Box::new(std::array::from_fn(|code| encoding.light(code as f64 / 255.0))),
+                };
+                let alpha = || Alpha::Bytes(picture.to_rgba8().pixels().map(|p| p.0[3]).collect());
+                (rgb, has_alpha.then(alpha))
+            }
         };
-        Ok(Self { columns, rows, texels, wrap })
+        let texels = Arc::new(Texels { rgb, alpha });
+        Ok(Self { columns, rows, texels, wraps: [wrap; 2], is_stepped: false })
     }
 
     /// Returns a picture of linear sRGB colors, row by row from the top.
@@ -108,7 +153,33 @@ impl ImageTexture {
                 expected: "whole rows of finite colors",
             });
         }
-        Ok(Self { columns, rows: rgb.len() / columns, texels: Texels::Linear(rgb), wrap })
+        let rows = rgb.len() / columns;
+        let texels = Arc::new(Texels { rgb: Colors::Linear(rgb), alpha: None });
+        Ok(Self { columns, rows, texels, wraps: [wrap; 2], is_stepped: false })
+    }
+
+    /// Returns the same picture with these edges along u and v, between its samples or in steps.
+    #[must_use]
+    pub(crate) fn sampled(&self, wraps: [Wrap; 2], is_stepped: bool) -> Self {
+        Self { wraps, is_stepped, ..self.clone() }
+    }
+
+    /// Returns the picture with its light multiplied by a color.
+    pub(crate) fn tinted(&self, by: [f32; 3]) -> Self {
+        let times = |rgb: [f32; 3]| std::array::from_fn(|k| rgb[k] * by[k]);
+        let rgb = match &self.texels.rgb {
+            Colors::Bytes { rgb, light } => {
+                rgb.iter().map(|codes| times(codes.map(|code| light[usize::from(code)]))).collect()
+            }
+            Colors::Linear(rgb) => rgb.iter().map(|rgb| times(*rgb)).collect(),
+        };
+        let texels = Arc::new(Texels { rgb: Colors::Linear(rgb), alpha: self.texels.alpha.clone() });
+        Self { texels, ..self.clone() }
+    }
+
+    /// Whether it says how opaque its samples are.
+    pub fn has_alpha(&self) -> bool {
+        self.texels.alpha.is_some()
     }
 
     /// Columns and rows.
@@ -118,15 +189,42 @@ impl ImageTexture {
 
     /// Returns the linear sRGB color at texture coordinates.
     pub fn rgb_at(&self, uv: Vec2) -> [f32; 3] {
+        self.between(uv, |index| match &self.texels.rgb {
+            Colors::Bytes { rgb, light } => rgb[index].map(|code| light[usize::from(code)]),
+            Colors::Linear(rgb) => rgb[index],
+        })
+    }
+
+    /// Returns how opaque it is at texture coordinates, 0–1; 1 of pictures without alpha.
+    pub fn alpha_at(&self, uv: Vec2) -> f32 {
+        let Some(alpha) = &self.texels.alpha else { return 1.0 };
+        let of = |index: usize| match alpha {
+            Alpha::Bytes(codes) => f32::from(codes[index]) / 255.0,
+            Alpha::Linear(values) => values[index],
+        };
+        self.between(uv, |index| [of(index)])[0]
+    }
+
+    /// Returns the value between samples, which are given by number.
+    fn between<const K: usize>(&self, uv: Vec2, sample: impl Fn(usize) -> [f32; K]) -> [f32; K] {
         if !uv.is_finite() {
-            return [0.0; 3];
+            return [0.0; K];
         }
-        let x = uv.x * self.columns as f32 - 0.5;
-        let y = (1.0 - uv.y) * self.rows as f32 - 0.5;
+        let at = |x: i64, y: i64| self.index(x, y).map_or([0.0; K], &sample);
+        let (x, y) = (uv.x * self.columns as f32, (1.0 - uv.y) * self.rows as f32);
+        if self.is_stepped {
+            return at(x.floor() as i64, y.floor() as i64);
+        }
+        let (x, y) = (x - 0.5, y - 0.5);
         let (x0, y0) = (x.floor(), y.floor());
         let (fx, fy) = (x - x0, y - y0);
-        let at = |dx: i64, dy: i64| self.texel(x0 as i64 + dx, y0 as i64 + dy);
-        let [a, b, c, d] = [at(0, 0), at(1, 0), at(0, 1), at(1, 1)];
+        let (x0, y0) = (x0 as i64, y0 as i64);
+        let [a, b, c, d] = [
+            at(x0, y0),
+            at(x0.saturating_add(1), y0),
+            at(x0, y0.saturating_add(1)),
+            at(x0.saturating_add(1), y0.saturating_add(1)),
+        ];
         std::array::from_fn(|k| (1.0 - fy) * ((1.0 - fx) * a[k] + fx * b[k]) + fy * ((1.0 - fx) * c[k] + fx * d[k]))
     }
 
@@ -134,19 +232,23 @@ impl ImageTexture {
         SmoothReflectance::of_rgb(self.rgb_at(uv))
     }
 
-    fn texel(&self, x: i64, y: i64) -> [f32; 3] {
-        let (columns, rows) = (self.columns as i64, self.rows as i64);
-        let (x, y) = match self.wrap {
-            Wrap::Repeat => (x.rem_euclid(columns), y.rem_euclid(rows)),
-            Wrap::Clamp => (x.clamp(0, columns - 1), y.clamp(0, rows - 1)),
-            Wrap::Black if !(0..columns).contains(&x) || !(0..rows).contains(&y) => return [0.0; 3],
-            Wrap::Black => (x, y),
+    /// Returns the number of the sample at a column and row that may lie beyond the edges; none where it is black there.
+    fn index(&self, x: i64, y: i64) -> Option<usize> {
+        let along = |at: i64, n: usize, wrap: Wrap| {
+            let n = n as i64;
+            Some(match wrap {
+                Wrap::Repeat => at.rem_euclid(n),
+                Wrap::Mirror => {
+                    let at = at.rem_euclid(2 * n);
+                    at.min(2 * n - 1 - at)
+                }
+                Wrap::Clamp => at.clamp(0, n - 1),
+                Wrap::Black if !(0..n).contains(&at) => return None,
+                Wrap::Black => at,
+            })
         };
-        let index = (y * columns + x) as usize;
-        match &self.texels {
-            Texels::Bytes { rgb, light } => rgb[index].map(|code| light[usize::from(code)]),
-            Texels::Linear(rgb) => rgb[index],
-        }
+        let (x, y) = (along(x, self.columns, self.wraps[0])?, along(y, self.rows, self.wraps[1])?);
+        Some(y as usize * self.columns + x as usize)
     }
 }
 

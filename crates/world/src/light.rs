@@ -29,6 +29,8 @@ pub enum Light {
         inner_rad: f64,
         /// Half the angle of the whole cone, rad.
         outer_rad: f64,
+        /// How it falls between the two.
+        fall_off: FallOff,
     },
     /// Parallel light from far away, like the sun's.
     Distant {
@@ -44,6 +46,18 @@ pub enum Light {
     },
     /// The radiance of a picture of all directions.
     SkyImage(SkyImage),
+}
+
+/// How a spot falls to 0 between its two angles, as a function of t, which goes from 0 to 1 with the cosine.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum FallOff {
+    /// 3 t² − 2 t³: pbrt's 4th version.
+    #[default]
+    Smooth,
+    /// t²: glTF.
+    Square,
+    /// t⁴: pbrt's 2nd and 3rd version.
+    Quartic,
 }
 
 /// How much light a lamp gives in all.
@@ -117,7 +131,7 @@ impl Light {
                 let at = position.as_vec3();
                 Some(LightBounds::all_around(at, at, 4.0 * PI * visible_power(intensity)))
             }
-            Self::Spot { position, direction, intensity, inner_rad, outer_rad } => {
+            Self::Spot { position, direction, intensity, inner_rad, outer_rad, .. } => {
                 let (at, inner_rad, outer_rad) = (position.as_vec3(), *inner_rad as f32, *outer_rad as f32);
                 let power = 4.0 * PI * visible_power(intensity);
                 let axis = direction.as_vec3();
@@ -150,10 +164,10 @@ impl Light {
         };
         match self {
             Self::Point { position, intensity } => point(*position, intensity, &|_| 1.0),
-            Self::Spot { position, direction, intensity, inner_rad, outer_rad } => {
+            Self::Spot { position, direction, intensity, inner_rad, outer_rad, fall_off } => {
                 point(*position, intensity, &|to_light| {
                     let cos = -f64::from(to_light.dot(direction.as_vec3()));
-                    smooth_step(outer_rad.cos(), inner_rad.cos(), cos) as f32
+                    fall_off.at(outer_rad.cos(), inner_rad.cos(), cos) as f32
                 })
             }
             Self::Distant { direction, irradiance } => Some(LightSample {
@@ -191,13 +205,19 @@ pub(crate) fn visible_power(curve: &SpectralCurve) -> f32 {
     (0..460).map(|i| curve.at(&[202.5 + 5.0 * i as f32])[0]).sum::<f32>() / 460.0
 }
 
-/// 0 below `low`, 1 above `high`, a cubic of continuous slope between them.
-fn smooth_step(low: f64, high: f64, at: f64) -> f64 {
-    if high <= low {
-        return if at >= high { 1.0 } else { 0.0 };
+impl FallOff {
+    /// 0 below `low`, 1 above `high`.
+    fn at(self, low: f64, high: f64, at: f64) -> f64 {
+        if high <= low {
+            return if at >= high { 1.0 } else { 0.0 };
+        }
+        let t = ((at - low) / (high - low)).clamp(0.0, 1.0);
+        match self {
+            Self::Smooth => t * t * (3.0 - 2.0 * t),
+            Self::Square => t.powi(2),
+            Self::Quartic => t.powi(4),
+        }
     }
-    let t = ((at - low) / (high - low)).clamp(0.0, 1.0);
-    t * t * (3.0 - 2.0 * t)
 }
 
 #[cfg(test)]
@@ -241,6 +261,7 @@ mod tests {
             intensity: SpectralCurve::constant(1.0),
             inner_rad,
             outer_rad,
+            fall_off: FallOff::Smooth,
         };
         let at = |degrees: f32| {
             let (sin, cos) = degrees.to_radians().sin_cos();

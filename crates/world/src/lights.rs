@@ -108,6 +108,7 @@ impl Lights {
         self.lights.len()
     }
 
+    /// Draws light; of a shape that glows, with its number and that of the triangle of a mesh.
     pub(crate) fn sample<const N: usize>(
         &self,
         shapes: &[PlacedShape],
@@ -115,10 +116,11 @@ impl Lights {
         u_light: f32,
         u: [f32; 2],
         wavelengths_nm: &[f32; N],
-    ) -> Option<LightSample<N>> {
+    ) -> Option<(LightSample<N>, Option<(u32, Option<u32>)>)> {
         let Chosen { light: index, triangle, probability, rest } = self.choose(at, u_light, u)?;
         let light = LightId(index as u32);
-        match &self.lights[index] {
+        let mut place = None;
+        let sample = match &self.lights[index] {
             Source::Alone(alone) => alone.sample(at.point, u, wavelengths_nm, probability, light),
             Source::Sky(sky) => {
                 let (direction, pdf) = sky.sample(u)?;
@@ -132,7 +134,9 @@ impl Lights {
                 })
             }
             Source::Area(area) => {
-                let (direction, distance_m, pdf, is_front) = area.sample(shapes, at.point, triangle, rest, u)?;
+                let (direction, distance_m, pdf, is_front, triangle) =
+                    area.sample(shapes, at.point, triangle, rest, u)?;
+                place = Some((area.shape(), triangle));
                 let is_lit = is_front || area.emission().is_two_sided;
                 is_lit.then(|| LightSample {
                     direction,
@@ -143,7 +147,8 @@ impl Lights {
                     light,
                 })
             }
-        }
+        };
+        sample.map(|sample| (sample, place))
     }
 
     /// The density with which `sample` draws this point of a glowing shape.
@@ -349,7 +354,8 @@ mod tests {
                 let v = (v ^ (v >> 15)).wrapping_mul(0x85eb_ca77);
                 ((v ^ (v >> 13)).wrapping_mul(0xc2b2_ae3d) >> 8) as f32 / (1 << 24) as f32
             };
-            let sample = lights.sample(shapes, &at, number(1), [number(2), number(3)], &[550.0]);
+            let sample =
+                lights.sample(shapes, &at, number(1), [number(2), number(3)], &[550.0]).map(|(sample, _)| sample);
             let value = sample.map_or(0.0, |s| f64::from(s.radiance[0] * s.direction.z.max(0.0) / s.pdf));
             sum += value / f64::from(n);
             squares += value * value / f64::from(n);
@@ -445,7 +451,10 @@ mod tests {
             let mut all = vec![infrared.clone()];
             all.extend(vec![white.clone(); n_white]);
             let lights = Lights::new(all, &mut []);
-            let drawn = |i: u32| lights.sample(&[], &Vec3::ZERO.into(), (i as f32 + 0.5) / 4096.0, [0.5; 2], &[850.0]);
+            let drawn = |i: u32| {
+                let sample = lights.sample(&[], &Vec3::ZERO.into(), (i as f32 + 0.5) / 4096.0, [0.5; 2], &[850.0]);
+                sample.map(|(sample, _)| sample)
+            };
             let n_infrared = (0..4096).filter_map(drawn).filter(|sample| sample.light == LightId(0)).count();
             assert!(n_infrared > 0, "{n_white}");
         }

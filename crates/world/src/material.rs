@@ -1,6 +1,6 @@
 //! What surfaces are made of.
 
-use glam::{Vec2, Vec3};
+use glam::Vec3;
 
 use crate::{
     Beyond, Bsdf, Hit, MaterialId, SpectralCurve, TextureId, WorldError,
@@ -8,7 +8,7 @@ use crate::{
     fresnel,
     microfacet::Ggx,
     sampling::Frame,
-    texture::Textures,
+    texture::{TexturePoint, Textures},
 };
 use dioptric_optics::Glass;
 use dioptric_spectrum::Spectrum;
@@ -61,6 +61,80 @@ pub enum Material {
         /// How rough the coat is.
         roughness: Roughness,
     },
+    /// Diffuse and rough on a small scale, like clay: brighter than Lambert's where light goes back to where it came from
+    /// (Oren & Nayar 1994).
+    RoughMatte {
+        /// Reflectance, 0–1.
+        reflectance: TextureId,
+        /// The standard deviation of its slopes, degrees.
+        sigma_deg: TextureId,
+    },
+    /// What a boundary mirrors alone, times a color; light that enters it is lost. A part of a [`Sum`](Self::Sum), as
+    /// pbrt's 3rd version has it.
+    Glossy {
+        /// What the reflectance by Fresnel's equations is multiplied by, 0–1.
+        reflectance: TextureId,
+        /// Index of refraction behind the boundary over that before it.
+        index: SpectralCurve,
+        /// How rough it is.
+        roughness: Roughness,
+    },
+    /// A [`Dielectric`](Self::Dielectric) whose mirrored and refracted light is colored, as no clear medium's is.
+    Glass {
+        /// What the mirrored light is multiplied by, 0–1.
+        reflectance: TextureId,
+        /// What the refracted light is multiplied by, 0–1.
+        transmittance: TextureId,
+        /// Index of refraction.
+        index: SpectralCurve,
+        /// How rough it is.
+        roughness: Roughness,
+    },
+    /// A clear pane so thin that it is one surface: light is mirrored between its sides to all orders and goes on straight.
+    Pane {
+        /// Index of refraction.
+        index: SpectralCurve,
+    },
+    /// A diffuse base below a glossy coat, after Ashikhmin & Shirley (2000), as pbrt's 3rd version has it.
+    Substrate {
+        /// Reflectance of the base, 0–1.
+        base: TextureId,
+        /// Reflectance of the coat at right angles, 0–1; it rises to 1 at grazing ones.
+        coat: TextureId,
+        /// How rough the coat is.
+        roughness: Roughness,
+    },
+    /// The material of glTF 2.0, by the formulas of its appendix B: a metal in the share `metallic`, else a diffuse base
+    /// below a mirroring layer. A base of which the share `transmission` is a thin clear sheet follows
+    /// `KHR_materials_transmission`.
+    MetallicRoughness {
+        /// The color of the base, or the reflectance of the metal at right angles.
+        color: TextureId,
+        /// The share of metal, 0–1.
+        metallic: TextureId,
+        /// The square root of GGX's α, 0–1.
+        roughness: TextureId,
+        /// Reflectance of the layer at right angles: 0.04 unless extensions say otherwise.
+        mirrored: TextureId,
+        /// Reflectance of the layer at grazing angles: 1 unless extensions say otherwise.
+        edge: TextureId,
+        /// The share of the base that lets light through; none for 0.
+        transmission: Option<TextureId>,
+    },
+    /// A material below a clear coat of index 1.5 that takes what it mirrors (`KHR_materials_clearcoat`).
+    Clearcoat {
+        /// What lies below.
+        base: MaterialId,
+        /// The share of the surface that is coated, 0–1.
+        amount: TextureId,
+        /// The square root of GGX's α of the coat, 0–1.
+        roughness: TextureId,
+    },
+    /// The light of two materials together.
+    Sum {
+        /// The two.
+        of: [MaterialId; 2],
+    },
     /// Two materials in a share of the surface each.
     Blend {
         /// The two.
@@ -68,7 +142,7 @@ pub enum Material {
         /// The share of the second, 0–1.
         amount: TextureId,
     },
-    /// Nothing: light passes as if the surface weren't there, but it is a hit to a ray.
+    /// Nothing: rays pass as if the surface weren't there, unless it glows.
     Open,
 }
 
@@ -76,12 +150,22 @@ pub enum Material {
 pub type Roughness = Option<[TextureId; 2]>;
 
 /// Detail of a surface that is too fine for its shape.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Relief {
     /// A texture of heights, m, over the surface.
     Heights(TextureId),
     /// A picture of normals: red, green and blue 0–1 stand for −1 to 1 along u, v and the normal.
     Normals(TextureId),
+    /// The same with the parts along u and v multiplied.
+    ScaledNormals(TextureId, f32),
+}
+
+impl Relief {
+    pub(crate) fn texture(self) -> TextureId {
+        match self {
+            Self::Heights(texture) | Self::Normals(texture) | Self::ScaledNormals(texture, _) => texture,
+        }
+    }
 }
 
 impl SpectralCurve {
@@ -118,7 +202,15 @@ pub(crate) struct Surface {
     pub(crate) material: Material,
     pub(crate) relief: Option<Relief>,
     /// For a coat: the share of even light below it that it mirrors back.
-    inside: Option<SpectralCurve>,
+    pub(crate) inside: Option<SpectralCurve>,
+    /// How much of the surface is there, 0–1; all of it where there is none.
+    pub(crate) coverage: Option<TextureId>,
+    /// What the radiance of shapes that glow is multiplied by.
+    pub(crate) glow: Option<TextureId>,
+    /// What a medium that fills the shape takes from light, 1/m.
+    pub(crate) absorption: Option<SpectralCurve>,
+    /// Whether rays may pass as if the surface weren't there.
+    pub(crate) has_gaps: bool,
 }
 
 impl Surface {
@@ -127,7 +219,8 @@ impl Surface {
             Material::Coated { index, .. } => Some(index.mapped(|n| fresnel::diffuse_reflectance(1.0 / n))),
             _ => None,
         };
-        Self { name, material, relief, inside }
+        let has_gaps = material == Material::Open;
+        Self { name, material, relief, inside, coverage: None, glow: None, absorption: None, has_gaps }
     }
 }
 
@@ -138,11 +231,40 @@ impl Material {
         match self {
             Self::Matte { reflectance } => vec![*reflectance],
             Self::Translucent { reflectance, transmittance } => vec![*reflectance, *transmittance],
-            Self::Mirror { reflectance, roughness } => [vec![*reflectance], rough(roughness)].concat(),
+            Self::RoughMatte { reflectance, sigma_deg } => vec![*reflectance, *sigma_deg],
+            Self::Mirror { reflectance, roughness } | Self::Glossy { reflectance, roughness, .. } => {
+                [vec![*reflectance], rough(roughness)].concat()
+            }
+            Self::Glass { reflectance, transmittance, roughness, .. } => {
+                [vec![*reflectance, *transmittance], rough(roughness)].concat()
+            }
+            Self::Substrate { base, coat, roughness } => [vec![*base, *coat], rough(roughness)].concat(),
+            Self::MetallicRoughness { color, metallic, roughness, mirrored, edge, transmission } => {
+                [*color, *metallic, *roughness, *mirrored, *edge].into_iter().chain(*transmission).collect()
+            }
+            Self::Clearcoat { amount, roughness, .. } => vec![*amount, *roughness],
             Self::Metal { roughness, .. } | Self::Dielectric { roughness, .. } => rough(roughness),
             Self::Coated { base, roughness, .. } => [vec![*base], rough(roughness)].concat(),
             Self::Blend { amount, .. } => vec![*amount],
-            Self::Open => Vec::new(),
+            Self::Open | Self::Pane { .. } | Self::Sum { .. } => Vec::new(),
+        }
+    }
+
+    /// The materials that it is made of.
+    pub(crate) fn parts(&self) -> &[MaterialId] {
+        match self {
+            Self::Blend { of, .. } | Self::Sum { of } => of,
+            Self::Clearcoat { base, .. } => std::slice::from_ref(base),
+            _ => &[],
+        }
+    }
+
+    /// How many kinds of scattering it has besides those of its parts.
+    fn n_own_lobes(&self) -> usize {
+        match self {
+            Self::Blend { .. } | Self::Sum { .. } => 0,
+            Self::MetallicRoughness { transmission: Some(_), .. } => 2,
+            _ => 1,
         }
     }
 }
@@ -157,28 +279,63 @@ pub(crate) struct Surfaces<'a> {
 impl Surfaces<'_> {
     /// Returns the scattering function at a hit.
     pub(crate) fn bsdf<const N: usize>(self, hit: &Hit, outgoing: Vec3, wavelengths_nm: &[f32; N]) -> Bsdf<N> {
+        let at = TexturePoint::from(hit);
         let frame = self.frame(hit);
         let mut bsdf = Bsdf::new(frame, hit.geometric_normal, outgoing);
-        self.add_lobes(&mut bsdf, hit.material, hit.uv, 1.0, wavelengths_nm);
+        self.add_lobes(&mut bsdf, hit.material, &at, (1.0, false), wavelengths_nm);
+        // Where a part of a mixture is open, the hit is one of the rest.
+        let surface = &self.surfaces[hit.material.0 as usize];
+        if surface.has_gaps && surface.material != Material::Open {
+            let share = self.share_of_parts(&surface.material, &at);
+            if share > 0.0 {
+                bsdf.divide(share);
+            }
+        }
         bsdf
     }
 
+    /// Returns how much of the surface of a material is there, 0–1.
+    pub(crate) fn coverage(self, material: MaterialId, at: &TexturePoint) -> f32 {
+        let surface = &self.surfaces[material.0 as usize];
+        let own = surface.coverage.map_or(1.0, |coverage| self.textures.number(coverage, at).clamp(0.0, 1.0));
+        if own > 0.0 { own * self.share_of_parts(&surface.material, at) } else { 0.0 }
+    }
+
+    fn share_of_parts(self, material: &Material, at: &TexturePoint) -> f32 {
+        match material {
+            Material::Open => 0.0,
+            Material::Blend { of: [a, b], amount } => {
+                let amount = self.textures.number(*amount, at).clamp(0.0, 1.0);
+                (1.0 - amount) * self.coverage(*a, at) + amount * self.coverage(*b, at)
+            }
+            _ => 1.0,
+        }
+    }
+
+    /// Adds what a material scatters in a share of the surface; as one term of a sum where that is said.
     fn add_lobes<const N: usize>(
         self,
         bsdf: &mut Bsdf<N>,
         material: MaterialId,
-        uv: Vec2,
-        share: f32,
+        at: &TexturePoint,
+        (share, is_term): (f32, bool),
         wavelengths_nm: &[f32; N],
     ) {
         let surface = &self.surfaces[material.0 as usize];
         let share_of =
-            |texture: TextureId| self.textures.spectral(texture, uv, wavelengths_nm).map(|v| v.clamp(0.0, 1.0));
+            |texture: TextureId| self.textures.spectral(texture, at, wavelengths_nm).map(|v| v.clamp(0.0, 1.0));
+        let number = |texture: TextureId| self.textures.number(texture, at).clamp(0.0, 1.0);
         let rough = |roughness: &Roughness| {
             roughness.and_then(|alphas| {
-                let [x, y] = alphas.map(|alpha| self.textures.number(alpha, uv));
+                let [x, y] = alphas.map(|alpha| self.textures.number(alpha, at));
                 Ggx::new(x, y)
             })
+        };
+        let part = |bsdf: &mut Bsdf<N>, part: MaterialId, share: f32, is_term: bool| {
+            if share > 0.0 {
+                let own = self.surfaces[part.0 as usize].coverage.map_or(1.0, number);
+                self.add_lobes(bsdf, part, at, (share * own, is_term), wavelengths_nm);
+            }
         };
         let lobe = match &surface.material {
             Material::Matte { reflectance } => {
@@ -204,8 +361,77 @@ impl Surfaces<'_> {
                 if index.iter().all(|n| *n == 1.0) {
                     Lobe::Open
                 } else {
-                    Lobe::Dielectric { index, rough: rough(roughness) }
+                    Lobe::Dielectric { index, reflectance: [1.0; N], transmittance: [1.0; N], rough: rough(roughness) }
                 }
+            }
+            Material::Glass { reflectance, transmittance, index, roughness } => {
+                let (index, transmittance) = (index.at(wavelengths_nm), share_of(*transmittance));
+                if index.iter().all(|n| *n == 1.0) {
+                    Lobe::Pane { reflectance: [0.0; N], transmittance, rough: None }
+                } else {
+                    let reflectance = share_of(*reflectance);
+                    Lobe::Dielectric { index, reflectance, transmittance, rough: rough(roughness) }
+                }
+            }
+            Material::Pane { index } => {
+                let index = index.at(wavelengths_nm);
+                let cos = bsdf.cosine();
+                // R + T² R + T² R³ + … of its two sides.
+                let reflectance = index.map(|n| {
+                    let once = fresnel::dielectric(cos, n);
+                    2.0 * once / (1.0 + once)
+                });
+                Lobe::Pane { reflectance, transmittance: reflectance.map(|r| 1.0 - r), rough: None }
+            }
+            Material::RoughMatte { reflectance, sigma_deg } => {
+                let variance = self.textures.number(*sigma_deg, at).to_radians().powi(2);
+                let constants = [1.0 - variance / (2.0 * (variance + 0.33)), 0.45 * variance / (variance + 0.09)];
+                Lobe::RoughDiffuse { reflectance: share_of(*reflectance), constants }
+            }
+            Material::Glossy { reflectance, index, roughness } => Lobe::Glossy {
+                reflectance: share_of(*reflectance),
+                index: index.at(wavelengths_nm),
+                rough: rough(roughness),
+            },
+            Material::Substrate { base, coat, roughness } => {
+                Lobe::Substrate { diffuse: share_of(*base), mirrored: share_of(*coat), rough: rough(roughness) }
+            }
+            Material::MetallicRoughness { color, metallic, roughness, mirrored, edge, transmission } => {
+                let (color, metallic, alpha) = (share_of(*color), number(*metallic), number(*roughness).powi(2));
+                let (mirrored, edge) = (share_of(*mirrored), number(*edge));
+                let through = transmission.map_or(0.0, number);
+                let rough = Ggx::new(alpha, alpha);
+                let lost = [mirrored.iter().copied().fold(0.0, f32::max), edge];
+                let base = (1.0 - metallic) * (1.0 - through);
+                let layered = Lobe::Layered {
+                    diffuse: color.map(|c| c * base),
+                    mirrored: std::array::from_fn(|lane| mirrored[lane] + metallic * (color[lane] - mirrored[lane])),
+                    edge: edge + metallic * (1.0 - edge),
+                    lost,
+                    rough,
+                };
+                if through <= 0.0 || metallic >= 1.0 {
+                    layered
+                } else {
+                    let tail = fresnel::schlick_tail(bsdf.cosine());
+                    let left = (1.0 - metallic) * through * (1.0 - fresnel::between(lost[0], lost[1], tail));
+                    bsdf.push_term(share, layered);
+                    let pane = Lobe::Pane { reflectance: [0.0; N], transmittance: color.map(|c| c * left), rough };
+                    bsdf.push_term(share, pane);
+                    return;
+                }
+            }
+            Material::Clearcoat { base, amount, roughness } => {
+                let mirrored = number(*amount) * fresnel::between(0.04, 1.0, fresnel::schlick_tail(bsdf.cosine()));
+                let alpha = number(*roughness).powi(2);
+                let coat = Lobe::Mirror { reflectance: [1.0; N], rough: Ggx::new(alpha, alpha) };
+                bsdf.push(share * mirrored, coat);
+                part(bsdf, *base, share * (1.0 - mirrored), is_term);
+                return;
+            }
+            Material::Sum { of } => {
+                of.iter().for_each(|of| part(bsdf, *of, share, true));
+                return;
             }
             Material::Coated { base, index, roughness } => Lobe::Coated {
                 diffuse: share_of(*base),
@@ -214,14 +440,19 @@ impl Surfaces<'_> {
                 rough: rough(roughness),
             },
             Material::Blend { of: [a, b], amount } => {
-                let amount = self.textures.number(*amount, uv).clamp(0.0, 1.0);
-                self.add_lobes(bsdf, *a, uv, share * (1.0 - amount), wavelengths_nm);
-                self.add_lobes(bsdf, *b, uv, share * amount, wavelengths_nm);
+                let amount = number(*amount);
+                part(bsdf, *a, share * (1.0 - amount), is_term);
+                part(bsdf, *b, share * amount, is_term);
                 return;
             }
+            // Of a mixture, which rays pass without a hit, it is no part.
+            Material::Open if share < 1.0 => return,
             Material::Open => Lobe::Open,
         };
-        bsdf.push(share, lobe);
+        match is_term {
+            true => bsdf.push_term(share, lobe),
+            false => bsdf.push(share, lobe),
+        }
     }
 
     /// Returns the shading frame at a hit, with relief: x runs along u.
@@ -232,7 +463,9 @@ impl Surfaces<'_> {
             Some(Relief::Heights(heights)) => {
                 // Tilt the tangents by the slope of the heights (Blinn 1978).
                 const STEP: f32 = 1e-3;
-                let at = |du: f32, dv: f32| self.textures.number(heights, hit.uv + Vec2::new(du, dv));
+                let here = TexturePoint::from(hit);
+                let tangents = [hit.dp_du, hit.dp_dv];
+                let at = |du: f32, dv: f32| self.textures.number(heights, &here.beside((du, dv), tangents));
                 let slope_u = (at(0.5 * STEP, 0.0) - at(-0.5 * STEP, 0.0)) / STEP;
                 let slope_v = (at(0.0, 0.5 * STEP) - at(0.0, -0.5 * STEP)) / STEP;
                 let n = hit.shading_normal;
@@ -242,32 +475,43 @@ impl Surfaces<'_> {
                 let normal = if normal.dot(n) < 0.0 { -normal } else { normal };
                 Frame::about_with(normal, hit.dp_du)
             }
-            Some(Relief::Normals(normals)) => {
-                let n = Vec3::from_array(self.textures.rgb(normals, hit.uv).map(|v| 2.0 * v - 1.0));
-                let y = plain.y * plain.y.dot(hit.dp_dv).signum();
-                let normal = (plain.x * n.x + y * n.y + plain.z * n.z.max(1e-3)).normalize_or(plain.z);
-                Frame::about_with(normal, hit.dp_du)
-            }
+            Some(Relief::Normals(normals)) => self.with_normals(hit, plain, (normals, 1.0)),
+            Some(Relief::ScaledNormals(normals, scale)) => self.with_normals(hit, plain, (normals, scale)),
         }
     }
 
-    /// How many kinds of scattering a material has, or how deep its mixtures go, whichever is the larger.
-    pub(crate) fn check_blends(surfaces: &[Surface]) -> Result<(), WorldError> {
-        let mut n_lobes = vec![1_usize; surfaces.len()];
-        for (index, surface) in surfaces.iter().enumerate() {
-            let Material::Blend { of, .. } = &surface.material else { continue };
-            if let Some(later) = of.iter().find(|part| part.0 as usize >= index) {
+    /// Returns the shading frame by a picture of normals, those along u and v multiplied.
+    fn with_normals(self, hit: &Hit, plain: Frame, (normals, scale): (TextureId, f32)) -> Frame {
+        let n = Vec3::from_array(self.textures.rgb(normals, &TexturePoint::from(hit)).map(|v| 2.0 * v - 1.0));
+        let n = n * Vec3::new(scale, scale, 1.0);
+        let y = plain.y * plain.y.dot(hit.dp_dv).signum();
+        let normal = (plain.x * n.x + y * n.y + plain.z * n.z.max(1e-3)).normalize_or(plain.z);
+        Frame::about_with(normal, hit.dp_du)
+    }
+
+    /// Checks that materials are made of earlier ones and have few enough kinds of scattering, and finds those with gaps.
+    pub(crate) fn check_parts(surfaces: &mut [Surface]) -> Result<(), WorldError> {
+        let mut n_lobes = vec![0_usize; surfaces.len()];
+        for index in 0..surfaces.len() {
+            let (earlier, rest) = surfaces.split_at_mut(index);
+            let Some(surface) = rest.first_mut() else { break };
+            let parts = surface.material.parts();
+            if let Some(later) = parts.iter().find(|part| part.0 as usize >= index) {
                 return Err(WorldError::Dangling {
-                    what: "a blend of materials",
+                    what: "a material made of others",
                     target: "material",
                     index: later.0 as usize,
                     n: index,
                 });
             }
-            n_lobes[index] = of.iter().map(|part| n_lobes[part.0 as usize]).sum();
+            n_lobes[index] =
+                surface.material.n_own_lobes() + parts.iter().map(|part| n_lobes[part.0 as usize]).sum::<usize>();
+            surface.has_gaps |= surface.coverage.is_some()
+                || matches!(surface.material, Material::Blend { .. })
+                    && parts.iter().any(|part| earlier[part.0 as usize].has_gaps);
             if n_lobes[index] > MAX_LOBES {
                 return Err(WorldError::TooMany {
-                    what: "materials in a blend",
+                    what: "kinds of scattering in a material",
                     n: n_lobes[index] as u64,
                     limit: MAX_LOBES as u64,
                 });

@@ -13,6 +13,10 @@ pub struct TriangleMesh {
     pub normals: Vec<Vec3>,
     /// Texture coordinates a vertex, or none.
     pub uvs: Vec<Vec2>,
+    /// Second texture coordinates a vertex, or none.
+    pub second_uvs: Vec<Vec2>,
+    /// Linear sRGB and alpha a vertex, or none.
+    pub colors: Vec<[f32; 4]>,
     /// Three vertices a triangle, counterclockwise as seen from outside.
     pub triangles: Vec<[u32; 3]>,
 }
@@ -24,9 +28,9 @@ impl TriangleMesh {
     pub fn quad(corner: Vec3, along_u: Vec3, along_v: Vec3) -> Self {
         Self {
             positions: vec![corner, corner + along_u, corner + along_u + along_v, corner + along_v],
-            normals: Vec::new(),
             uvs: vec![Vec2::ZERO, Vec2::X, Vec2::ONE, Vec2::Y],
             triangles: vec![[0, 1, 2], [0, 2, 3]],
+            ..Self::default()
         }
     }
 
@@ -55,7 +59,12 @@ impl TriangleMesh {
         if u32::try_from(n_vertices).is_err() || u32::try_from(self.triangles.len()).is_err() {
             return Err(WorldError::mesh(format!("{n_vertices} vertices: expected fewer than 2³²")));
         }
-        for (what, n) in [("normals", self.normals.len()), ("texture coordinates", self.uvs.len())] {
+        for (what, n) in [
+            ("normals", self.normals.len()),
+            ("texture coordinates", self.uvs.len()),
+            ("second texture coordinates", self.second_uvs.len()),
+            ("colors", self.colors.len()),
+        ] {
             if n != 0 && n != n_vertices {
                 return Err(WorldError::mesh(format!("{n} {what} for {n_vertices} vertices: expected one a vertex")));
             }

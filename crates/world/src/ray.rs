@@ -37,6 +37,10 @@ pub struct Hit {
     pub dp_dv: Vec3,
     /// Texture coordinates.
     pub uv: Vec2,
+    /// The second texture coordinates of the vertices, or (0, 0).
+    pub second_uv: Vec2,
+    /// Linear sRGB and alpha of the vertices, or white.
+    pub color: [f32; 4],
     /// Which shape.
     pub shape: ShapeId,
     /// Which triangle of a mesh; 0 for shapes that have no parts.

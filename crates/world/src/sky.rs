@@ -61,6 +61,20 @@ pub enum SkyMapping {
     EqualArea,
 }
 
+impl SkyMapping {
+    /// Returns the direction, of length 1, that lies at a place of the picture: 0 to 1 to the right, and down.
+    pub fn direction_at(self, [s, t]: [f64; 2]) -> Vec3 {
+        match self {
+            Self::LatLong => {
+                let (sin, cos) = (std::f64::consts::PI * t).sin_cos();
+                let (y, x) = (std::f64::consts::TAU * s).sin_cos();
+                glam::DVec3::new(sin * x, sin * y, cos).as_vec3()
+            }
+            Self::EqualArea => sphere_of_square(glam::DVec2::new(s, t).as_vec2()),
+        }
+    }
+}
+
 /// A picture of the sky with the shares that its parts have of the light.
 #[derive(Clone, Debug)]
 pub(crate) struct SampledSky {

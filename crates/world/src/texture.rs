@@ -2,9 +2,10 @@
 
 use std::sync::Arc;
 
-use glam::{Mat2, Vec2};
+use glam::{Affine3A, Mat2, Vec2, Vec3};
+use std::f32::consts::{FRAC_1_PI, PI, TAU};
 
-use crate::{ImageTexture, SpectralCurve, TextureId};
+use crate::{Hit, ImageTexture, Pattern, SpectralCurve, TextureId, pattern::Found, upsample::SmoothReflectance};
 
 /// A value over a surface: a spectrum where a color is asked for, a number where a number is.
 ///
@@ -29,6 +30,39 @@ pub enum Texture {
         /// Which point of the board is where.
         mapping: UvMapping,
     },
+    /// One channel of a picture, as a number: `scale · channel + offset`.
+    Channel {
+        /// The picture.
+        image: Arc<ImageTexture>,
+        /// 0 red, 1 green, 2 blue, 3 alpha, which is 1 in pictures without it.
+        channel: usize,
+        /// Which point of the picture is where.
+        mapping: UvMapping,
+        /// What its values are multiplied by.
+        scale: f32,
+        /// What is added to them.
+        offset: f32,
+    },
+    /// The linear sRGB colors of the vertices as reflectances; white where a mesh has none.
+    VertexColors,
+    /// The alpha of the vertices; 1 where a mesh has none.
+    VertexAlpha,
+    /// 1 where a number is at least so large, else 0.
+    Step {
+        /// The number.
+        of: TextureId,
+        /// The least that counts.
+        at_least: f32,
+    },
+    /// GGX's α of a roughness from 0 to 1, by the law of a version of pbrt.
+    Alpha {
+        /// The roughness.
+        roughness: TextureId,
+        /// Which law.
+        by: RoughnessLaw,
+    },
+    /// A pattern by formula.
+    Pattern(Box<Pattern>),
     /// One texture times another.
     Product([TextureId; 2]),
     /// Two textures mixed.
@@ -40,26 +74,114 @@ pub enum Texture {
     },
 }
 
-/// Texture coordinates as a function of those of the surface: `matrix · uv + offset`.
+/// How a roughness from 0 to 1 becomes GGX's α.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RoughnessLaw {
+    /// α = √roughness: pbrt's 4th version.
+    Root,
+    /// The polynomial of log roughness of pbrt's 3rd version.
+    LogPolynomial,
+    /// The width of Blinn's lobe of exponent 1/roughness, which pbrt's 2nd version has: α² = 2/(1/roughness + 2).
+    Blinn,
+}
+
+impl RoughnessLaw {
+    /// Returns α.
+    pub fn alpha(self, roughness: f32) -> f32 {
+        let roughness = roughness.max(0.0);
+        let alpha = match self {
+            Self::Root => roughness.sqrt(),
+            Self::LogPolynomial => {
+                let x = roughness.max(1e-3).ln();
+                1.62142 + x * (0.819_955 + x * (0.1734 + x * (0.017_120_1 + x * 0.000_640_711)))
+            }
+            Self::Blinn => (2.0 / (1.0 / roughness.max(1e-6) + 2.0)).sqrt(),
+        };
+        alpha.clamp(0.0, 1.0)
+    }
+}
+
+/// Texture coordinates as a function of a point of the surface: `matrix · uv + offset`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UvMapping {
     /// Turns and scales.
     pub matrix: Mat2,
     /// Moves.
     pub offset: Vec2,
+    /// Where u and v come from.
+    pub from: Coordinates,
+}
+
+/// Where the two coordinates of a texture come from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Coordinates {
+    /// Those of the surface.
+    First,
+    /// The second ones of its vertices; (0, 0) where a mesh has none.
+    Second,
+    /// The polar angle over π and the azimuth over 2 π about the z axis of a frame, which this leads to from the world.
+    Sphere(Affine3A),
+    /// The azimuth about the z axis of a frame over 2 π, from −x, and the height along it.
+    Cylinder(Affine3A),
+    /// The x and y of a frame.
+    Plane(Affine3A),
 }
 
 impl UvMapping {
     /// The coordinates of the surface.
-    pub const IDENTITY: Self = Self { matrix: Mat2::IDENTITY, offset: Vec2::ZERO };
+    pub const IDENTITY: Self = Self { matrix: Mat2::IDENTITY, offset: Vec2::ZERO, from: Coordinates::First };
 
     /// Returns the mapping that scales each coordinate and then moves it.
     pub fn scaled(scale: Vec2, offset: Vec2) -> Self {
-        Self { matrix: Mat2::from_diagonal(scale), offset }
+        Self { matrix: Mat2::from_diagonal(scale), offset, ..Self::IDENTITY }
     }
 
-    fn at(&self, uv: Vec2) -> Vec2 {
+    pub(crate) fn at(&self, at: &TexturePoint) -> Vec2 {
+        let uv = match &self.from {
+            Coordinates::First => at.uv,
+            Coordinates::Second => at.second_uv,
+            Coordinates::Sphere(frame) => {
+                let d = frame.transform_point3(at.point).normalize_or(Vec3::Z);
+                Vec2::new(d.z.clamp(-1.0, 1.0).acos() * FRAC_1_PI, azimuth(d) / TAU)
+            }
+            Coordinates::Cylinder(frame) => {
+                let p = frame.transform_point3(at.point);
+                Vec2::new((PI + p.y.atan2(p.x)) / TAU, p.z)
+            }
+            Coordinates::Plane(frame) => frame.transform_point3(at.point).truncate(),
+        };
         self.matrix * uv + self.offset
+    }
+}
+
+/// The angle about the z axis from +x, 0 to 2 π.
+fn azimuth(d: Vec3) -> f32 {
+    let angle = d.y.atan2(d.x);
+    if angle < 0.0 { angle + TAU } else { angle }
+}
+
+/// What textures can depend on.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct TexturePoint {
+    pub(crate) uv: Vec2,
+    pub(crate) second_uv: Vec2,
+    /// Linear sRGB and alpha of the vertices.
+    pub(crate) color: [f32; 4],
+    /// In the world, m.
+    pub(crate) point: Vec3,
+}
+
+impl TexturePoint {
+    /// Returns a point beside this one, so far along both coordinates.
+    pub(crate) fn beside(&self, (du, dv): (f32, f32), [dp_du, dp_dv]: [Vec3; 2]) -> Self {
+        let by = Vec2::new(du, dv);
+        Self { uv: self.uv + by, second_uv: self.second_uv + by, point: self.point + du * dp_du + dv * dp_dv, ..*self }
+    }
+}
+
+impl From<&Hit> for TexturePoint {
+    fn from(hit: &Hit) -> Self {
+        Self { uv: hit.uv, second_uv: hit.second_uv, color: hit.color, point: hit.point }
     }
 }
 
@@ -68,13 +190,16 @@ pub(crate) const MAX_DEPTH: usize = 32;
 
 impl Texture {
     /// The textures that this one is made of.
-    pub(crate) fn parts(&self) -> impl Iterator<Item = TextureId> {
-        let parts: [Option<TextureId>; 3] = match self {
-            Self::Curve(_) | Self::Image { .. } => [None; 3],
-            Self::Checkerboard { fields: [a, b], .. } | Self::Product([a, b]) => [Some(*a), Some(*b), None],
-            Self::Blend { of: [a, b], amount } => [Some(*a), Some(*b), Some(*amount)],
-        };
-        parts.into_iter().flatten()
+    pub(crate) fn parts(&self) -> Vec<TextureId> {
+        match self {
+            Self::Curve(_) | Self::Image { .. } | Self::Channel { .. } | Self::VertexColors | Self::VertexAlpha => {
+                Vec::new()
+            }
+            Self::Pattern(pattern) => pattern.parts(),
+            Self::Step { of, .. } | Self::Alpha { roughness: of, .. } => vec![*of],
+            Self::Checkerboard { fields: of, .. } | Self::Product(of) => of.to_vec(),
+            Self::Blend { of: [a, b], amount } => vec![*a, *b, *amount],
+        }
     }
 }
 
@@ -84,46 +209,86 @@ pub(crate) struct Textures<'a>(pub(crate) &'a [Texture]);
 
 impl Textures<'_> {
     /// Returns the spectrum at a point; not held to any range.
-    pub(crate) fn spectral<const N: usize>(self, id: TextureId, uv: Vec2, wavelengths_nm: &[f32; N]) -> [f32; N] {
+    pub(crate) fn spectral<const N: usize>(
+        self,
+        id: TextureId,
+        at: &TexturePoint,
+        wavelengths_nm: &[f32; N],
+    ) -> [f32; N] {
         match &self.0[id.0 as usize] {
             Texture::Curve(curve) => curve.at(wavelengths_nm),
             Texture::Image { image, mapping, scale } => {
-                image.reflectance_at(mapping.at(uv)).at(wavelengths_nm).map(|v| v * scale)
+                image.reflectance_at(mapping.at(at)).at(wavelengths_nm).map(|v| v * scale)
             }
             Texture::Checkerboard { fields, mapping } => {
-                self.spectral(fields[field(mapping.at(uv))], uv, wavelengths_nm)
+                self.spectral(fields[field(mapping.at(at))], at, wavelengths_nm)
+            }
+            Texture::Channel { .. } | Texture::VertexAlpha | Texture::Step { .. } | Texture::Alpha { .. } => {
+                [self.number(id, at); N]
+            }
+            Texture::Pattern(pattern) => match pattern.at(at) {
+                Found::Number(value) => [value; N],
+                Found::Color(rgb) => SmoothReflectance::of_rgb(rgb).at(wavelengths_nm),
+                Found::Texture(of) => self.spectral(of, at, wavelengths_nm),
+                Found::Mixture(parts) => {
+                    let mut sum = [0.0; N];
+                    for (part, counts) in parts {
+                        let value = self.spectral(part, at, wavelengths_nm);
+                        sum = std::array::from_fn(|i| sum[i] + counts * value[i]);
+                    }
+                    sum
+                }
+            },
+            Texture::VertexColors => {
+                let [r, g, b, _] = at.color;
+                SmoothReflectance::of_rgb([r, g, b]).at(wavelengths_nm)
             }
             Texture::Product([a, b]) => {
-                let [a, b] = [*a, *b].map(|t| self.spectral(t, uv, wavelengths_nm));
+                let [a, b] = [*a, *b].map(|t| self.spectral(t, at, wavelengths_nm));
                 std::array::from_fn(|i| a[i] * b[i])
             }
             Texture::Blend { of: [a, b], amount } => {
-                let [a, b] = [*a, *b].map(|t| self.spectral(t, uv, wavelengths_nm));
-                let amount = self.number(*amount, uv).clamp(0.0, 1.0);
+                let [a, b] = [*a, *b].map(|t| self.spectral(t, at, wavelengths_nm));
+                let amount = self.number(*amount, at).clamp(0.0, 1.0);
                 std::array::from_fn(|i| a[i] + amount * (b[i] - a[i]))
             }
         }
     }
 
     /// Returns the number at a point.
-    pub(crate) fn number(self, id: TextureId, uv: Vec2) -> f32 {
+    pub(crate) fn number(self, id: TextureId, at: &TexturePoint) -> f32 {
         match &self.0[id.0 as usize] {
             Texture::Curve(curve) => curve.mean_visible(),
-            Texture::Image { image, mapping, scale } => scale * image.rgb_at(mapping.at(uv)).iter().sum::<f32>() / 3.0,
-            Texture::Checkerboard { fields, mapping } => self.number(fields[field(mapping.at(uv))], uv),
-            Texture::Product([a, b]) => self.number(*a, uv) * self.number(*b, uv),
+            Texture::Image { image, mapping, scale } => scale * image.rgb_at(mapping.at(at)).iter().sum::<f32>() / 3.0,
+            Texture::Checkerboard { fields, mapping } => self.number(fields[field(mapping.at(at))], at),
+            Texture::Channel { image, channel, mapping, scale, offset } => {
+                let at = mapping.at(at);
+                let value = if *channel < 3 { image.rgb_at(at)[*channel] } else { image.alpha_at(at) };
+                scale * value + offset
+            }
+            Texture::VertexColors => at.color[..3].iter().sum::<f32>() / 3.0,
+            Texture::VertexAlpha => at.color[3],
+            Texture::Alpha { roughness, by } => by.alpha(self.number(*roughness, at)),
+            Texture::Pattern(pattern) => match pattern.at(at) {
+                Found::Number(value) => value,
+                Found::Color(rgb) => rgb.iter().sum::<f32>() / 3.0,
+                Found::Texture(of) => self.number(of, at),
+                Found::Mixture(parts) => parts.iter().map(|(part, counts)| counts * self.number(*part, at)).sum(),
+            },
+            Texture::Step { of, at_least } => f32::from(self.number(*of, at) >= *at_least),
+            Texture::Product([a, b]) => self.number(*a, at) * self.number(*b, at),
             Texture::Blend { of: [a, b], amount } => {
-                let [a, b] = [*a, *b].map(|t| self.number(t, uv));
-                a + self.number(*amount, uv).clamp(0.0, 1.0) * (b - a)
+                let [a, b] = [*a, *b].map(|t| self.number(t, at));
+                a + self.number(*amount, at).clamp(0.0, 1.0) * (b - a)
             }
         }
     }
 
     /// Returns the linear sRGB color at a point of a picture, or of the pictures a texture is made of, for normal maps.
-    pub(crate) fn rgb(self, id: TextureId, uv: Vec2) -> [f32; 3] {
+    pub(crate) fn rgb(self, id: TextureId, at: &TexturePoint) -> [f32; 3] {
         match &self.0[id.0 as usize] {
-            Texture::Image { image, mapping, .. } => image.rgb_at(mapping.at(uv)),
-            _ => [self.number(id, uv); 3],
+            Texture::Image { image, mapping, .. } => image.rgb_at(mapping.at(at)),
+            _ => [self.number(id, at); 3],
         }
     }
 }

@@ -1,17 +1,20 @@
 //! Worlds: what there is, checked once and then only looked at.
 
+use std::path::{Path, PathBuf};
+
 use glam::{DAffine3, DVec3, Vec2, Vec3};
 
 use crate::{
     Bsdf, Emission, GroupId, Hit, InstanceId, Light, LightSample, Material, MaterialId, Ray, Receiver, Relief, Shape,
-    ShapeId, Texture, TextureId, TriangleMesh, WorldCamera, WorldError,
+    ShapeId, SpectralCurve, Texture, TextureId, TriangleMesh, WorldCamera, WorldError,
     group::{Crossing, Group, GroupParts, Instance, Parts, Primitive},
     lights::Lights,
     material::{Surface, Surfaces},
     mesh::normal_matrix,
+    notes::Notes,
     placed::{PlacedKind, PlacedShape},
     shape::Quadric,
-    texture::{MAX_DEPTH, Textures},
+    texture::{MAX_DEPTH, TexturePoint, Textures},
 };
 
 /// Geometry, materials, lights and cameras, checked and ready to be asked.
@@ -27,6 +30,32 @@ pub struct World {
     lights: Lights,
     cameras: Vec<WorldCamera>,
     notes: Vec<String>,
+    /// Whether rays pass some of its surfaces.
+    has_gaps: bool,
+    sources: Vec<PathBuf>,
+    up: DVec3,
+    is_left_handed: bool,
+}
+
+fn front_of(up: DVec3, is_left_handed: bool) -> DVec3 {
+    match (up.z.abs() > 0.5, is_left_handed) {
+        (true, _) => DVec3::NEG_Y,
+        (false, false) => DVec3::Z,
+        (false, true) => DVec3::NEG_Z,
+    }
+}
+
+/// The most surfaces that a ray passes one after another.
+const MOST_PASSED: u32 = 1 << 16;
+
+/// Returns a number in [0, 1) that differs from ray to ray.
+fn number_of(ray: &Ray) -> f32 {
+    let mut mixed = 0x9e37_79b9_7f4a_7c15_u64;
+    for value in ray.origin.to_array().into_iter().chain(ray.direction.to_array()) {
+        mixed = (mixed ^ u64::from(value.to_bits())).wrapping_mul(0xff51_afd7_ed55_8ccd);
+        mixed ^= mixed >> 29;
+    }
+    (mixed.wrapping_mul(0xc4ce_b9fe_1a85_ec53) >> 40) as f32 / (1 << 24) as f32
 }
 
 /// All that a ray can meet.
@@ -57,10 +86,51 @@ impl Parts for Geometry {
 
 impl World {
     /// Returns where a ray first meets a surface nearer than `t_max_m`.
+    ///
+    /// Of a surface that is partly there, such as a leaf with an outline in its picture, a ray meets as many points as its
+    /// share says; which ones depends on the ray alone.
     pub fn intersect(&self, ray: &Ray, t_max_m: f32) -> Option<Hit> {
+        let hit = self.first_crossing(ray, t_max_m)?;
+        if self.is_there(&hit, ray) { Some(hit) } else { self.intersect_behind(hit, ray, t_max_m) }
+    }
+
+    fn first_crossing(&self, ray: &Ray, t_max_m: f32) -> Option<Hit> {
         let root = &self.geometry.groups[0];
         let crossing = root.nearest(&self.geometry, ray.origin, ray.direction, t_max_m)?;
         Some(self.geometry.hit(ray, &crossing))
+    }
+
+    /// Goes on behind a surface that the ray passes.
+    #[cold]
+    fn intersect_behind(&self, passed: Hit, ray: &Ray, t_max_m: f32) -> Option<Hit> {
+        let (mut hit, mut gone_m) = (passed, 0.0);
+        for _ in 0..MOST_PASSED {
+            gone_m += hit.distance_m;
+            let next = hit.ray_towards(ray.direction);
+            hit = self.first_crossing(&next, t_max_m - gone_m)?;
+            if self.is_there(&hit, &next) {
+                hit.distance_m += gone_m;
+                return Some(hit);
+            }
+        }
+        None
+    }
+
+    /// Whether a ray meets the point of the surface that it crosses.
+    fn is_there(&self, hit: &Hit, ray: &Ray) -> bool {
+        let surface = &self.surfaces[hit.material.0 as usize];
+        if !surface.has_gaps {
+            return true;
+        }
+        if surface.material == Material::Open && surface.coverage.is_none() {
+            return self.geometry.shapes[hit.shape.0 as usize].emission.is_some();
+        }
+        let share = self.asked().coverage(hit.material, &TexturePoint::from(hit));
+        share >= 1.0 || share > 0.0 && number_of(ray) < share
+    }
+
+    fn asked(&self) -> Surfaces<'_> {
+        Surfaces { surfaces: &self.surfaces, textures: Textures(&self.textures) }
     }
 
     /// Tells whether a ray meets anything before it has gone `length_m`, which it isn't held to to the last digit.
@@ -68,22 +138,38 @@ impl World {
     /// The last 1e-4 of the length is left out, so that a ray to a light doesn't meet the light itself.
     pub fn is_occluded(&self, ray: &Ray, length_m: f32) -> bool {
         let root = &self.geometry.groups[0];
-        root.is_crossed(&self.geometry, ray.origin, ray.direction, length_m * (1.0 - 1e-4))
+        let length_m = length_m * (1.0 - 1e-4);
+        let is_crossed = root.is_crossed(&self.geometry, ray.origin, ray.direction, length_m);
+        is_crossed && (!self.has_gaps || self.intersect(ray, length_m).is_some())
     }
 
     /// Returns how the surface at a hit scatters light that leaves it towards `outgoing`, at these wavelengths, nm.
     ///
     /// `outgoing` has length 1 and points away from the surface, against the ray that met it.
     pub fn bsdf<const N: usize>(&self, hit: &Hit, outgoing: Vec3, wavelengths_nm: &[f32; N]) -> Bsdf<N> {
-        let surfaces = Surfaces { surfaces: &self.surfaces, textures: Textures(&self.textures) };
-        surfaces.bsdf(hit, outgoing, wavelengths_nm)
+        self.asked().bsdf(hit, outgoing, wavelengths_nm)
+    }
+
+    /// Returns the share of light that is left after the way along a ray to this hit, where the shape that it lies on is
+    /// filled with an absorbing medium and was met from within; `None` for all of it.
+    pub fn transmittance<const N: usize>(&self, hit: &Hit, ray: &Ray, wavelengths_nm: &[f32; N]) -> Option<[f32; N]> {
+        let absorption = self.surfaces[hit.material.0 as usize].absorption.as_ref()?;
+        let is_within = hit.geometric_normal.dot(ray.direction) > 0.0;
+        is_within.then(|| absorption.at(wavelengths_nm).map(|per_m| (-per_m * hit.distance_m).exp()))
     }
 
     /// Returns the radiance, W m⁻² sr⁻¹ nm⁻¹, that the surface at a hit gives of itself towards `outgoing`.
     pub fn emission<const N: usize>(&self, hit: &Hit, outgoing: Vec3, wavelengths_nm: &[f32; N]) -> [f32; N] {
         match &self.geometry.shapes[hit.shape.0 as usize].emission {
             Some(emission) if emission.is_two_sided || hit.geometric_normal.dot(outgoing) > 0.0 => {
-                emission.radiance.at(wavelengths_nm)
+                let radiance = emission.radiance.at(wavelengths_nm);
+                match self.surfaces[hit.material.0 as usize].glow {
+                    None => radiance,
+                    Some(glow) => {
+                        let share = Textures(&self.textures).spectral(glow, &TexturePoint::from(hit), wavelengths_nm);
+                        std::array::from_fn(|lane| radiance[lane] * share[lane])
+                    }
+                }
             }
             _ => [0.0; N],
         }
@@ -104,7 +190,17 @@ impl World {
         u: [f32; 2],
         wavelengths_nm: &[f32; N],
     ) -> Option<LightSample<N>> {
-        self.lights.sample(&self.geometry.shapes, &at.into(), u_light, u, wavelengths_nm)
+        let at = at.into();
+        let (mut light, place) = self.lights.sample(&self.geometry.shapes, &at, u_light, u, wavelengths_nm)?;
+        if let Some((shape, triangle)) = place
+            && let Some(glow) = self.surfaces[self.geometry.shapes[shape as usize].material.0 as usize].glow
+        {
+            let point = at.point + light.distance_m * light.direction;
+            let hit = self.geometry.shapes[shape as usize].hit_at(point, triangle);
+            let share = Textures(&self.textures).spectral(glow, &TexturePoint::from(&hit), wavelengths_nm);
+            light.radiance = std::array::from_fn(|lane| light.radiance[lane] * share[lane]);
+        }
+        Some(light)
     }
 
     /// Returns the density, 1/sr, with which [`sample_light`](Self::sample_light) draws the glowing point of a hit.
@@ -148,6 +244,26 @@ impl World {
         &self.notes
     }
 
+    /// Every file that the world was read from, pictures included, in the order in which they were read.
+    pub fn sources(&self) -> &[PathBuf] {
+        &self.sources
+    }
+
+    /// Which way is up: the axis nearest to what its first camera has as up, or its file's convention.
+    pub fn up(&self) -> DVec3 {
+        self.up
+    }
+
+    /// What faces the viewer: +z of a right-handed world, −z of a left-handed one, and −y where z is up.
+    pub fn front(&self) -> DVec3 {
+        front_of(self.up, self.is_left_handed)
+    }
+
+    /// Whether its frame is left-handed: as seen with x to the right and y up, z goes away from the viewer.
+    pub fn is_left_handed(&self) -> bool {
+        self.is_left_handed
+    }
+
     /// The corners of an upright box around everything, m; `None` for a world without shapes.
     pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
         let (low, high) = self.geometry.groups[0].bounds();
@@ -186,6 +302,34 @@ impl Geometry {
     }
 }
 
+impl PlacedShape {
+    /// Returns the hit of a point of the shape, which stands in the root group; of a mesh, of this triangle.
+    fn hit_at(&self, point: Vec3, triangle: Option<u32>) -> Hit {
+        match (&self.kind, triangle) {
+            (PlacedKind::Quadric(quadric), _) => quadric.hit(point.as_dvec3()),
+            (PlacedKind::Mesh(mesh), triangle) => {
+                let index = triangle.unwrap_or(0);
+                let corners = mesh.corners(index as usize);
+                let [b1, b2] = weights_in(corners, point);
+                mesh.hit(index, corners, b1, b2)
+            }
+        }
+    }
+}
+
+/// Returns the weights of the second and third corner of a triangle at a point of it.
+fn weights_in([a, b, c]: [Vec3; 3], point: Vec3) -> [f32; 2] {
+    let (ab, ac, ap) = (b - a, c - a, point - a);
+    let (d00, d01, d11) = (ab.length_squared(), ab.dot(ac), ac.length_squared());
+    let (d20, d21) = (ap.dot(ab), ap.dot(ac));
+    let determinant = d00 * d11 - d01 * d01;
+    if determinant > 0.0 {
+        [(d11 * d20 - d01 * d21) / determinant, (d00 * d21 - d01 * d20) / determinant].map(|w| w.clamp(0.0, 1.0))
+    } else {
+        [0.0; 2]
+    }
+}
+
 impl TriangleMesh {
     /// Returns a hit of a triangle in the mesh's own frame, with what the mesh doesn't know left at 0.
     ///
@@ -214,6 +358,20 @@ impl TriangleMesh {
             dp_du,
             dp_dv,
             uv: b0 * uvs[0] + b1 * uvs[1] + b2 * uvs[2],
+            second_uv: match self.second_uvs.is_empty() {
+                true => Vec2::ZERO,
+                false => {
+                    let [a, b, c] = vertices().map(|v| self.second_uvs[v]);
+                    b0 * a + b1 * b + b2 * c
+                }
+            },
+            color: match self.colors.is_empty() {
+                true => [1.0; 4],
+                false => {
+                    let [a, b, c] = vertices().map(|v| self.colors[v]);
+                    std::array::from_fn(|k| b0 * a[k] + b1 * b[k] + b2 * c[k])
+                }
+            },
             shape: ShapeId(0),
             primitive: triangle,
             material: MaterialId(0),
@@ -245,6 +403,8 @@ impl Quadric {
             dp_du: at.dp_du.as_vec3(),
             dp_dv: at.dp_dv.as_vec3(),
             uv: at.uv.as_vec2(),
+            second_uv: Vec2::ZERO,
+            color: [1.0; 4],
             shape: ShapeId(0),
             primitive: 0,
             material: MaterialId(0),
@@ -295,7 +455,10 @@ pub struct WorldBuilder {
     textures: Vec<Texture>,
     lights: Vec<Light>,
     cameras: Vec<WorldCamera>,
-    notes: Vec<String>,
+    notes: Notes,
+    sources: Vec<PathBuf>,
+    up: DVec3,
+    is_left_handed: bool,
 }
 
 /// A shape to be placed.
@@ -326,7 +489,10 @@ impl WorldBuilder {
             textures: Vec::new(),
             lights: Vec::new(),
             cameras: Vec::new(),
-            notes: Vec::new(),
+            notes: Notes::default(),
+            sources: Vec::new(),
+            up: DVec3::Y,
+            is_left_handed: false,
         }
     }
 
@@ -345,6 +511,39 @@ impl WorldBuilder {
     pub fn add_material_with(&mut self, name: &str, material: Material, relief: Option<Relief>) -> MaterialId {
         self.surfaces.push(Surface::new(name.to_owned(), material, relief));
         MaterialId(self.surfaces.len() as u32 - 1)
+    }
+
+    /// Says how much of the surfaces of a material is there, 0–1: rays pass the rest.
+    pub fn set_coverage(&mut self, material: MaterialId, coverage: TextureId) {
+        if let Some(surface) = self.surfaces.get_mut(material.0 as usize) {
+            surface.coverage = Some(coverage);
+        }
+    }
+
+    /// Adds a material that is another of which only this much is there, 0–1, times what of the other is.
+    pub(crate) fn add_covered(&mut self, of: MaterialId, coverage: TextureId) -> MaterialId {
+        let Some(surface) = self.surfaces.get(of.0 as usize).cloned() else { return of };
+        let coverage = match surface.coverage {
+            Some(own) => self.add_texture(Texture::Product([own, coverage])),
+            None => coverage,
+        };
+        self.surfaces.push(Surface { coverage: Some(coverage), ..surface });
+        MaterialId(self.surfaces.len() as u32 - 1)
+    }
+
+    /// Says what the radiance of shapes of a material that glow is multiplied by.
+    pub fn set_glow(&mut self, material: MaterialId, glow: TextureId) {
+        if let Some(surface) = self.surfaces.get_mut(material.0 as usize) {
+            surface.glow = Some(glow);
+        }
+    }
+
+    /// Says what the medium that fills shapes of a material takes from light, 1/m. Shapes must be closed, and their material
+    /// let light in.
+    pub fn set_absorption(&mut self, material: MaterialId, per_m: SpectralCurve) {
+        if let Some(surface) = self.surfaces.get_mut(material.0 as usize) {
+            surface.absorption = Some(per_m);
+        }
     }
 
     /// Stands a shape in the world.
@@ -400,25 +599,78 @@ impl WorldBuilder {
         self.cameras.push(camera);
     }
 
-    /// Adds a sentence about what wasn't understood, once.
+    /// Adds a sentence about what wasn't understood; said again, it is counted.
     pub fn note(&mut self, note: impl Into<String>) {
-        let note = note.into();
-        const LIMIT: usize = 500;
-        if self.notes.len() < LIMIT && !self.notes.contains(&note) {
-            self.notes.push(note);
-            if self.notes.len() == LIMIT {
-                self.notes.push("and more that isn't listed".to_owned());
+        self.notes.add(note.into());
+    }
+
+    /// Adds a thing to those that a sentence is said of, as in "pictures that aren't there: a.png, b.png and 3 more".
+    pub fn note_of(&mut self, sentence: &str, thing: &str) {
+        self.notes.add_of(sentence, thing);
+    }
+
+    /// Says which way is up in the world, and whether its frame is left-handed: as seen with x to the right and y up, z
+    /// goes away from the viewer.
+    pub fn set_up(&mut self, up: DVec3, is_left_handed: bool) {
+        (self.up, self.is_left_handed) = (up, is_left_handed);
+    }
+
+    /// Adds a file that the world is made of, or that it names and that isn't there.
+    pub fn add_source(&mut self, file: &Path) {
+        if !self.sources.iter().any(|known| known == file) {
+            self.sources.push(file.to_owned());
+        }
+    }
+
+    /// Returns which way is up and whether the frame is left-handed: as its first camera stands in it, or by its file's convention.
+    fn convention(&self) -> (DVec3, bool) {
+        let Some(camera) = self.cameras.first() else { return (self.up, self.is_left_handed) };
+        let m = camera.world_from_camera.matrix3;
+        let y = m.y_axis.normalize_or(self.up);
+        // The axis that is nearest.
+        let largest = y.abs().max_element();
+        let nearest = DVec3::from_array(y.to_array().map(|v| if v.abs() == largest { v.signum() } else { 0.0 }));
+        (nearest.normalize_or(self.up), m.determinant() > 0.0)
+    }
+
+    /// Returns which way is up in the world, and what faces the viewer, as [`World::up`] and [`World::front`].
+    pub fn up_and_front(&self) -> (DVec3, DVec3) {
+        let (up, is_left_handed) = self.convention();
+        (up, front_of(up, is_left_handed))
+    }
+
+    /// Returns the greatest extent along an axis of the shapes that belong to no group, m; 0 where there are none.
+    pub fn extent_m(&self) -> f64 {
+        let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        for shape in self.shapes.iter().filter(|shape| shape.group == GroupId::ROOT) {
+            let (a, b) = match &shape.shape {
+                Shape::Mesh(mesh) => mesh.positions.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(a, b), p| {
+                    (a.min(p.as_dvec3()), b.max(p.as_dvec3()))
+                }),
+                other => Quadric::new(other.clone(), DAffine3::IDENTITY).bounds(),
+            };
+            if a.cmple(b).all() {
+                let (a, b) = crate::shape::placed_bounds(&shape.place, a, b);
+                (low, high) = (low.min(a), high.max(b));
             }
         }
+        if low.cmple(high).all() { (high - low).max_element() } else { 0.0 }
+    }
+
+    /// Whether anything gives light.
+    pub fn has_light(&self) -> bool {
+        !self.lights.is_empty() || self.shapes.iter().any(|shape| shape.emission.is_some())
     }
 
     /// Checks the parts, and builds the world.
     ///
     /// # Errors
     /// When a part names another that isn't there, a shape has no extent, or a transform can't be undone.
-    pub fn build(self) -> Result<World, WorldError> {
+    pub fn build(mut self) -> Result<World, WorldError> {
         self.check()?;
-        let Self { shapes, n_groups, instances, surfaces, textures, lights, cameras, notes } = self;
+        let (up, is_left_handed) = self.convention();
+        let Self { shapes, n_groups, instances, surfaces, textures, lights, cameras, .. } = self;
+        let (notes, sources) = (self.notes.sentences(), self.sources);
         let mut placed: Vec<PlacedShape> = shapes.into_iter().map(NewShape::placed).collect();
         let instances: Vec<Instance> = instances
             .into_iter()
@@ -442,10 +694,12 @@ impl WorldBuilder {
         groups.insert(0, Group::build(root));
         let lights = Lights::new(lights, &mut placed);
         let geometry = Geometry { shapes: placed, instances, groups };
-        Ok(World { geometry, surfaces, textures, lights, cameras, notes })
+        let has_gaps = geometry.shapes.iter().any(|shape| surfaces[shape.material.0 as usize].has_gaps);
+        Ok(World { geometry, surfaces, textures, lights, cameras, notes, has_gaps, sources, up, is_left_handed })
     }
 
-    fn check(&self) -> Result<(), WorldError> {
+    fn check(&mut self) -> Result<(), WorldError> {
+        Surfaces::check_parts(&mut self.surfaces)?;
         let named = |what, target, index: u32, n: usize| match (index as usize) < n {
             true => Ok(()),
             false => Err(WorldError::Dangling { what, target, index: index as usize, n }),
@@ -476,14 +730,11 @@ impl WorldBuilder {
             }
         }
         for surface in &self.surfaces {
-            let relief = surface.relief.map(|relief| match relief {
-                Relief::Heights(texture) | Relief::Normals(texture) => texture,
-            });
-            for texture in surface.material.textures().into_iter().chain(relief) {
+            let more = surface.relief.map(Relief::texture).into_iter().chain(surface.coverage).chain(surface.glow);
+            for texture in surface.material.textures().into_iter().chain(more) {
                 named("a material", "texture", texture.0, self.textures.len())?;
             }
         }
-        Surfaces::check_blends(&self.surfaces)?;
         // Textures are made of earlier ones, so that none is made of itself, and aren't nested too deep for a stack.
         let mut depths = vec![0; self.textures.len()];
         for (index, texture) in self.textures.iter().enumerate() {

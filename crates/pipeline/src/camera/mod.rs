@@ -45,7 +45,7 @@ pub(crate) use scene::bands_or_own;
 pub use scene::{FlatSize, SceneSource, SceneSpec};
 pub use sensor_options::SensorOptions;
 pub use video::{CameraTurn, TurnPath, VideoSpec};
-pub use world::{RenderEffort, RenderMethod, WorldSpec};
+pub use world::{RenderEffort, RenderMethod, WorldLamp, WorldSky, WorldSpec, WorldView};
 
 use self::check::Checker;
 use crate::{Outputs, PipelineError};

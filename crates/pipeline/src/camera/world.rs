@@ -13,16 +13,25 @@ use crate::PipelineError;
 /// A three-dimensional world before the camera, and how it is rendered.
 ///
 /// The center of the lens's entrance pupil stands where the world's file has its camera, and looks where that does; without
-/// one it stands at the origin and looks along +z.
+/// one it sees the whole.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct WorldSpec {
-    /// The file: `.pbrt`, `.gltf`, `.glb`, `.obj` or `.ply`; or `still-life`, the built-in scene of the demo.
+    /// The file: `.pbrt`, `.gltf`, `.glb`, `.obj`, `.ply` or `.stl`; or `still-life`, the built-in scene of the demo.
     pub file: PathBuf,
     /// How long the file's unit of length is, m.
     #[serde(default = "one_meter")]
     pub unit_m: f64,
+    /// From where it is seen.
+    #[serde(default)]
+    pub view: WorldView,
+    /// Light from beyond it, besides its own; of a world without any light an even sky if left out.
+    #[serde(default)]
+    pub sky: Option<WorldSky>,
+    /// Lamps that are added to it.
+    #[serde(default)]
+    pub lamps: Vec<WorldLamp>,
     /// How its light comes to the film.
     #[serde(default)]
     pub method: RenderMethod,
@@ -52,6 +61,73 @@ pub struct WorldSpec {
     /// The seed of the rendering's samples; that of the sensor's noise is the camera's.
     #[serde(default = "one")]
     pub seed: u64,
+}
+
+/// From where a world is seen.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub enum WorldView {
+    /// From where the file has its first camera; without one, the whole.
+    #[default]
+    OfFile,
+    /// From where the file has the camera of this name, or of this number from 1.
+    Camera(String),
+    /// The whole of it, a quarter round from its front and from above.
+    Whole,
+    /// From a place.
+    From {
+        /// Where the center of the entrance pupil stands, m.
+        eye_m: (f64, f64, f64),
+        /// What is in the middle of the picture, m; the middle of the world if left out.
+        #[serde(default)]
+        look_at_m: Option<(f64, f64, f64)>,
+        /// What is up in the picture; if left out, what is up in the world.
+        #[serde(default)]
+        up: Option<(f64, f64, f64)>,
+    },
+}
+
+/// Light from beyond a world.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub enum WorldSky {
+    /// This radiance from all sides, W m⁻² sr⁻¹ nm⁻¹.
+    Even(f64),
+    /// A clear day: sun and sky.
+    Day {
+        /// How high the sun stands above the horizon, degrees.
+        elevation_deg: f64,
+        /// How far round it stands from the front of the world, to the right as seen from above, degrees.
+        #[serde(default = "usual_azimuth")]
+        azimuth_deg: f64,
+        /// How hazy the air is: 2 very clear, 3 clear, 6 hazy.
+        #[serde(default = "usual_turbidity")]
+        turbidity: f64,
+    },
+    /// A picture of all directions, its columns by azimuth and its rows by height (EXR, HDR, PNG, JPEG, TIFF); linear sRGB of 1 is as bright
+    /// as an even sky of 1.
+    Picture(PathBuf),
+}
+
+/// A lamp that shines alike in all directions, of the color of daylight D65.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub struct WorldLamp {
+    /// Where it is, m.
+    pub at_m: (f64, f64, f64),
+    /// Its luminous flux, lm.
+    pub lumens: f64,
+}
+
+fn usual_azimuth() -> f64 {
+    30.0
+}
+
+fn usual_turbidity() -> f64 {
+    3.0
 }
 
 /// How the light of a world comes to the film.
@@ -101,6 +177,9 @@ impl WorldSpec {
         Self {
             file,
             unit_m: one_meter(),
+            view: WorldView::default(),
+            sky: None,
+            lamps: Vec::new(),
             method: RenderMethod::default(),
             effort: RenderEffort::default(),
             size: None,
@@ -153,6 +232,27 @@ impl WorldSpec {
 
     pub(super) fn check(&self, checker: &Checker<'_>) -> Result<(), PipelineError> {
         checker.number("unit_m", self.unit_m)?;
+        let point = |key: &'static str, (x, y, z): (f64, f64, f64)| {
+            [x, y, z].into_iter().try_for_each(|value| checker.number(key, value))
+        };
+        if let WorldView::From { eye_m, look_at_m, up } = &self.view {
+            point("eye_m", *eye_m)?;
+            look_at_m.map_or(Ok(()), |at_m| point("look_at_m", at_m))?;
+            up.map_or(Ok(()), |up| point("up", up))?;
+        }
+        match &self.sky {
+            Some(WorldSky::Even(radiance)) => checker.number("Even", *radiance)?,
+            Some(WorldSky::Day { elevation_deg, azimuth_deg, turbidity }) => {
+                checker.number("elevation_deg", *elevation_deg)?;
+                checker.number("azimuth_deg", *azimuth_deg)?;
+                checker.number("turbidity", *turbidity)?;
+            }
+            Some(WorldSky::Picture(_)) | None => {}
+        }
+        for lamp in &self.lamps {
+            checker.number("lumens", lamp.lumens)?;
+            point("at_m", lamp.at_m)?;
+        }
         checker.number("advance_mm", self.advance_mm)?;
         checker.number("aside_mm", self.aside_mm.0)?;
         checker.number("aside_mm", self.aside_mm.1)?;
@@ -164,6 +264,10 @@ impl WorldSpec {
         if self.is_still_life() {
             if self.unit_m != one_meter() {
                 checker.wrong("unit_m", &self.unit_m.to_string(), "1, the unit of the still life")?;
+            }
+            if self.view != WorldView::OfFile || self.sky.is_some() || !self.lamps.is_empty() {
+                let expected = "none: the still life has a view and light of its own";
+                checker.wrong("view, sky or lamps", "given", expected)?;
             }
             if self.paths != LightPaths::Full {
                 let expected = "Full: the light in the still life was followed before";

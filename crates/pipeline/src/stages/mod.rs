@@ -51,6 +51,9 @@ mod with_given;
 mod world;
 mod world_camera;
 mod world_light;
+mod world_sky;
+mod world_summary;
+mod world_view;
 
 pub(crate) use frames::{MovedLight, expose};
 pub(crate) use irradiance::photodiode_irradiance_file;
@@ -74,3 +77,5 @@ pub use resume::{RESUME_FILE, Resumed};
 pub use scene::{ResolvedScene, SceneSummary};
 pub use video::{Video, VideoFrame, VideoFrameFacts};
 pub use world::WorldRender;
+pub use world_summary::{CameraSummary, WorldSummary};
+pub use world_view::world_camera;

@@ -23,7 +23,7 @@ use super::{
 use crate::{
     BlurSpec, BorderSpec, Camera, Crop, Diffraction, DualPixelSpec, FilmSpec, FilterSpec, FlatSize, FocusSpec,
     FramesSpec, LensReadOptions, LensSpec, LightFieldSpec, Movements, PipelineError, Quality, RenderEffort,
-    SceneSource, SceneSpec, StopSpec, WavelengthSpec, WorldSpec,
+    SceneSource, SceneSpec, StopSpec, WavelengthSpec, WorldLamp, WorldSky, WorldSpec,
 };
 
 /// A file as it was when it was looked at, so that a change of it is seen.
@@ -110,6 +110,8 @@ pub(crate) struct SceneInputs {
 pub(crate) struct WorldInputs {
     pub(crate) file: PathBuf,
     pub(crate) unit_m: f64,
+    pub(crate) sky: Option<WorldSky>,
+    pub(crate) lamps: Vec<WorldLamp>,
     files: Vec<FileStamp>,
 }
 
@@ -265,7 +267,13 @@ impl GeometryInputs {
         if spec.is_still_life() {
             return None;
         }
-        let inputs = WorldInputs { file: spec.file.clone(), unit_m: spec.unit_m, files: self.files.clone() };
+        let inputs = WorldInputs {
+            file: spec.file.clone(),
+            unit_m: spec.unit_m,
+            sky: spec.sky.clone(),
+            lamps: spec.lamps.clone(),
+            files: self.files.clone(),
+        };
         Some((inputs, spec))
     }
 }

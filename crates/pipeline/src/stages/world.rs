@@ -9,12 +9,8 @@ use dioptric_backward::{
 };
 use dioptric_optics::{Lens, glam::DVec2};
 use dioptric_scene::{HiddenLayer, Scene, SceneLight, View};
-use dioptric_spectrum::{Cancel, DepthMap, Quantity, SpectralImage, SpectrumError, WavelengthGrid};
-use dioptric_world::{
-    CameraKind, ReadOptions, World, WorldCamera,
-    glam::{DAffine3, DVec3},
-    read_world,
-};
+use dioptric_spectrum::{Cancel, DepthMap, Illuminant, Quantity, SpectralImage, SpectrumError, WavelengthGrid};
+use dioptric_world::{CameraKind, Flux, Light, ReadOptions, World, WorldCamera, glam::DVec3, open_world};
 use ndarray::Array2;
 
 use super::{
@@ -25,10 +21,12 @@ use super::{
     scene::ResolvedScene,
     spec::{IrradianceInputs, SceneInputs, WorldInputs},
     world_light::light_on,
+    world_sky::add_sky,
+    world_view::{horizontal_fov_deg, placement, world_camera},
 };
 use crate::{
     Diffraction, PipelineError, Progress, REFERENCE_WAVELENGTH_NM, RenderEffort, RenderMethod, SceneSource, Stage,
-    WorldSpec,
+    WorldLamp, WorldSky, WorldSpec,
 };
 
 /// Samples of a pass: as many as spread well, and few enough for a first picture soon.
@@ -70,10 +68,10 @@ impl WorldStage {
         }
     }
 
-    fn placement(&self, spec: &WorldSpec) -> Placement {
+    fn placement(&self, spec: &WorldSpec, fov_deg: Option<f64>) -> Result<Placement, PipelineError> {
         match self {
-            Self::World(world) => placement(world, spec),
-            Self::StillLife(life) => life.placement(),
+            Self::World(world) => placement(world, spec, fov_deg),
+            Self::StillLife(life) => Ok(life.placement()),
         }
     }
 
@@ -89,18 +87,37 @@ impl WorldStage {
 /// Reads a world.
 pub(super) fn read(inputs: &WorldInputs, watch: &Watch<'_>) -> Result<World, PipelineError> {
     watch.progress.at(Stage::Scene, 0.0);
-    Ok(read_world(&inputs.file, &ReadOptions { metres_per_unit: inputs.unit_m }, watch.cancel)?)
+    let mut builder = open_world(&inputs.file, &ReadOptions { metres_per_unit: inputs.unit_m }, watch.cancel)?;
+    for WorldLamp { at_m: (x, y, z), lumens } in &inputs.lamps {
+        let intensity = Flux::Lumens(*lumens).spectrum(&Illuminant::D65.spectrum(), 4.0 * std::f64::consts::PI)?;
+        builder.add_light(Light::Point { position: DVec3::new(*x, *y, *z), intensity });
+    }
+    let (up, front) = builder.up_and_front();
+    match &inputs.sky {
+        Some(sky) => add_sky(&mut builder, sky, up, front)?,
+        None if !builder.has_light() => {
+            builder.note(
+                "nothing in the file gives light: an even sky of radiance 1 W m⁻² sr⁻¹ nm⁻¹ does; --sky day or --light gives another",
+            );
+            add_sky(&mut builder, &WorldSky::Even(1.0), up, front)?;
+        }
+        None => {}
+    }
+    let is_gltf = inputs
+        .file
+        .extension()
+        .is_some_and(|kind| kind.eq_ignore_ascii_case("gltf") || kind.eq_ignore_ascii_case("glb"));
+    let extent_m = builder.extent_m();
+    if !is_gltf && inputs.unit_m == 1.0 && extent_m > MOST_LIKELY_M {
+        builder.note(format!(
+            "the file says no unit: in metres, as it is taken, all of it is {extent_m:.0} m wide; --unit-m 0.001 takes millimetres"
+        ));
+    }
+    Ok(builder.build()?)
 }
 
-/// Returns where the middle of the entrance pupil stands, and how it looks.
-pub(super) fn placement(world: &World, spec: &WorldSpec) -> Placement {
-    let of_file = world.cameras().first().map_or(DAffine3::IDENTITY, |camera| camera.world_from_camera);
-    let advance = DAffine3::from_translation(1e-3 * DVec3::new(spec.aside_mm.0, spec.aside_mm.1, spec.advance_mm));
-    Placement { world_from_camera: of_file * advance }
-}
-
-/// The view of worlds whose file has no camera: columns and rows.
-const SIZE: (usize, usize) = (720, 480);
+/// Worlds wider than this are seldom in metres.
+const MOST_LIKELY_M: f64 = 1000.0;
 
 /// Renders the view from the middle of the entrance pupil: radiance and depth.
 ///
@@ -114,11 +131,11 @@ pub(super) fn view(
     watch: &Watch<'_>,
 ) -> Result<ResolvedScene, PipelineError> {
     let geometry = &inputs.geometry;
-    let of_file = world.cameras().first();
-    let (columns, rows) = spec.size.or(of_file.map(|camera| camera.resolution)).unwrap_or(SIZE);
+    let of_view = world_camera(world, spec, geometry.field_of_view_deg)?;
+    let (columns, rows) = spec.size.unwrap_or(of_view.resolution);
     let binning = geometry.quality.scene_binning(columns);
     let (columns, rows) = ((columns / binning).max(1), (rows / binning).max(1));
-    let fov_deg = geometry.field_of_view_deg.or(of_file.and_then(horizontal_fov_deg));
+    let fov_deg = geometry.field_of_view_deg.or_else(|| horizontal_fov_deg(&of_view));
     let fov_deg = fov_deg.ok_or_else(|| PipelineError::Unsuitable {
         what: "field_of_view_deg",
         reason: format!("missing, and {} has no camera that states an angle; expected degrees", spec.file.display()),
@@ -130,7 +147,8 @@ pub(super) fn view(
     has_room((rows, columns), bands.grid.len(), n_layers)?;
     let half_tangents = 0.5 * DVec2::new(columns as f64, rows as f64) / view.focal_px;
     let pixels = PixelGrid::new(columns, rows);
-    let pinhole = Pinhole { placement: placement(world, spec), pixels, half_tangents, layer: 0 };
+    let pinhole =
+        Pinhole { placement: placement(world, spec, geometry.field_of_view_deg)?, pixels, half_tangents, layer: 0 };
     let (effort, samples_per_pass) = match spec.method {
         // As few as reach every band.
         RenderMethod::Backward => (RenderEffort::Samples(1), 1),
@@ -181,19 +199,6 @@ fn hidden_layer(
     Ok(HiddenLayer { radiance: behind, depth: DepthMap::new(behind_m)? })
 }
 
-/// Returns the angle across the picture of a camera that states one, degrees.
-fn horizontal_fov_deg(camera: &WorldCamera) -> Option<f64> {
-    if !matches!(camera.kind, CameraKind::Perspective { .. }) {
-        return None;
-    }
-    let view = match Camera::from_world(camera, &reference_band().ok()?, &|_| Lens::pinhole(1.0)).ok()? {
-        Camera::Pinhole(view) => view,
-        Camera::ThinLens(lens) => lens.view,
-        Camera::Lens(_) => return None,
-    };
-    Some(2.0 * view.half_tangents.x.atan().to_degrees())
-}
-
 pub(super) fn reference_band() -> Result<Bands, SpectrumError> {
     Ok(Bands { grid: WavelengthGrid::new(vec![REFERENCE_WAVELENGTH_NM])?, sampling: BandSampling::Center })
 }
@@ -234,7 +239,7 @@ impl WorldRender {
             film_distance_mm: place.film_distance_mm + inputs.micro_array.map_or(0.0, |array| array.gap_mm),
             film_size_mm: DVec2::new(columns as f64, rows as f64) * (1e-3 * place.pitch_um),
             pixels: PixelGrid::new(columns, rows),
-            placement: stage.placement(spec),
+            placement: stage.placement(spec, inputs.scene.geometry.field_of_view_deg)?,
             origin: LensOrigin::EntrancePupil,
             diffraction: inputs.plan.bank.diffraction.hurb(),
             micro_array: inputs.micro_array,
@@ -266,7 +271,12 @@ impl WorldRender {
         let bands = Bands { grid, sampling: spec.bands };
         let folder = spec.file.parent().unwrap_or(Path::new(""));
         let read_lens = |name: &str| Lens::read(&folder.join(name));
-        let identity = format!("{} {camera:?}", fingerprint(&world, spec));
+        let lens = match &camera.kind {
+            CameraKind::Lens { file, .. } if !file.is_empty() => fs::read(folder.join(file)).ok(),
+            _ => None,
+        };
+        let lens = lens.map(|bytes| blake3::hash(&bytes));
+        let identity = format!("{} {camera:?} {lens:?}", fingerprint(&world, spec));
         let camera = Camera::from_world(&camera, &bands, &read_lens)?;
         let (paths, seed) = (spec.paths, spec.seed);
         let stage = WorldStage::World(world);
@@ -409,10 +419,15 @@ const RADIANCE_FILE: &str = "radiance.exr";
 /// The name of the file of depth, normals and materials.
 const AUXILIARY_FILE: &str = "auxiliary.exr";
 
-/// Returns words that differ between worlds: what is counted and measured of one.
+/// Returns words that differ between worlds: the contents of all files that one was read from, wherever they lie, and what was added to it.
 fn fingerprint(world: &World, spec: &WorldSpec) -> String {
-    let names: Vec<&str> = world.material_names().collect();
-    let counts = (world.n_primitives(), world.n_lights(), world.bounds());
-    let file = fs::metadata(&spec.file).ok().map(|data| (data.len(), data.modified().ok()));
-    format!("{counts:?} {names:?} {file:?} {}", spec.unit_m)
+    let mut hasher = blake3::Hasher::new();
+    for path in world.sources() {
+        let mut own = blake3::Hasher::new();
+        let is_read = fs::File::open(path).and_then(|file| own.update_reader(file).map(|_| ())).is_ok();
+        // A file that wasn't there differs from every one that is.
+        hasher.update(&[u8::from(is_read)]);
+        hasher.update(own.finalize().as_bytes());
+    }
+    format!("{} {} {:?} {:?} {:?}", hasher.finalize().to_hex(), spec.unit_m, spec.view, spec.sky, spec.lamps)
 }

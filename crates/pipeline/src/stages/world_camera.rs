@@ -8,7 +8,8 @@ use dioptric_world::{CameraKind, World, WorldCamera};
 
 use super::{
     lit_still_life::{RadiantStillLife, picture_at},
-    world::{placement, reference_band},
+    world::reference_band,
+    world_view::placement,
 };
 use crate::{
     Camera as CameraFile, Diffraction, FilmSpec, FocusSpec, LensReadOptions, LensSpec, PipelineError,
@@ -77,7 +78,7 @@ impl CameraFile {
         let SceneSource::World(spec) = &self.scene.source else { return Ok(self.focus) };
         let lens = self.stop.apply(self.lens.open(&self.lens_reading)?.lens)?.at(REFERENCE_WAVELENGTH_NM)?;
         let ahead_m = match world {
-            Some(world) => distance_ahead_m(world, &placement(world, spec)),
+            Some(world) => distance_ahead_m(world, &placement(world, spec, self.scene.field_of_view_deg)?),
             None => RadiantStillLife::unlit(&picture_at(spec))?.distance_ahead_m(),
         };
         let ahead_m = ahead_m.unwrap_or(f64::INFINITY);

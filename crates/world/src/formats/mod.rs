@@ -5,14 +5,15 @@ mod gltf;
 mod obj;
 mod pbrt;
 mod ply;
+mod stl;
 
 use std::path::Path;
 
 use dioptric_spectrum::Cancel;
 use glam::{DAffine3, DVec3};
 
-pub use self::{obj::read_obj, ply::read_ply};
-use crate::{Material, Shape, SpectralCurve, Texture, World, WorldBuilder, WorldError};
+pub use self::{obj::read_obj, ply::read_ply, stl::read_stl};
+use crate::{Material, MaterialId, Shape, SpectralCurve, Texture, TriangleMesh, World, WorldBuilder, WorldError};
 
 /// How a world file is read.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,49 +29,72 @@ impl Default for ReadOptions {
     }
 }
 
-/// Reads a world from a file: `.pbrt` (text of versions 2 to 4), `.gltf` and `.glb`, or a bare mesh as `.obj` or `.ply`.
+/// Reads a world from a file: `.pbrt` (text of versions 2 to 4, also packed as `.pbrt.gz`), `.gltf` and `.glb`, or a mesh as
+/// `.obj` with its materials, `.ply` or `.stl`.
 ///
-/// A bare mesh is gray (reflectance 0.5) under a sky of radiance 1 W m⁻² sr⁻¹ nm⁻¹. What of a file isn't understood is
-/// named in [`World::notes`] with what stands in its place. Reading takes at most 256 times the memory of the bytes read,
-/// and pictures at most 2²⁸ samples each.
+/// What of a file isn't understood is named in [`World::notes`] with what stands in its place. Reading takes at most 256 times
+/// the memory of the bytes read, and pictures at most 2²⁸ samples each.
 ///
 /// # Errors
 /// When the file can't be read or is malformed, with its line where it has lines; when it has more than 2³¹ bytes, those
 /// that it includes counted in; and when the work was cancelled.
 pub fn read_world(path: &Path, options: &ReadOptions, cancel: &Cancel) -> Result<World, WorldError> {
+    open_world(path, options, cancel)?.build()
+}
+
+/// Reads a world as [`read_world`] does, to which more can be added before it is built.
+///
+/// # Errors
+/// As [`read_world`].
+pub fn open_world(path: &Path, options: &ReadOptions, cancel: &Cancel) -> Result<WorldBuilder, WorldError> {
     let unit = options.metres_per_unit;
     if !(unit > 0.0 && unit.is_finite()) {
         let (what, value) = ("the unit of length", unit.to_string());
         return Err(WorldError::Setting { what, value, expected: "a finite number of metres over 0" });
     }
     let scale = DAffine3::from_scale(DVec3::splat(unit));
-    let kind = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
-    let builder = match kind.as_deref() {
+    let name = path.file_name().map(|name| name.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
+    let name = name.strip_suffix(".gz").filter(|name| name.ends_with(".pbrt")).unwrap_or(&name);
+    let builder = match name.rsplit_once('.').map(|(_, kind)| kind) {
         Some("pbrt") => pbrt::read(path, unit, cancel)?,
         #[cfg(feature = "gltf")]
         Some("gltf" | "glb") => gltf::read(path, scale, cancel)?,
         #[cfg(not(feature = "gltf"))]
         Some("gltf" | "glb") => return Err(WorldError::LacksFeature { file: path.to_owned(), feature: "gltf" }),
-        Some("obj") => bare(read_obj(path)?.into_iter().map(|(_, mesh)| mesh), scale),
-        Some("ply") => bare([read_ply(path)?], scale),
+        Some("obj") => obj::read(path, unit)?,
+        Some("ply") => bare(path, read_ply(path)?, scale, DVec3::Y),
+        Some("stl") => bare(path, read_stl(path)?, scale, DVec3::Z),
         _ => return Err(WorldError::UnknownKind { file: path.to_owned() }),
     };
     cancel.check()?;
-    builder.build()
+    Ok(builder)
 }
 
-/// Gray meshes under a plain sky.
-fn bare(meshes: impl IntoIterator<Item = crate::TriangleMesh>, place: DAffine3) -> WorldBuilder {
+/// A mesh without a material, gray or of its own colors.
+fn bare(path: &Path, mesh: TriangleMesh, place: DAffine3, up: DVec3) -> WorldBuilder {
     let mut builder = WorldBuilder::new();
-    let gray = builder.add_texture(Texture::Curve(SpectralCurve::constant(0.5)));
-    let matte = builder.add_material("gray", Material::Matte { reflectance: gray });
-    for mesh in meshes {
-        builder.add_shape(Shape::Mesh(mesh), place, matte, None);
-    }
-    builder.add_light(crate::Light::Sky { radiance: SpectralCurve::constant(1.0) });
-    builder.note("a bare mesh: gray of reflectance 0.5 under a sky of radiance 1 W m⁻² sr⁻¹ nm⁻¹");
+    builder.set_up(up, false);
+    builder.add_source(path);
+    let material = plain(&mut builder, !mesh.colors.is_empty());
+    builder.add_shape(Shape::Mesh(mesh), place, material, None);
     builder
 }
+
+/// Adds the material of meshes without one: gray of reflectance 0.5, or the colors of their vertices.
+fn plain(builder: &mut WorldBuilder, has_colors: bool) -> MaterialId {
+    let (name, texture) = match has_colors {
+        true => ("colors of the vertices", Texture::VertexColors),
+        false => {
+            builder.note("meshes without a material: gray of reflectance 0.5");
+            ("gray", Texture::Curve(SpectralCurve::constant(0.5)))
+        }
+    };
+    let reflectance = builder.add_texture(texture);
+    builder.add_material(name, Material::Matte { reflectance })
+}
+
+/// The most bytes that a file may have.
+const MAX_BYTES: u64 = 1 << 31;
 
 /// Reads a file of at most this many bytes into memory.
 fn read_bytes(path: &Path, limit: u64) -> Result<Vec<u8>, WorldError> {

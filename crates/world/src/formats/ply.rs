@@ -2,6 +2,7 @@
 
 use std::{fs::File, io::BufReader, path::Path};
 
+use dioptric_spectrum::srgb_decode;
 use glam::{Vec2, Vec3};
 use ply_rs_bw::{
     parser::{Parser, Reader},
@@ -15,6 +16,8 @@ struct Vertex {
     position: Vec3,
     normal: Vec3,
     uv: Vec2,
+    /// As it is written.
+    color: Option<[f32; 4]>,
 }
 
 impl PropertyAccess for Vertex {
@@ -32,6 +35,23 @@ impl PropertyAccess for Vertex {
             "nz" => &mut self.normal.z,
             "u" | "s" | "texture_u" | "texture_s" => &mut self.uv.x,
             "v" | "t" | "texture_v" | "texture_t" => &mut self.uv.y,
+            "red" | "green" | "blue" | "alpha" | "r" | "g" | "b" | "diffuse_red" | "diffuse_green" | "diffuse_blue" => {
+                let channel = match name.trim_start_matches("diffuse_").as_bytes().first() {
+                    Some(b'r') => 0,
+                    Some(b'g') => 1,
+                    Some(b'b') => 2,
+                    _ => 3,
+                };
+                // Whole numbers are codes; a missing alpha is opaque.
+                let most = match property {
+                    Property::UChar(_) | Property::Char(_) => 255.0,
+                    Property::UShort(_) | Property::Short(_) => 65535.0,
+                    _ => 1.0,
+                };
+                let Some(value) = property.to_f32_lossy() else { return PropertyAccessResult::UnsupportedType };
+                self.color.get_or_insert([0.0, 0.0, 0.0, 1.0])[channel] = value / most;
+                return PropertyAccessResult::Set;
+            }
             _ => return PropertyAccessResult::Ignored,
         };
         match property.to_f32_lossy() {
@@ -77,6 +97,46 @@ impl Face {
     }
 }
 
+/// Strips of triangles: vertices, and −1 where one ends.
+#[derive(Default)]
+struct Strips(Vec<i64>);
+
+impl PropertyAccess for Strips {
+    fn new() -> Self {
+        Self::default()
+    }
+
+    fn set_property(&mut self, name: &str, property: Property) -> PropertyAccessResult {
+        if name != "vertex_indices" && name != "vertex_index" {
+            return PropertyAccessResult::Ignored;
+        }
+        self.0 = match property {
+            Property::ListInt(values) => values.into_iter().map(i64::from).collect(),
+            Property::ListShort(values) => values.into_iter().map(i64::from).collect(),
+            Property::ListChar(values) => values.into_iter().map(i64::from).collect(),
+            property => match property.to_u32_list() {
+                Some(values) => values.into_iter().map(i64::from).collect(),
+                None => return PropertyAccessResult::UnsupportedType,
+            },
+        };
+        PropertyAccessResult::Set
+    }
+}
+
+impl Strips {
+    fn triangles(&self) -> impl Iterator<Item = [u32; 3]> {
+        self.0.split(|vertex| *vertex < 0).flat_map(|strip| {
+            let index = |vertex: i64| u32::try_from(vertex).unwrap_or(u32::MAX);
+            strip.windows(3).enumerate().filter(|(_, t)| t[0] != t[1] && t[1] != t[2] && t[2] != t[0]).map(
+                move |(number, t)| match number % 2 {
+                    0 => [index(t[0]), index(t[1]), index(t[2])],
+                    _ => [index(t[1]), index(t[0]), index(t[2])],
+                },
+            )
+        })
+    }
+}
+
 /// Anything else, which is passed over.
 struct Other;
 
@@ -107,7 +167,8 @@ fn malformed(file: &Path, error: &dyn std::fmt::Display) -> WorldError {
     }
 }
 
-/// Reads the mesh of a PLY file: `vertex` (x, y, z; nx, ny, nz; u, v or s, t) and `face` (polygons become fans).
+/// Reads the mesh of a PLY file: `vertex` (x, y, z; nx, ny, nz; u, v or s, t; red, green, blue, alpha as they are shown),
+/// `face` (polygons become fans) and `tristrips`.
 ///
 /// # Errors
 /// When the file can't be read, claims more elements than it has bytes, or its mesh isn't sound.
@@ -132,6 +193,11 @@ pub fn read_ply(path: &Path) -> Result<TriangleMesh, WorldError> {
                 if has(&["nx"]) {
                     mesh.normals = vertices.iter().map(|v| v.normal).collect();
                 }
+                if vertices.iter().any(|v| v.color.is_some()) {
+                    let light = |code: f32| srgb_decode(f64::from(code.clamp(0.0, 1.0))) as f32;
+                    let color = |[r, g, b, a]: [f32; 4]| [light(r), light(g), light(b), a];
+                    mesh.colors = vertices.iter().map(|v| color(v.color.unwrap_or([1.0; 4]))).collect();
+                }
                 if has(&["u", "s", "texture_u", "texture_s"]) {
                     mesh.uvs = vertices.iter().map(|v| v.uv).collect();
                 }
@@ -141,6 +207,12 @@ pub fn read_ply(path: &Path) -> Result<TriangleMesh, WorldError> {
                 for face in faces.map_err(|e| malformed(path, &e))? {
                     let fan = face.vertices();
                     mesh.triangles.extend(fan.windows(2).skip(1).map(|pair| [fan[0], pair[0], pair[1]]));
+                }
+            }
+            "tristrips" => {
+                let strips = Parser::<Strips>::new().read_payload_for_element(&mut reader, element, &header);
+                for strips in strips.map_err(|e| malformed(path, &e))? {
+                    mesh.triangles.extend(strips.triangles());
                 }
             }
             _ => {
@@ -184,6 +256,22 @@ mod tests {
         });
         assert_eq!(meshes[0], meshes[1]);
         assert_eq!(meshes[0], TriangleMesh::quad(Vec3::Z * 3.0, Vec3::X, Vec3::Y));
+    }
+
+    #[test]
+    fn colors_and_strips_are_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.ply");
+        let text = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n\
+                    property uchar red\nproperty uchar green\nproperty uchar blue\nelement tristrips 1\n\
+                    property list int int vertex_indices\nend_header\n\
+                    0 0 0 255 0 0\n1 0 0 0 255 0\n0 1 0 0 0 255\n1 1 0 188 188 188\n8 0 1 2 3 -1 2 1 3\n";
+        std::fs::write(&path, text).unwrap();
+        let mesh = read_ply(&path).unwrap();
+        assert_eq!(mesh.triangles, [[0, 1, 2], [2, 1, 3], [2, 1, 3]]);
+        assert_eq!(mesh.colors[0], [1.0, 0.0, 0.0, 1.0]);
+        // A code of 188 is half the light of 255.
+        assert!((mesh.colors[3][0] - 0.5).abs() < 0.01, "{:?}", mesh.colors[3]);
     }
 
     #[test]

@@ -5,12 +5,13 @@ use std::path::Path;
 use dioptric_spectrum::Cancel;
 use dioptric_world::{ReadOptions, read_world};
 
-const SEEDS: [(&str, &[u8]); 7] = [
+const SEEDS: [(&str, &[u8]); 8] = [
     ("small.pbrt", include_bytes!("../corpus/small.pbrt")),
     ("second.pbrt", include_bytes!("../corpus/second.pbrt")),
     ("square.ply", include_bytes!("../corpus/mesh.ply")),
     ("binary.ply", include_bytes!("../corpus/binary.ply")),
     ("mesh.obj", include_bytes!("../corpus/mesh.obj")),
+    ("solid.stl", include_bytes!("../corpus/solid.stl")),
     ("world.gltf", include_bytes!("../corpus/world.gltf")),
     ("world.glb", include_bytes!("../corpus/world.glb")),
 ];
@@ -21,8 +22,9 @@ pub(crate) fn seeds() -> impl Iterator<Item = (&'static str, &'static [u8])> {
 }
 
 /// What they name.
-const BESIDE: [(&str, &[u8]); 3] = [
+const BESIDE: [(&str, &[u8]); 4] = [
     ("mesh.ply", include_bytes!("../corpus/mesh.ply")),
+    ("none.mtl", include_bytes!("../corpus/none.mtl")),
     ("part.pbrt", include_bytes!("../corpus/part.pbrt")),
     ("picture.png", include_bytes!("../corpus/picture.png")),
 ];

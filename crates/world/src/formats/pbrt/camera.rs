@@ -3,7 +3,15 @@
 use glam::{DAffine3, DVec3};
 
 use super::params::Params;
-use crate::{CameraKind, WorldCamera};
+use crate::{CameraKind, SkyMapping, WorldCamera};
+
+/// Returns the distance from the rear vertex to the film, mm; none for 0, which leaves it to the focus.
+///
+/// The cameras of ISET for pbrt's 2nd version count it in millimetres, all others of ISET in metres.
+fn film_distance_mm(kind: &str, params: &Params<'_>) -> Option<f64> {
+    let unit_mm = if matches!(kind, "realisticDiffraction" | "idealDiffraction") { 1.0 } else { 1e3 };
+    params.number("filmdistance").filter(|distance| *distance != 0.0).map(|distance| unit_mm * distance)
+}
 
 /// What a file has said of its camera so far.
 #[derive(Debug, Default)]
@@ -17,6 +25,7 @@ pub(super) struct CameraWords {
     lens_file: String,
     focal_length_mm: Option<f64>,
     film_distance_mm: Option<f64>,
+    mapping: String,
     aperture_diameter_mm: Option<f64>,
     film_diagonal_mm: Option<f64>,
     has_diffraction: bool,
@@ -36,7 +45,8 @@ impl CameraWords {
             focus_distance: params.number_of(&["focaldistance", "focusdistance"]),
             lens_file: params.text("lensfile").or_else(|| params.text("specfile")).unwrap_or("").to_owned(),
             focal_length_mm: params.number("focal_length"),
-            film_distance_mm: params.number("filmdistance"),
+            film_distance_mm: film_distance_mm(kind, params),
+            mapping: params.text("mapping").unwrap_or("equalarea").to_owned(),
             aperture_diameter_mm: params.number_of(&["aperturediameter", "aperture_diameter"]),
             film_diagonal_mm: params.number("filmdiag").or(self.film_diagonal_mm),
             has_diffraction: is_set("diffractionEnabled"),
@@ -72,6 +82,12 @@ impl CameraWords {
             "orthographic" => CameraKind::Orthographic {
                 screen_window: self.screen_window.unwrap_or([-1.0, 1.0, -1.0, 1.0]).map(|v| v * metres_per_unit),
             },
+            "environment" => CameraKind::Panorama { mapping: SkyMapping::LatLong },
+            "spherical" if self.mapping == "equirectangular" => CameraKind::Panorama { mapping: SkyMapping::LatLong },
+            "spherical" => CameraKind::Panorama { mapping: SkyMapping::EqualArea },
+            kind @ ("realisticEye" | "humaneye" | "raytransfer" | "lightfield") => {
+                CameraKind::Other { kind: kind.to_owned() }
+            }
             _ if !self.lens_file.is_empty() || self.focal_length_mm.is_some() => CameraKind::Lens {
                 file: self.lens_file.clone(),
                 focal_length_mm: self.focal_length_mm,
@@ -82,6 +98,9 @@ impl CameraWords {
                 has_diffraction: self.has_diffraction,
                 has_dispersion: self.has_dispersion,
             },
+            kind if !matches!(kind, "perspective" | "pinhole" | "realistic" | "omni" | "thinlens") => {
+                CameraKind::Other { kind: kind.to_owned() }
+            }
             _ => CameraKind::Perspective {
                 fov_deg: self.fov_deg.unwrap_or(90.0),
                 lens_radius_m: self.lens_radius * metres_per_unit,

@@ -4,8 +4,13 @@ use std::{f64::consts::PI, sync::Arc};
 
 use glam::{DMat3, DVec3};
 
-use super::{Fault, Reader, params::Params, shapes::FaceAreas};
-use crate::{Emission, Encoding, ImageTexture, Light, SkyImage, SkyMapping, Wrap};
+use super::{
+    Fault, Reader,
+    params::Params,
+    shapes::FaceAreas,
+    spectra::{SpectrumUse, photopic_mean},
+};
+use crate::{Emission, Encoding, FallOff, ImageTexture, Light, SkyImage, SkyMapping, Wrap};
 
 use super::Version;
 
@@ -50,8 +55,17 @@ impl Reader<'_> {
         self.of_fourth(params, "illuminance")
     }
 
+    /// Returns what the light is multiplied by; a color, which earlier versions allow, by its mean.
+    fn scale(&mut self, params: &Params<'_>) -> f64 {
+        let Some(numbers) = params.numbers("scale") else { return 1.0 };
+        if numbers.iter().any(|n| *n != numbers[0]) {
+            self.builder.note("a light's 'scale' that is a color: its mean stands for it");
+        }
+        numbers.iter().sum::<f64>() / numbers.len() as f64
+    }
+
     pub(super) fn glow(&mut self, params: &Params<'_>) -> Result<Glow, Fault> {
-        let scale = params.number("scale").unwrap_or(1.0);
+        let scale = self.scale(params);
         let radiance = self.light_curve(params.find("L"), scale)?;
         let emission = Emission { radiance, is_two_sided: params.flag("twosided").unwrap_or(false) };
         Ok(Glow { emission, power: self.power(params) })
@@ -59,19 +73,19 @@ impl Reader<'_> {
 
     pub(super) fn light(&mut self, kind: &str, params: &Params<'_>) -> Result<(), Fault> {
         if self.object.is_some() {
-            self.builder.note(format!("LightSource \"{kind}\" within an object: left out"));
+            self.builder.note_of("light sources within an object: left out", kind);
             return Ok(());
         }
         let place = self.place_m()?;
         let unit = self.metres_per_unit;
-        let scale = params.number("scale").unwrap_or(1.0);
+        let scale = self.scale(params);
         let point = |name: &str, default: [f64; 3]| DVec3::from_array(params.three(name).unwrap_or(default));
         // A file in other units means the irradiance that its own lengths give.
         let of_point = scale * unit * unit;
         let light = match kind {
             "point" | "goniometric" | "projection" => {
                 if kind != "point" {
-                    self.builder.note(format!("LightSource \"{kind}\": a point that shines alike in all directions"));
+                    self.builder.note_of("light sources that shine alike in all directions, as a point does", kind);
                 }
                 let position = place.transform_point3(point("from", [0.0; 3]));
                 let of_power = self.power(params).map_or(1.0, |power| power / (4.0 * PI));
@@ -89,7 +103,8 @@ impl Reader<'_> {
                 let solid_angle = 2.0 * PI * (1.0 - 0.5 * (inner_rad.cos() + outer_rad.cos()));
                 let of_power = self.power(params).map_or(1.0, |power| power / solid_angle);
                 let intensity = self.light_curve(params.find("I"), of_point * of_power)?;
-                Light::Spot { position, direction, intensity, inner_rad, outer_rad }
+                let fall_off = if self.version == Version::Four { FallOff::Smooth } else { FallOff::Quartic };
+                Light::Spot { position, direction, intensity, inner_rad, outer_rad, fall_off }
             }
             "distant" => {
                 let way = point("to", [0.0, 0.0, 1.0]) - point("from", [0.0; 3]);
@@ -99,14 +114,14 @@ impl Reader<'_> {
                 Light::Distant { direction, irradiance: self.light_curve(params.find("L"), scale)? }
             }
             "infinite" => match params.text("mapname").or_else(|| params.text("filename")) {
-                Some(name) => return self.sky_image(name, scale, self.illuminance(params)),
+                Some(name) => return self.sky_image(name, params, (scale, self.illuminance(params))),
                 None => {
                     let scale = scale * self.illuminance(params).map_or(1.0, |illuminance| illuminance / PI);
                     Light::Sky { radiance: self.light_curve(params.find("L"), scale)? }
                 }
             },
             _ => {
-                self.builder.note(format!("LightSource \"{kind}\": not supported, left out"));
+                self.builder.note_of("light sources that aren't supported, left out", kind);
                 return Ok(());
             }
         };
@@ -114,8 +129,13 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// Adds a picture of the sky, which puts `illuminance` on a surface that faces its +z, where that is given.
-    fn sky_image(&mut self, name: &str, scale: f64, illuminance: Option<f64>) -> Result<(), Fault> {
+    /// Adds a picture of the sky times the color `L`, which puts `illuminance` on a surface that faces its +z, where that is given.
+    fn sky_image(
+        &mut self,
+        name: &str,
+        params: &Params<'_>,
+        (scale, illuminance): (f64, Option<f64>),
+    ) -> Result<(), Fault> {
         // Of an even sky in its place.
         let of_even = scale * illuminance.map_or(1.0, |illuminance| illuminance / PI);
         let image = self.find_file(name).map(|path| ImageTexture::read(&path, Encoding::Srgb, Wrap::Repeat));
@@ -134,7 +154,22 @@ impl Reader<'_> {
                 return Ok(());
             }
         };
-        let mapping = if self.version == Version::Four { SkyMapping::EqualArea } else { SkyMapping::LatLong };
+        let (columns, rows) = image.size();
+        let mapping = match self.version {
+            Version::Four if columns != rows => {
+                self.builder.note_of(
+                    "pictures of the sky that aren't square, read as rows of equal height above the horizon",
+                    name,
+                );
+                SkyMapping::LatLong
+            }
+            Version::Four => SkyMapping::EqualArea,
+            Version::Two | Version::Three => SkyMapping::LatLong,
+        };
+        let image = match self.sky_tint(params)? {
+            Some(tint) => image.tinted(tint),
+            None => image,
+        };
         let m = self.checked_place()?.matrix3;
         let axes = [m.x_axis, m.y_axis, m.z_axis].map(DVec3::normalize);
         let is_turned = (0..3).all(|i| axes[i].dot(axes[(i + 1) % 3]).abs() < 1e-6);
@@ -149,5 +184,16 @@ impl Reader<'_> {
         }
         self.builder.add_light(Light::SkyImage(sky));
         Ok(())
+    }
+
+    /// Returns the color that `L` multiplies a picture of the sky by; a spectrum counts by its photopic mean.
+    fn sky_tint(&mut self, params: &Params<'_>) -> Result<Option<[f32; 3]>, Fault> {
+        let Some(param) = params.find("L") else { return Ok(None) };
+        if matches!(param.kind, "rgb" | "color") && param.numbers.len() == 3 {
+            return Ok(Some(std::array::from_fn(|k| param.numbers[k] as f32)));
+        }
+        let Some(curve) = self.curve(param, SpectrumUse::Light)? else { return Ok(None) };
+        self.builder.note("'L' of a picture of the sky that is a spectrum: its photopic mean multiplies the picture");
+        Ok(Some([photopic_mean(&curve)? as f32; 3]))
     }
 }

@@ -4,54 +4,53 @@ use std::sync::Arc;
 
 use super::{Fault, Reader, Version, params::Params, spectra::SpectrumUse};
 use crate::{
-    Encoding, ImageTexture, Material, MaterialId, MetalKind, Relief, Roughness, SpectralCurve, Texture, TextureId,
-    UvMapping, Wrap,
+    Encoding, ImageTexture, Material, MaterialId, MetalKind, Relief, Roughness, RoughnessLaw, SpectralCurve, Texture,
+    TextureId, UvMapping, Wrap,
 };
 
 impl Reader<'_> {
     /// Adds the material of a directive.
     pub(super) fn material(&mut self, name: &str, kind: &str, params: &Params<'_>) -> Result<MaterialId, Fault> {
         let color = |reader: &mut Self, names: &[&str], default: f32| reader.part(params, names, false, default);
+        let is_fourth = self.version == Version::Four;
         let material = match kind {
             "matte" | "diffuse" => {
-                if params.number("sigma").is_some_and(|sigma| sigma != 0.0) {
-                    self.builder.note(format!("Material \"{name}\": sigma is left out, it reflects as Lambert's law"));
-                }
-                Material::Matte { reflectance: color(self, &["Kd", "reflectance"], 0.5)? }
-            }
-            "plastic" | "substrate" | "coateddiffuse" => {
-                params.find("Ks");
-                Material::Coated {
-                    base: color(self, &["Kd", "reflectance"], if kind == "plastic" { 0.25 } else { 0.5 })?,
-                    index: self.index(params, 1.5)?,
-                    roughness: self.roughness(params, if kind == "coateddiffuse" { 0.0 } else { 0.1 })?,
+                let reflectance = color(self, &["Kd", "reflectance"], 0.5)?;
+                match params.find("sigma") {
+                    Some(sigma) if sigma.kind == "texture" || sigma.numbers.iter().any(|n| *n != 0.0) => {
+                        Material::RoughMatte { reflectance, sigma_deg: self.part(params, &["sigma"], true, 0.0)? }
+                    }
+                    _ => Material::Matte { reflectance },
                 }
             }
-            "uber" => self.uber(name, params)?,
+            "coateddiffuse" => Material::Coated {
+                base: color(self, &["reflectance"], 0.5)?,
+                index: self.index(params, 1.5)?,
+                roughness: self.roughness(params, 0.0, true)?,
+            },
+            "plastic" => self.plastic(name, params)?,
+            "substrate" => Material::Substrate {
+                base: color(self, &["Kd"], 0.5)?,
+                coat: color(self, &["Ks"], 0.5)?,
+                roughness: self.roughness(params, 0.1, false)?,
+            },
+            "uber" => return self.uber(name, params),
             "glass" | "dielectric" => {
-                params.find_any(&["Kr", "Kt"]);
-                params.find("Kt");
-                Material::Dielectric { index: self.index(params, 1.5)?, roughness: self.roughness(params, 0.0)? }
+                let (index, roughness) = (self.index(params, 1.5)?, self.roughness(params, 0.0, true)?);
+                match (self.part_if_any(params, &["Kr"], false)?, self.part_if_any(params, &["Kt"], false)?) {
+                    (None, None) => Material::Dielectric { index, roughness },
+                    (kr, kt) => {
+                        let [reflectance, transmittance] = [kr, kt].map(|k| k.unwrap_or_else(|| self.even(1.0)));
+                        Material::Glass { reflectance, transmittance, index, roughness }
+                    }
+                }
             }
-            "thindielectric" => {
-                self.builder.note(format!("Material \"{name}\": thin glass mirrors 8 % at all angles"));
-                let white = self.even(1.0);
-                let mirror = Material::Mirror { reflectance: white, roughness: None };
-                let mirror = self.builder.add_material(name, mirror);
-                let open = self.builder.add_material(name, Material::Open);
-                params.find("eta");
-                Material::Blend { of: [open, mirror], amount: self.even(0.08) }
-            }
+            "thindielectric" => Material::Pane { index: self.index(params, 1.5)? },
             "mirror" => Material::Mirror { reflectance: color(self, &["Kr"], 0.9)?, roughness: None },
             "metal" | "conductor" => self.metal(kind, params)?,
-            "translucent" => {
-                let base = color(self, &["Kd"], 0.25)?;
-                let [back, through] = ["reflect", "transmit"].map(|name| self.part(params, &[name], false, 0.5));
-                params.find("Ks");
-                let reflectance = self.builder.add_texture(Texture::Product([base, back?]));
-                let transmittance = self.builder.add_texture(Texture::Product([base, through?]));
-                Material::Translucent { reflectance, transmittance }
-            }
+            "coatedconductor" => self.coated_metal(name, params)?,
+            "disney" => self.disney(name, params)?,
+            "translucent" => self.translucent(name, params)?,
             "diffusetransmission" => Material::Translucent {
                 reflectance: color(self, &["reflectance"], 0.25)?,
                 transmittance: color(self, &["transmittance"], 0.25)?,
@@ -59,10 +58,18 @@ impl Reader<'_> {
             "mix" => self.mix(params)?,
             "" | "none" | "interface" => Material::Open,
             _ => {
-                self.builder.note(format!("Material \"{name}\" of kind '{kind}': not supported, matte in its place"));
-                Material::Matte { reflectance: color(self, &["Kd", "reflectance", "color", "basecolor"], 0.5)? }
+                let reflectance = color(self, &["Kd", "reflectance", "color", "basecolor"], 0.5)?;
+                let sentence = format!("materials of kind '{kind}': not supported, matte in their place");
+                self.builder.note_of(&sentence, name);
+                Material::Matte { reflectance }
             }
         };
+        if is_fourth && matches!(kind, "matte" | "plastic" | "uber" | "substrate" | "glass" | "translucent" | "mirror")
+        {
+            let sentence =
+                format!("materials of kind '{kind}', which pbrt's fourth version doesn't have: as its third");
+            self.builder.note_of(&sentence, name);
+        }
         let relief = self.relief(params)?;
         Ok(self.builder.add_material_with(name, material, relief))
     }
@@ -71,26 +78,118 @@ impl Reader<'_> {
         self.builder.add_texture(Texture::Curve(SpectralCurve::constant(value)))
     }
 
-    /// `uber` without mirroring is matte; else its base lies below a clear coat, which keeps energy where pbrt doesn't.
-    fn uber(&mut self, name: &str, params: &Params<'_>) -> Result<Material, Fault> {
-        let base = self.part(params, &["Kd"], false, 0.25)?;
-        let is_off = |param: &str| {
-            params
-                .find(param)
-                .is_some_and(|p| p.kind != "texture" && !p.numbers.is_empty() && p.numbers.iter().all(|n| *n == 0.0))
+    /// Lambert's base and, added to it, what a boundary mirrors by GGX. pbrt's third version takes the boundary from its
+    /// inside: from 41.8° on all is mirrored.
+    fn plastic(&mut self, name: &str, params: &Params<'_>) -> Result<Material, Fault> {
+        let reflectance = self.part(params, &["Kd"], false, 0.25)?;
+        let gloss = Material::Glossy {
+            reflectance: self.part(params, &["Ks"], false, 0.25)?,
+            index: SpectralCurve::constant(1.0 / 1.5),
+            roughness: self.roughness(params, 0.1, false)?,
         };
-        let is_matte = is_off("Ks") && (is_off("Kr") || params.find("Kr").is_none());
+        Ok(self.sum(name, vec![Material::Matte { reflectance }, gloss]))
+    }
+
+    /// Lambert's base, a rough boundary that mirrors, a smooth one that mirrors and refracts, in the share `opacity`.
+    fn uber(&mut self, name: &str, params: &Params<'_>) -> Result<MaterialId, Fault> {
         let index = self.index(params, 1.5)?;
-        let roughness = self.roughness(params, 0.1)?;
-        if is_matte {
-            return Ok(Material::Matte { reflectance: base });
+        let reflectance = self.part(params, &["Kd"], false, 0.25)?;
+        let mut terms = vec![Material::Matte { reflectance }];
+        let is_black = |params: &Params<'_>, name: &str| {
+            params.find(name).is_some_and(|p| p.kind != "texture" && p.numbers.iter().all(|n| *n == 0.0))
+        };
+        let roughness = self.roughness(params, 0.1, false)?;
+        if !is_black(params, "Ks") {
+            let reflectance = self.part(params, &["Ks"], false, 0.25)?;
+            terms.push(Material::Glossy { reflectance, index: index.clone(), roughness });
         }
-        self.builder.note(format!("Material \"{name}\": uber is a base below a clear coat of its index and roughness"));
-        Ok(Material::Coated { base, index, roughness })
+        if ["Kr", "Kt"].into_iter().any(|name| params.find(name).is_some() && !is_black(params, name)) {
+            let reflectance = self.part(params, &["Kr"], false, 0.0)?;
+            let transmittance = self.part(params, &["Kt"], false, 0.0)?;
+            terms.push(Material::Glass { reflectance, transmittance, index, roughness: None });
+        }
+        let relief = self.relief(params)?;
+        let material = self.sum(name, terms);
+        let id = self.builder.add_material_with(name, material, relief);
+        match self.part_if_any(params, &["opacity"], true)? {
+            Some(opacity) => Ok(self.builder.add_covered(id, opacity)),
+            None => Ok(id),
+        }
+    }
+
+    /// Lambert's base and a rough boundary, of both the shares that come back and go through.
+    fn translucent(&mut self, name: &str, params: &Params<'_>) -> Result<Material, Fault> {
+        let [base, gloss] = ["Kd", "Ks"].map(|name| self.part(params, &[name], false, 0.25));
+        let [back, through] = ["reflect", "transmit"].map(|name| self.part(params, &[name], false, 0.5));
+        let (base, gloss, back, through) = (base?, gloss?, back?, through?);
+        let [diffuse_back, diffuse_through, gloss_back, gloss_through] =
+            [[base, back], [base, through], [gloss, back], [gloss, through]]
+                .map(|of| self.builder.add_texture(Texture::Product(of)));
+        let diffuse = Material::Translucent { reflectance: diffuse_back, transmittance: diffuse_through };
+        let boundary = Material::Glass {
+            reflectance: gloss_back,
+            transmittance: gloss_through,
+            index: SpectralCurve::constant(1.5),
+            roughness: self.roughness(params, 0.1, false)?,
+        };
+        Ok(self.sum(name, vec![diffuse, boundary]))
+    }
+
+    /// Returns the material of all terms together.
+    fn sum(&mut self, name: &str, terms: Vec<Material>) -> Material {
+        let mut terms = terms.into_iter();
+        let first = terms.next().unwrap_or(Material::Open);
+        terms.fold(first, |sum, term| {
+            let of = [sum, term].map(|part| self.builder.add_material(name, part));
+            Material::Sum { of }
+        })
+    }
+
+    fn coated_metal(&mut self, name: &str, params: &Params<'_>) -> Result<Material, Fault> {
+        let of = |reader: &mut Self, name: &str| match params.find(name) {
+            Some(param) => reader.curve(param, SpectrumUse::Index),
+            None => Ok(None),
+        };
+        let (n, k) = (of(self, "conductor.eta")?, of(self, "conductor.k")?);
+        let copper = MetalKind::Copper.index();
+        let roughness = |reader: &mut Self, names: [&str; 2], default: f32| {
+            let part = reader.part(params, &names, true, default);
+            part.map(|roughness| reader.builder.add_texture(Texture::Alpha { roughness, by: RoughnessLaw::Root }))
+        };
+        let metal_alpha = roughness(self, ["conductor.roughness", "conductor.uroughness"], 0.0)?;
+        let coat = self.part(params, &["interface.roughness", "interface.uroughness"], true, 0.0)?;
+        let metal = match self.part_if_any(params, &["reflectance"], false)? {
+            Some(reflectance) => Material::Mirror { reflectance, roughness: Some([metal_alpha; 2]) },
+            None => {
+                let [copper_n, copper_k] = copper;
+                let (n, k) = (n.unwrap_or(copper_n), k.unwrap_or(copper_k));
+                Material::Metal { n, k, roughness: Some([metal_alpha; 2]) }
+            }
+        };
+        self.builder.note_of("materials of kind 'coatedconductor': metal below a clear coat of index 1.5", name);
+        let base = self.builder.add_material(name, metal);
+        // The coat squares the square root of α; pbrt's roughness is α², whose square root it takes.
+        let root = self.builder.add_texture(Texture::Alpha { roughness: coat, by: RoughnessLaw::Root });
+        let roughness = self.builder.add_texture(Texture::Alpha { roughness: root, by: RoughnessLaw::Root });
+        Ok(Material::Clearcoat { base, amount: self.even(1.0), roughness })
+    }
+
+    fn disney(&mut self, name: &str, params: &Params<'_>) -> Result<Material, Fault> {
+        self.builder.note_of("materials of kind 'disney': by their color, metallic, roughness and eta alone", name);
+        let index = params.number("eta").unwrap_or(1.5);
+        let mirrored = ((index - 1.0) / (index + 1.0)).powi(2);
+        Ok(Material::MetallicRoughness {
+            color: self.part(params, &["color"], false, 0.5)?,
+            metallic: self.part(params, &["metallic"], true, 0.0)?,
+            roughness: self.part(params, &["roughness"], true, 0.5)?,
+            mirrored: self.even(mirrored as f32),
+            edge: self.even(1.0),
+            transmission: None,
+        })
     }
 
     fn metal(&mut self, kind: &str, params: &Params<'_>) -> Result<Material, Fault> {
-        let roughness = self.roughness(params, if kind == "metal" { 0.01 } else { 0.0 })?;
+        let roughness = self.roughness(params, if kind == "metal" { 0.01 } else { 0.0 }, kind == "conductor")?;
         if let Some(reflectance) = self.part_if_any(params, &["reflectance"], false)? {
             return Ok(Material::Mirror { reflectance, roughness });
         }
@@ -114,7 +213,11 @@ impl Reader<'_> {
         };
         let of = |name: &&str| self.materials.get(*name).copied();
         let &[Some(a), Some(b)] = names.iter().map(of).collect::<Vec<_>>().as_slice() else {
-            return Err(format!("a mix of the materials {names:?}: expected two that were named before").into());
+            self.builder.note_of(
+                "materials of kind 'mix' of others that weren't named before, an even 0.5 in their place",
+                &names.join(" and "),
+            );
+            return Ok(Material::Matte { reflectance: self.even(0.5) });
         };
         let amount = self.part(params, &["amount"], true, 0.5)?;
         // Before the fourth version the amount is the share of the first.
@@ -128,31 +231,33 @@ impl Reader<'_> {
         if is_sound { Ok(curve) } else { Err("an index of refraction: expected 0.1 to 10".to_owned().into()) }
     }
 
-    /// Returns α along u and v; files give it directly where `remaproughness` is false.
-    fn roughness(&mut self, params: &Params<'_>, default: f64) -> Result<Roughness, Fault> {
+    /// Returns α along u and v; files give it directly where `remaproughness` is false. A roughness of 0 is a smooth
+    /// boundary where `has_smooth`, else the least that the remapping knows.
+    fn roughness(&mut self, params: &Params<'_>, default: f32, has_smooth: bool) -> Result<Roughness, Fault> {
         let is_remapped = params.flag("remaproughness").unwrap_or(true);
+        let by = match self.version {
+            Version::Four => RoughnessLaw::Root,
+            Version::Three => RoughnessLaw::LogPolynomial,
+            Version::Two => RoughnessLaw::Blinn,
+        };
         let mut alphas = Vec::with_capacity(2);
         for names in [["uroughness", "roughness"], ["vroughness", "roughness"]] {
             let param = params.find_any(&names);
             let is_texture = param.is_some_and(|param| param.kind == "texture");
             if is_texture {
-                if is_remapped {
-                    self.builder.note("a roughness by texture is α itself, not remapped");
-                }
-                alphas.push(self.part(params, &names, true, 0.0)?);
+                let roughness = self.part(params, &names, true, default)?;
+                alphas.push(match is_remapped {
+                    true => self.builder.add_texture(Texture::Alpha { roughness, by }),
+                    false => roughness,
+                });
                 continue;
             }
-            let given = param.and_then(|param| param.numbers.first().copied()).unwrap_or(default).max(0.0);
-            let alpha = match self.version {
-                _ if !is_remapped || given == 0.0 => given,
-                Version::Four => given.sqrt(),
-                Version::Two | Version::Three => {
-                    // pbrt 3, `TrowbridgeReitzDistribution::RoughnessToAlpha`.
-                    let x = given.max(1e-3).ln();
-                    1.62142 + x * (0.819_955 + x * (0.1734 + x * (0.017_120_1 + x * 0.000_640_711)))
-                }
-            };
-            alphas.push(self.even(alpha.clamp(0.0, 1.0) as f32));
+            let given = param.and_then(|param| param.numbers.first().map(|n| *n as f32)).unwrap_or(default).max(0.0);
+            let is_as_given = !is_remapped || given == 0.0 && (has_smooth || self.version == Version::Four);
+            alphas.push(self.even(if is_as_given { given.min(1.0) } else { by.alpha(given) }));
+        }
+        if self.version == Version::Two && params.find_any(&["roughness", "uroughness"]).is_some() {
+            self.builder.note("roughness of pbrt's second version: GGX of the width of Blinn's lobe");
         }
         Ok(<[TextureId; 2]>::try_from(alphas).ok())
     }
@@ -165,7 +270,7 @@ impl Reader<'_> {
         let Some(file) = params.text("normalmap") else { return Ok(None) };
         let read = self.find_file(file).map(|path| ImageTexture::read(&path, Encoding::Linear, Wrap::Repeat));
         let Some(Ok(image)) = read else {
-            self.builder.note(format!("normal map '{file}': can't be read, left out"));
+            self.builder.note_of("normal maps that can't be read, left out", file);
             return Ok(None);
         };
         let texture = Texture::Image { image: Arc::new(image), mapping: UvMapping::IDENTITY, scale: 1.0 };

@@ -9,11 +9,13 @@ mod materials;
 mod params;
 mod shapes;
 mod spectra;
+mod surfaces;
 mod textures;
 mod tokens;
 
 use std::{
     collections::HashMap,
+    io::Read,
     path::{Path, PathBuf},
 };
 
@@ -112,12 +114,22 @@ struct Reader<'c> {
     named_curves: HashMap<String, SpectralCurve>,
     objects: HashMap<String, GroupId>,
     object: Option<GroupId>,
+    /// Materials of which a part is there, by the bits of a number or the number of a texture.
+    covered: HashMap<(MaterialId, Coverage), MaterialId>,
     cancel: &'c Cancel,
+}
+
+/// How much of a shape is there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+enum Coverage {
+    Number(u32),
+    Texture(TextureId),
 }
 
 impl<'c> Reader<'c> {
     fn new(path: &Path, metres_per_unit: f64, cancel: &'c Cancel) -> Self {
         let mut builder = WorldBuilder::new();
+        builder.set_up(DVec3::Y, true);
         let half = builder.add_texture(Texture::Curve(SpectralCurve::constant(0.5)));
         let material = builder.add_material("default", Material::Matte { reflectance: half });
         let attributes = Attributes { place: DAffine3::IDENTITY, material, glow: None, is_reversed: false };
@@ -138,15 +150,17 @@ impl<'c> Reader<'c> {
             named_curves: HashMap::new(),
             objects: HashMap::new(),
             object: None,
+            covered: HashMap::new(),
             cancel,
         }
     }
 
     fn read_file(&mut self, path: &Path, depth: usize) -> Result<(), WorldError> {
-        let bytes = read_bytes(path, self.bytes_left)?;
+        self.builder.add_source(path);
+        let bytes = unpacked(path, read_bytes(path, self.bytes_left)?, self.bytes_left)?;
         self.bytes_left -= bytes.len() as u64;
         // Names and comments may be in any old encoding.
-        let text = String::from_utf8_lossy(&bytes);
+        let text = String::from_utf8_lossy(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&bytes));
         if depth == 0 && text.contains("WorldEnd") {
             self.version = Version::Three;
         }
@@ -185,8 +199,12 @@ impl<'c> Reader<'c> {
             }
             "CoordSysTransform" => {
                 let name = text(directive, tokens)?;
-                self.attributes.place =
-                    *self.places.get(name).ok_or_else(|| format!("no coordinate system has the name '{name}'"))?;
+                match self.places.get(name) {
+                    Some(place) => self.attributes.place = *place,
+                    None => {
+                        self.builder.note_of("CoordSysTransform: no such coordinate system, nothing is moved", name)
+                    }
+                }
             }
             "ActiveTransform" => {
                 if !matches!(tokens.next()?, Some((Token::Word(_), _))) {
@@ -213,7 +231,10 @@ impl<'c> Reader<'c> {
             }
             "ObjectInstance" => {
                 let name = text(directive, tokens)?;
-                let group = *self.objects.get(name).ok_or_else(|| format!("no object has the name '{name}'"))?;
+                let Some(&group) = self.objects.get(name) else {
+                    self.builder.note_of("ObjectInstance: no such object, left out", name);
+                    return Ok(());
+                };
                 if self.object.is_some() {
                     return Err("ObjectInstance within an object".to_owned().into());
                 }
@@ -225,8 +246,10 @@ impl<'c> Reader<'c> {
             "Texture" => return self.texture(tokens),
             "NamedMaterial" => {
                 let name = text(directive, tokens)?;
-                self.attributes.material =
-                    *self.materials.get(name).ok_or_else(|| format!("no material has the name '{name}'"))?;
+                match self.materials.get(name) {
+                    Some(material) => self.attributes.material = *material,
+                    None => self.builder.note_of("NamedMaterial: no such material, the one before it stands", name),
+                }
             }
             _ => return self.directive_with_params(directive, tokens),
         }
@@ -255,7 +278,10 @@ impl<'c> Reader<'c> {
         let kind = text(directive, tokens)?;
         let params = Params::read(tokens)?;
         match directive {
-            "Camera" => self.camera.set_camera(kind, &params, self.attributes.place),
+            "Camera" => {
+                self.camera.set_camera(kind, &params, self.attributes.place);
+                self.places.insert("camera".to_owned(), self.attributes.place.inverse());
+            }
             "Film" => {
                 if self.camera.set_film(&params) {
                     self.builder
@@ -278,7 +304,7 @@ impl<'c> Reader<'c> {
                 self.builder.note(format!("ColorSpace \"{kind}\": colors are taken as sRGB"));
             }
             "MakeNamedMedium" | "Volume" | "Attribute" => {
-                self.builder.note(format!("{directive} \"{kind}\": not supported, left out"));
+                self.builder.note_of(&format!("{directive}: not supported, left out"), kind);
                 return Ok(());
             }
             "SurfaceIntegrator" | "VolumeIntegrator" | "Renderer" => {
@@ -314,15 +340,17 @@ impl<'c> Reader<'c> {
         match self.find_file(name) {
             Some(path) => Ok(self.read_file(&path, depth + 1)?),
             None => {
-                self.builder.note(format!("Include \"{name}\": no such file, left out"));
+                self.builder.note_of("Include: no such file, left out", name);
                 Ok(())
             }
         }
     }
 
-    /// Returns a file that is named in the world's, beside which it is looked for.
-    fn find_file(&self, name: &str) -> Option<PathBuf> {
+    /// Returns a file that is named in the world's, beside which it is looked for; of Windows' separators either way.
+    fn find_file(&mut self, name: &str) -> Option<PathBuf> {
         let path = self.folder.join(name);
+        let path = if path.is_file() { path } else { self.folder.join(name.replace('\\', "/")) };
+        self.builder.add_source(&path);
         path.is_file().then_some(path)
     }
 
@@ -372,10 +400,14 @@ impl<'c> Reader<'c> {
                     return Err(format!("{directive}: expected 16 numbers in brackets").into());
                 }
                 let row = m.row(3);
-                if row.truncate() != DVec3::ZERO || row.w == 0.0 {
+                if row.w == 0.0 {
                     return Err(format!("{directive}: its last row is {row}, expected 0, 0, 0, 1").into());
                 }
+                if row.truncate() != DVec3::ZERO {
+                    self.builder.note(format!("{directive}: its last row, which isn't 0, 0, 0, 1, is left out"));
+                }
                 let affine = DAffine3::from_mat4(m * (1.0 / row.w));
+                let place = &mut self.attributes.place;
                 *place = if directive == "Transform" { affine } else { *place * affine };
             }
         }
@@ -397,6 +429,21 @@ impl<'c> Reader<'c> {
     fn place_m(&self) -> Result<DAffine3, Fault> {
         Ok(DAffine3::from_scale(DVec3::splat(self.metres_per_unit)) * self.checked_place()?)
     }
+}
+
+/// Returns the bytes of a file, unpacked where they are those of gzip.
+fn unpacked(path: &Path, bytes: Vec<u8>, limit: u64) -> Result<Vec<u8>, WorldError> {
+    if !bytes.starts_with(&[0x1f, 0x8b]) {
+        return Ok(bytes);
+    }
+    let unreadable = |reason: String| WorldError::Unreadable { file: path.to_owned(), reason };
+    let mut text = Vec::new();
+    let mut unpacking = flate2::read::MultiGzDecoder::new(bytes.as_slice()).take(limit + 1);
+    unpacking.read_to_end(&mut text).map_err(|e| unreadable(e.to_string()))?;
+    if text.len() as u64 > limit {
+        return Err(unreadable(format!("it unpacks to more than {limit} bytes")));
+    }
+    Ok(text)
 }
 
 fn no_begin(directive: &str) -> String {

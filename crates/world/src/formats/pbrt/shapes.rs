@@ -4,53 +4,65 @@ use std::f64::consts::PI;
 
 use glam::{DAffine3, DVec3, Vec2, Vec3};
 
-use super::{Fault, Reader, params::Params};
-use crate::{GroupId, Material, Shape, TriangleMesh, read_ply};
+use super::{Coverage, Fault, Reader, params::Params, surfaces};
+use crate::{GroupId, Material, MaterialId, Shape, SpectralCurve, Texture, TriangleMesh, read_ply};
 
 impl Reader<'_> {
     pub(super) fn shape(&mut self, kind: &str, params: &Params<'_>) -> Result<(), Fault> {
         let mut place = self.place_m()?;
         let number = |name: &str, default: f64| params.number(name).unwrap_or(default);
-        let shape = match kind {
-            "trianglemesh" => Shape::Mesh(triangles(params)?),
-            "loopsubdiv" => {
-                self.builder.note("Shape \"loopsubdiv\": its control mesh, not smoothed");
-                params.find_any(&["nlevels", "levels"]);
-                Shape::Mesh(triangles(params)?)
+        let part = surfaces::quadric(kind, params)?;
+        let is_part = part.is_some();
+        let shape = match (kind, part) {
+            (_, Some(part)) => Shape::Mesh(part),
+            ("trianglemesh", None) => Shape::Mesh(triangles(params)?),
+            ("loopsubdiv", None) => {
+                let levels = params.number_of(&["levels", "nlevels"]).unwrap_or(3.0).clamp(0.0, 10.0);
+                let control = triangles(params)?;
+                control.check().map_err(|e| e.to_string())?;
+                Shape::Mesh(surfaces::smoothed(&control, levels as u32))
             }
-            "bilinearmesh" => {
-                self.builder.note("Shape \"bilinearmesh\": two triangles a patch");
-                Shape::Mesh(patches(params)?)
+            ("bilinearmesh", None) => {
+                let mesh = patches(params)?;
+                if !are_parallelograms(&mesh) {
+                    self.builder.note("Shape \"bilinearmesh\": two triangles a patch");
+                }
+                Shape::Mesh(mesh)
             }
-            "plymesh" => {
+            ("plymesh", None) => {
                 let file = params.text("filename").ok_or("a plymesh without filename".to_owned())?;
                 match self.find_file(file) {
                     Some(path) => Shape::Mesh(read_ply(&path)?),
                     None => {
-                        self.builder.note(format!("Shape \"plymesh\": no file '{file}', left out"));
+                        self.builder.note_of("Shape \"plymesh\": no such file, left out", file);
                         return Ok(());
                     }
                 }
             }
-            "sphere" => Shape::Sphere { radius_m: number("radius", 1.0) },
-            "disk" => {
+            ("sphere", None) => Shape::Sphere { radius_m: number("radius", 1.0) },
+            ("disk", None) => {
                 place *= DAffine3::from_translation(DVec3::Z * number("height", 0.0));
                 Shape::Disc { radius_m: number("radius", 1.0), inner_radius_m: number("innerradius", 0.0) }
             }
-            "cylinder" => Shape::Cylinder {
+            ("cylinder", None) => Shape::Cylinder {
                 radius_m: number("radius", 1.0),
                 z_min_m: number("zmin", -1.0),
                 z_max_m: number("zmax", 1.0),
             },
-            _ => {
-                self.builder.note(format!("Shape \"{kind}\": not supported, left out"));
+            (_, None) => {
+                self.builder.note_of("shapes that aren't supported, left out", kind);
                 return Ok(());
             }
         };
         shape.check().map_err(|e| e.to_string())?;
         let glow = self.attributes.glow.clone();
         let emission = glow.map(|glow| {
-            let faces = FaceAreas::of(&shape, &place, if kind == "bilinearmesh" { 2 } else { 1 });
+            let triangles_a_face = match (&shape, kind) {
+                (Shape::Mesh(mesh), _) if is_part => mesh.triangles.len().max(1),
+                (_, "bilinearmesh") => 2,
+                _ => 1,
+            };
+            let faces = FaceAreas::of(&shape, &place, triangles_a_face);
             if glow.has_power() && !faces.are_alike {
                 let n = faces.n;
                 self.builder
@@ -58,16 +70,48 @@ impl Reader<'_> {
             }
             glow.of_faces(&faces.per_square_unit(self.metres_per_unit))
         });
-        let mut material = self.attributes.material;
-        if params.number("alpha") == Some(0.0) {
-            material = self.builder.add_material("open", Material::Open);
-        }
+        let material = self.material_of_shape(params, emission.is_some())?;
         let group = self.object.unwrap_or(GroupId::ROOT);
         let id = self.builder.add_shape_to(group, shape, place, material, emission);
         if self.attributes.is_reversed {
             self.builder.reverse(id);
         }
         Ok(())
+    }
+}
+
+impl Reader<'_> {
+    /// Returns the current material, of which so much is there as the shape's alpha says.
+    fn material_of_shape(&mut self, params: &Params<'_>, glows: bool) -> Result<MaterialId, Fault> {
+        let material = self.attributes.material;
+        if params.find("shadowalpha").is_some() {
+            self.builder.note("'shadowalpha' of shapes: shadows are those of 'alpha'");
+        }
+        let Some(param) = params.find("alpha") else { return Ok(material) };
+        let coverage = match (param.kind, param.numbers.first()) {
+            ("texture", _) => match self.part_if_any(params, &["alpha"], true)? {
+                Some(texture) => Coverage::Texture(texture),
+                None => return Ok(material),
+            },
+            (_, Some(number)) if *number >= 1.0 => return Ok(material),
+            // A lamp that isn't seen.
+            (_, Some(number)) if *number <= 0.0 && glows => {
+                return Ok(self.builder.add_material("open", Material::Open));
+            }
+            (_, number) => Coverage::Number((number.copied().unwrap_or(1.0) as f32).to_bits()),
+        };
+        if let Some(known) = self.covered.get(&(material, coverage)) {
+            return Ok(*known);
+        }
+        let texture = match coverage {
+            Coverage::Texture(texture) => texture,
+            Coverage::Number(bits) => {
+                self.builder.add_texture(Texture::Curve(SpectralCurve::constant(f32::from_bits(bits))))
+            }
+        };
+        let partly = self.builder.add_covered(material, texture);
+        self.covered.insert((material, coverage), partly);
+        Ok(partly)
     }
 }
 
@@ -147,12 +191,21 @@ fn mesh<const N: usize>(params: &Params<'_>) -> Result<(TriangleMesh, Vec<[u32; 
         }
         faces.push(corners);
     }
-    Ok((TriangleMesh { positions, normals, uvs, triangles: Vec::new() }, faces))
+    Ok((TriangleMesh { positions, normals, uvs, ..TriangleMesh::default() }, faces))
 }
 
 fn triangles(params: &Params<'_>) -> Result<TriangleMesh, Fault> {
     let (mesh, triangles) = mesh::<3>(params)?;
     Ok(TriangleMesh { triangles, ..mesh })
+}
+
+/// Whether two triangles each are the patches that a mesh was made from.
+fn are_parallelograms(mesh: &TriangleMesh) -> bool {
+    mesh.triangles.chunks_exact(2).all(|pair| {
+        let [a, b, d] = pair[0].map(|v| mesh.positions[v as usize]);
+        let c = mesh.positions[pair[1][2] as usize];
+        (a + d - b - c).length() <= 1e-5 * (b - c).length()
+    })
 }
 
 /// Patches have their corners row by row: (0, 0), (1, 0), (0, 1), (1, 1).

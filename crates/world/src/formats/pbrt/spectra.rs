@@ -49,8 +49,8 @@ impl Reader<'_> {
                 return self.named_curve(name, beyond);
             }
             kind => {
-                let name = param.name;
-                self.builder.note(format!("parameter '{name}' of type '{kind}': not supported, its default stands"));
+                let sentence = format!("parameters of type '{kind}': not supported, their defaults stand");
+                self.builder.note_of(&sentence, param.name);
                 return Ok(None);
             }
         }))
@@ -71,7 +71,7 @@ impl Reader<'_> {
                 SpectralCurve::new(&spectrum, beyond)
             }
             (None, None) => {
-                self.builder.note(format!("spectrum \"{name}\": neither a known name nor a file, its default stands"));
+                self.builder.note_of("spectra that are neither a known name nor a file, their defaults stand", name);
                 return Ok(None);
             }
         };
@@ -91,13 +91,18 @@ impl Reader<'_> {
             return Ok(curve.scaled(scale as f32));
         }
         // The fourth version scales every spectrum of a light so that its mean weighted by the photopic sensitivity is 1.
-        let grid = WavelengthGrid::uniform(360.0, 830.0, 1.0).map_err(|e| e.to_string())?;
-        let sensitivity = &Observer::Cie1931.weights(&grid)[1];
-        let weighted: f64 =
-            grid.centers_nm().iter().zip(sensitivity).map(|(&w, y)| y * f64::from(curve.at(&[w as f32])[0])).sum();
-        let mean = weighted / sensitivity.iter().sum::<f64>();
+        let mean = photopic_mean(&curve)?;
         Ok(curve.scaled(if mean > 0.0 { (scale / mean) as f32 } else { 0.0 }))
     }
+}
+
+/// Returns the mean of a curve weighted by the photopic sensitivity.
+pub(super) fn photopic_mean(curve: &SpectralCurve) -> Result<f64, String> {
+    let grid = WavelengthGrid::uniform(360.0, 830.0, 1.0).map_err(|e| e.to_string())?;
+    let sensitivity = &Observer::Cie1931.weights(&grid)[1];
+    let weighted: f64 =
+        grid.centers_nm().iter().zip(sensitivity).map(|(&w, y)| y * f64::from(curve.at(&[w as f32])[0])).sum();
+    Ok(weighted / sensitivity.iter().sum::<f64>())
 }
 
 fn knots(numbers: &[f64]) -> Result<Spectrum, String> {

@@ -2,10 +2,12 @@
 
 use std::{path::PathBuf, sync::Arc};
 
-use glam::Vec2;
+use glam::{Affine3A, DAffine3, DMat3, DMat4, DVec3, Vec2, Vec3};
 
 use super::{Fault, Reader, Version, params::Params, spectra::SpectrumUse, text, tokens::Tokens};
-use crate::{Encoding, ImageTexture, SpectralCurve, Texture, TextureId, UvMapping, Wrap};
+use crate::{
+    Coordinates, Encoding, ImageTexture, NoiseKind, Pattern, SpectralCurve, Texture, TextureId, UvMapping, Wrap,
+};
 
 impl Reader<'_> {
     pub(super) fn texture(&mut self, tokens: &mut Tokens<'_>) -> Result<(), Fault> {
@@ -30,17 +32,62 @@ impl Reader<'_> {
             "checkerboard" => {
                 let a = self.part(&params, &["tex1"], is_number, 1.0)?;
                 let b = self.part(&params, &["tex2"], is_number, 0.0)?;
-                Texture::Checkerboard { fields: [a, b], mapping: self.mapping(name, &params) }
+                match params.number("dimension") {
+                    Some(3.0) => pattern(Pattern::Blocks { of: [a, b], frame: self.texture_from_world()? }),
+                    _ => Texture::Checkerboard { fields: [a, b], mapping: self.mapping(name, &params)? },
+                }
+            }
+            "dots" => {
+                let inside = self.part(&params, &["inside"], is_number, 1.0)?;
+                let outside = self.part(&params, &["outside"], is_number, 0.0)?;
+                pattern(Pattern::Dots { of: [inside, outside], mapping: self.mapping(name, &params)? })
+            }
+            "bilerp" => {
+                let mut of = Vec::with_capacity(4);
+                for (corner, default) in [("v00", 0.0), ("v01", 1.0), ("v10", 0.0), ("v11", 1.0)] {
+                    of.push(self.part(&params, &[corner], is_number, default)?);
+                }
+                let of = <[TextureId; 4]>::try_from(of).map_err(|_| "a bilerp has four corners".to_owned())?;
+                pattern(Pattern::Corners { of, mapping: self.mapping(name, &params)? })
+            }
+            "uv" => pattern(Pattern::Coordinates { mapping: self.mapping(name, &params)? }),
+            "fbm" | "wrinkled" | "windy" | "marble" => {
+                let octaves = params.number("octaves").unwrap_or(8.0).clamp(0.0, 32.0) as u32;
+                let roughness = params.number("roughness").unwrap_or(0.5) as f32;
+                let frame = self.texture_from_world()?;
+                let kind = match kind {
+                    "fbm" => NoiseKind::Fbm,
+                    "wrinkled" => NoiseKind::Wrinkled,
+                    "windy" => NoiseKind::Windy,
+                    _ => {
+                        let scale = params.number("scale").unwrap_or(1.0) as f32;
+                        let variation = params.number("variation").unwrap_or(0.2) as f32;
+                        let frame = Affine3A::from_scale(Vec3::splat(scale)) * frame;
+                        let marble = Pattern::Marble { octaves, roughness, variation, frame };
+                        return self.add_named_texture(name, is_number, pattern(marble), &params);
+                    }
+                };
+                pattern(Pattern::Noise { kind, octaves, roughness, frame })
             }
             _ => {
-                self.builder
-                    .note(format!("Texture \"{name}\" of kind '{kind}': not supported, an even 0.5 in its place"));
+                let sentence = format!("textures of kind '{kind}': not supported, an even 0.5 in their place");
+                self.builder.note_of(&sentence, name);
                 Texture::Curve(SpectralCurve::constant(0.5))
             }
         };
+        self.add_named_texture(name, is_number, texture, &params)
+    }
+
+    fn add_named_texture(
+        &mut self,
+        name: &str,
+        is_number: bool,
+        texture: Texture,
+        params: &Params<'_>,
+    ) -> Result<(), Fault> {
         let unused = params.unused();
         if !unused.is_empty() {
-            self.builder.note(format!("Texture \"{name}\": not supported and left out: {}", unused.join(", ")));
+            self.builder.note(format!("Texture: not supported and left out: {}", unused.join(", ")));
         }
         let id = self.builder.add_texture(texture);
         let textures = if is_number { &mut self.number_textures } else { &mut self.spectrum_textures };
@@ -78,7 +125,7 @@ impl Reader<'_> {
         };
         let found = first.get(name).or_else(|| second.get(name)).copied();
         if found.is_none() {
-            return Err(format!("the parameter '{}': no texture has the name '{name}'", param.name).into());
+            self.builder.note_of("textures that are named and not there, the defaults of their parameters stand", name);
         }
         Ok(found)
     }
@@ -110,35 +157,80 @@ impl Reader<'_> {
             }
             (None, None) => Encoding::Srgb,
         };
-        let mapping = self.mapping(name, params);
+        let mapping = self.mapping(name, params)?;
         let scale = params.number("scale").unwrap_or(1.0) as f32;
         params.find("trilinear");
         params.find("maxanisotropy");
         params.find("filter");
+        let is_inverted = params.flag("invert").unwrap_or(false);
         match ImageTexture::read(&path, gamma, wrap) {
-            Ok(image) => Ok(Texture::Image { image: Arc::new(image), mapping, scale }),
-            Err(error) => {
-                let what = if file.is_empty() { "no file is named".to_owned() } else { error.to_string() };
-                self.builder.note(format!("Texture \"{name}\": {what}; an even 0.5 in its place"));
+            Ok(image) => {
+                let picture = Texture::Image { image: Arc::new(image), mapping, scale };
+                if !is_inverted {
+                    return Ok(picture);
+                }
+                let amount = self.builder.add_texture(picture);
+                let [one, zero] =
+                    [1.0, 0.0].map(|v| self.builder.add_texture(Texture::Curve(SpectralCurve::constant(v))));
+                self.builder.note_of("pictures that are inverted: without color", name);
+                Ok(Texture::Blend { of: [one, zero], amount })
+            }
+            Err(_) => {
+                let what = match (file.is_empty(), path.is_file()) {
+                    (true, _) => "textures that name no file, an even 0.5 in their place",
+                    (_, false) => "pictures that aren't there, an even 0.5 in their place",
+                    (_, true) => "pictures that can't be read, an even 0.5 in their place",
+                };
+                self.builder.note_of(what, if file.is_empty() { name } else { file });
                 Ok(Texture::Curve(SpectralCurve::constant(0.5)))
             }
         }
     }
 
+    /// Returns the way from the world, m, to the frame in which a texture is written.
+    fn texture_from_world(&self) -> Result<Affine3A, Fault> {
+        Ok(Affine3A::from_mat4(DMat4::from(self.place_m()?.inverse()).as_mat4()))
+    }
+
     /// Returns the mapping of a texture, v upwards; the second version's v runs down the picture.
-    fn mapping(&mut self, name: &str, params: &Params<'_>) -> UvMapping {
-        match params.text("mapping") {
-            None | Some("uv") => {}
-            Some(other) => {
-                self.builder.note(format!("Texture \"{name}\": mapping '{other}' isn't supported, it follows u and v"));
+    fn mapping(&mut self, name: &str, params: &Params<'_>) -> Result<UvMapping, Fault> {
+        let from = match params.text("mapping") {
+            None | Some("uv") => None,
+            Some("spherical") => Some(Coordinates::Sphere(self.texture_from_world()?)),
+            Some("cylindrical") => Some(Coordinates::Cylinder(self.texture_from_world()?)),
+            Some("planar") => {
+                let row = |name: &str, default: [f64; 3]| DVec3::from_array(params.three(name).unwrap_or(default));
+                let (u, v) = (row("v1", [1.0, 0.0, 0.0]), row("v2", [0.0, 1.0, 0.0]));
+                // Rows u and v of a frame; pbrt takes the points in the world, its fourth version in the texture's frame.
+                let rows = DMat3::from_cols(u, v, DVec3::Z).transpose();
+                let offset =
+                    DVec3::new(params.number("udelta").unwrap_or(0.0), params.number("vdelta").unwrap_or(0.0), 0.0);
+                let of_file = match self.version {
+                    Version::Four => self.place_m()?.inverse(),
+                    _ => DAffine3::from_scale(DVec3::splat(self.metres_per_unit)).inverse(),
+                };
+                let frame = DAffine3 { matrix3: rows, translation: offset } * of_file;
+                Some(Coordinates::Plane(Affine3A::from_mat4(DMat4::from(frame).as_mat4())))
             }
+            Some(other) => {
+                self.builder
+                    .note_of(&format!("textures of mapping '{other}': not supported, they follow u and v"), name);
+                None
+            }
+        };
+        if let Some(from) = from {
+            return Ok(UvMapping { from, ..UvMapping::IDENTITY });
         }
         let of = |names: &[&str], default| params.number_of(names).unwrap_or(default) as f32;
         let scale = Vec2::new(of(&["uscale", "su"], 1.0), of(&["vscale", "sv"], 1.0));
         let offset = Vec2::new(of(&["udelta", "du"], 0.0), of(&["vdelta", "dv"], 0.0));
         if self.version == Version::Two {
-            return UvMapping::scaled(Vec2::new(scale.x, -scale.y), Vec2::new(offset.x, 1.0 - offset.y));
+            return Ok(UvMapping::scaled(Vec2::new(scale.x, -scale.y), Vec2::new(offset.x, 1.0 - offset.y)));
         }
-        UvMapping::scaled(scale, offset)
+        Ok(UvMapping::scaled(scale, offset))
     }
+}
+
+fn pattern(pattern: Pattern) -> Texture {
+    Texture::Pattern(Box::new(pattern))
 }

@@ -1,0 +1,70 @@
+//! `dioptric world`: what the file of a world holds.
+
+use std::fmt::Write;
+
+use dioptric_pipeline::{Camera, KeptCamera, SceneSource, SceneSpec, Silent, WorldSpec, WorldSummary};
+use dioptric_spectrum::Cancel;
+
+use crate::{
+    args::Common,
+    render_args::WorldCommand,
+    terminal::{print, print_json},
+};
+
+/// So many materials are named.
+const MOST_NAMED: usize = 24;
+
+pub(crate) fn run(command: &WorldCommand, common: &Common) -> anyhow::Result<()> {
+    let WorldCommand::Info { world, unit_m } = command;
+    let spec = WorldSpec { unit_m: *unit_m, ..WorldSpec::of_file(world.clone()) };
+    let mut camera = Camera::demo()?;
+    camera.scene = SceneSpec { source: SceneSource::World(spec.clone()), ..SceneSpec::of_file(world.clone()) };
+    let read = KeptCamera::new(camera).world(&Silent, &Cancel::new())?;
+    let summary = WorldSummary::of(&read, &spec);
+    if common.json {
+        return print_json(&summary);
+    }
+    print(&table(&summary)?)
+}
+
+fn table(summary: &WorldSummary) -> Result<String, std::fmt::Error> {
+    let mut text = String::new();
+    writeln!(text, "{}", summary.file.display())?;
+    let point = |p: [f64; 3]| format!("{:.4}, {:.4}, {:.4}", p[0], p[1], p[2]);
+    match summary.bounds_m {
+        Some([low, high]) => {
+            let size: Vec<String> = (0..3).map(|k| format!("{:.4}", high[k] - low[k])).collect();
+            writeln!(text, "size       {} m, from {} to {}", size.join(" × "), point(low), point(high))?;
+        }
+        None => writeln!(text, "size       nothing in it has an extent")?,
+    }
+    writeln!(text, "unit       {} m; up is {}", summary.unit_m, point(summary.up))?;
+    writeln!(text, "shapes     {} triangles and other primitives", summary.n_primitives)?;
+    writeln!(text, "lights     {}", summary.n_lights)?;
+    let named: Vec<&str> = summary.materials.iter().take(MOST_NAMED).map(String::as_str).collect();
+    let more = summary.materials.len().saturating_sub(MOST_NAMED);
+    let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+    writeln!(text, "materials  {}{more}", named.join(", "))?;
+    if summary.cameras.is_empty() {
+        writeln!(text, "cameras    none: the whole is seen, or what --eye and --look-at say")?;
+    }
+    for (index, camera) in summary.cameras.iter().enumerate() {
+        let fov = camera.horizontal_fov_deg.map_or_else(String::new, |deg| format!(", {deg:.1}° wide"));
+        writeln!(
+            text,
+            "camera {:<3} '{}': {}{fov}, {} × {} pixels, at {} towards {}",
+            index + 1,
+            camera.name,
+            camera.kind,
+            camera.size.0,
+            camera.size.1,
+            point(camera.eye_m),
+            point(camera.forward)
+        )?;
+    }
+    writeln!(text, "files      {}", summary.sources.len())?;
+    for note in &summary.notes {
+        writeln!(text, "note: {note}")?;
+    }
+    Ok(text)
+}

@@ -1,0 +1,190 @@
+use base64::prelude::BASE64_STANDARD;
+use glam::Vec3;
+
+use super::*;
+use crate::{Ray, World};
+
+/// A triangle 5 m before a camera, red, in two files that differ in how much they promise.
+fn file(count: &str, indices: usize) -> String {
+    let floats = [0.0_f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0].into_iter().flat_map(f32::to_le_bytes);
+    let bytes: Vec<u8> = floats.chain([0, 0, 1, 0, 2, 0]).collect();
+    let base64 = BASE64_STANDARD.encode(bytes);
+    format!(
+        r#"{{"asset":{{"version":"2.0"}},"extensionsUsed":["KHR_lights_punctual"],
+        "extensions":{{"KHR_lights_punctual":{{"lights":[{{"type":"point","intensity":683}}]}}}},
+        "scene":0,"scenes":[{{"nodes":[0,1]}}],
+        "nodes":[{{"mesh":0,"translation":[0,0,-3]}},
+                 {{"camera":0,"translation":[0,0,2],"extensions":{{"KHR_lights_punctual":{{"light":0}}}}}}],
+        "cameras":[{{"type":"perspective","perspective":{{"yfov":0.5,"znear":0.1,"aspectRatio":2}}}}],
+        "materials":[{{"name":"red","pbrMetallicRoughness":{{"baseColorFactor":[1,0,0,1],"metallicFactor":0}},
+                       "emissiveFactor":[0,0,1]}}],
+        "meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}},"indices":1,"material":0}}]}}],
+        "accessors":[{{"bufferView":0,"componentType":5126,"count":{count},"type":"VEC3","min":[0,0,0],"max":[1,1,0]}},
+                     {{"bufferView":1,"componentType":5123,"count":{indices},"type":"SCALAR"}}],
+        "bufferViews":[{{"buffer":0,"byteLength":36}},{{"buffer":0,"byteOffset":36,"byteLength":6}}],
+        "buffers":[{{"byteLength":42,"uri":"data:application/octet-stream;base64,{base64}"}}]}}"#
+    )
+}
+
+fn read_text(text: &str) -> Result<World, WorldError> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("world.gltf");
+    std::fs::write(&path, text).unwrap();
+    crate::read_world(&path, &crate::ReadOptions::default(), &Cancel::new())
+}
+
+fn seen(world: &World, [x, y]: [f32; 2]) -> crate::Hit {
+    let ray = Ray { origin: Vec3::new(x, y, 2.0), direction: Vec3::NEG_Z };
+    world.intersect(&ray, f32::INFINITY).expect("a surface ahead")
+}
+
+#[test]
+fn triangle_camera_and_light_are_read() {
+    let world = read_text(&file("3", 3)).unwrap();
+    let camera = &world.cameras()[0];
+    assert_eq!(camera.resolution, (960, 480));
+    let forwards = camera.world_from_camera.transform_vector3(DVec3::Z).as_vec3();
+    let origin = camera.world_from_camera.translation.as_vec3() + Vec3::new(0.2, 0.2, 0.0);
+    let hit = world.intersect(&Ray { origin, direction: forwards }, f32::INFINITY).unwrap();
+    // One rounding of an f32.
+    assert!((hit.distance_m - 5.0).abs() <= 5.0 * f32::EPSILON, "{}", hit.distance_m);
+    let albedo = world.bsdf(&hit, -forwards, &[450.0, 650.0]).albedo();
+    assert!(albedo[1] > 0.6 && albedo[0] < 0.2, "{albedo:?}");
+    assert!(world.emission(&hit, -forwards, &[450.0])[0] > 0.1);
+    assert_eq!(world.n_lights(), 2);
+}
+
+#[test]
+fn ranges_beyond_a_buffer_are_refused() {
+    assert!(read_text(&file("3", 4)).unwrap_err().to_string().contains("accessor 1"));
+    assert!(read_text(&file("4000000000", 3)).unwrap_err().to_string().contains("accessor 0"));
+    let no_accessor = file("3", 3).replace("\"POSITION\":0", "\"POSITION\":9");
+    assert!(read_text(&no_accessor).unwrap_err().to_string().contains("accessor 9 is named, of which there are 2"));
+    assert!(read_text("{}").unwrap_err().to_string().contains("expected 2.0"));
+    assert!(read_text("{\n\"asset\": }").unwrap_err().to_string().contains("line 2"));
+    let draco = file("3", 3).replace("\"scene\":0", r#""scene":0,"extensionsRequired":["KHR_draco_mesh_compression"]"#);
+    assert!(read_text(&draco).unwrap_err().to_string().contains("KHR_draco_mesh_compression"));
+}
+
+#[test]
+fn unknown_words_are_noted_once() {
+    let text = file("3", 3).replace("\"material\":0}", "\"material\":0,\"colour\":1}");
+    let text = text.replace("\"name\":\"red\"", r#""name":"red","shine":3,"extensions":{"VENDOR_shine":{}}"#);
+    let notes = read_text(&text).unwrap().notes().join("\n");
+    assert!(notes.contains("materials.shine") && notes.contains("meshes.primitives.colour"), "{notes}");
+    assert!(notes.contains("VENDOR_shine"), "{notes}");
+}
+
+/// The words of a file that change no picture aren't told.
+#[test]
+fn a_plain_file_has_nothing_to_tell() {
+    let plain = file("3", 3).replace("\"emissiveFactor\":[0,0,1]", "\"extras\":{\"x\":1}");
+    assert_eq!(read_text(&plain).unwrap().notes(), [""; 0]);
+}
+
+fn strip(mode: u64, n: u32) -> Vec<[u32; 3]> {
+    let indices: Vec<u32> = (0..n).collect();
+    meshes::triangles(mode, &indices)
+}
+
+#[test]
+fn strips_and_fans_are_triangles() {
+    assert_eq!(strip(5, 5), [[0, 1, 2], [2, 1, 3], [2, 3, 4]]);
+    assert_eq!(strip(6, 5), [[0, 1, 2], [0, 2, 3], [0, 3, 4]]);
+    assert_eq!(strip(4, 7), [[0, 1, 2], [3, 4, 5]]);
+}
+
+#[test]
+fn escapes_of_names_are_undone() {
+    assert_eq!(unescaped("a%20b%C3%BC%zz.png"), "a bü%zz.png");
+}
+
+/// Inputs that went wrong, each with the value that is right.
+mod shared {
+    use std::path::Path;
+
+    use super::*;
+
+    fn read(name: &str) -> World {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/inputs/world").join(name);
+        crate::read_world(&path, &crate::ReadOptions::default(), &Cancel::new()).unwrap_or_else(|e| panic!("{e}"))
+    }
+
+    fn albedo(world: &World, at: [f32; 2]) -> [f32; 3] {
+        world.bsdf(&seen(world, at), Vec3::Z, &[450.0, 550.0, 640.0]).albedo()
+    }
+
+    /// Whether a color is red, green, blue or yellow, as the fields of `quad.png`.
+    fn color([blue, green, red]: [f32; 3]) -> &'static str {
+        match [blue, green, red].map(|v| v > 0.5) {
+            [false, false, true] => "red",
+            [false, true, false] => "green",
+            [true, false, false] => "blue",
+            [false, true, true] => "yellow",
+            _ => "another",
+        }
+    }
+
+    fn fields(world: &World) -> [&'static str; 4] {
+        [[-0.5, 0.5], [0.5, 0.5], [-0.5, -0.5], [0.5, -0.5]].map(|at| color(albedo(world, at)))
+    }
+
+    #[dioptric_golden::needs_shared]
+    #[test]
+    fn pictures_lie_where_the_file_says() {
+        let quad = ["red", "green", "blue", "yellow"];
+        assert_eq!(fields(&read("01_glb_embedded.glb")), quad);
+        // The second coordinates see a corner of the picture.
+        assert_eq!(fields(&read("05_texcoord1.gltf")), ["red"; 4]);
+        // Beyond its edges a clamped picture goes on with the colors there.
+        let clamped = read("19_wrap_clamp3.gltf");
+        assert_eq!(fields(&clamped), quad);
+        assert_eq!([[-0.95, 0.95], [0.95, -0.95]].map(|at| color(albedo(&clamped, at))), ["red", "yellow"]);
+    }
+
+    #[dioptric_golden::needs_shared]
+    #[test]
+    fn glow_follows_its_picture() {
+        let world = read("02_emissive_texture.gltf");
+        let glow = |x: f32| world.emission(&seen(&world, [x, 0.3]), Vec3::Z, &[550.0])[0];
+        let (one, other) = (glow(-0.5), glow(0.5));
+        assert!(one.min(other) < 1e-3 && one.max(other) > 0.5, "{one} {other}");
+        // Lights that are drawn have the same radiance as those that are met.
+        let mut found = [0, 0];
+        for i in 0..256 {
+            let u = [(i % 16) as f32 / 16.0 + 0.03, (i / 16) as f32 / 16.0 + 0.03];
+            let Some(light) = world.sample_light(Vec3::new(0.0, 0.0, 1.0), 0.5, u, &[550.0]) else { continue };
+            let at = Vec3::Z + light.distance_m * light.direction;
+            let met = world.emission(&seen(&world, [at.x, at.y]), Vec3::Z, &[550.0])[0];
+            assert!((light.radiance[0] - met).abs() < 1e-3, "{} {met} at {at}", light.radiance[0]);
+            found[usize::from(met > 0.5)] += 1;
+        }
+        assert!(found.iter().all(|n| *n > 50), "{found:?}");
+    }
+
+    /// Roughness in green, metal in blue: the plastic half reflects its base, and is no mirror.
+    #[dioptric_golden::needs_shared]
+    #[test]
+    fn metal_and_roughness_follow_their_picture() {
+        let world = read("08_metal_texture.gltf");
+        let mirrors = |x: f32| {
+            let bsdf = world.bsdf(&seen(&world, [x, 0.3]), Vec3::Z, &[550.0]);
+            // Far from the mirror direction only a diffuse base gives light back.
+            let aside = Vec3::new(0.9, 0.0, 0.435_89);
+            std::f32::consts::PI * bsdf.eval(aside)[0] / aside.z
+        };
+        let (left, right) = (mirrors(-0.5), mirrors(0.5));
+        // White plastic on the left, rough metal on the right.
+        assert!(left > 0.8 && right < 0.6, "{left} {right}");
+    }
+
+    /// The node of a skinned mesh, 10 m away, is of no account: its joint stands at the origin.
+    #[dioptric_golden::needs_shared]
+    #[test]
+    fn skins_hang_on_their_joints() {
+        let (low, high) = read("16_skin.gltf").bounds().unwrap();
+        assert!(
+            low.abs_diff_eq(DVec3::new(-1.0, -1.0, 0.0), 1e-4) && high.abs_diff_eq(DVec3::new(1.0, 1.0, 0.0), 1e-4)
+        );
+    }
+}
