@@ -24,6 +24,7 @@ mod progress;
 mod quality;
 mod ranges;
 mod schema;
+mod scene_files;
 mod sense;
 mod shown;
 mod stages;
@@ -36,7 +37,9 @@ pub use ndarray;
 pub use dioptric_backward::{BandSampling, LightPaths, MicroArray, MicroElements, MicroLayout, Renderer, Rendering};
 pub use dioptric_optics::{GlassRange, MissingGlass, SeqNumbers, SurfaceChange};
 pub use dioptric_psf::Diffraction;
-pub use dioptric_scene::{ExrSamples, FillDepth};
+pub use dioptric_scene::{
+    DepthKind, ExrSamples, FileQuantity, FileReading, FillDepth, NoData, may_be_read_with as may_be_read_with_scene,
+};
 
 pub use camera::{
     BankData, BankSpec, BlurSpec, Camera, CameraTurn, Crop, DualPixelSpec, Exposed, FilmSpec, FilterSpec, FlatSize,
@@ -60,6 +63,7 @@ pub use ranges::{Range, range_of};
 #[cfg(feature = "schema")]
 pub use schema::generated_schemas;
 pub use schema::{CAMERA_SCHEMA, CAMERA_TEMPLATE, SENSOR_SCHEMA};
+pub use scene_files::{SceneInfo, SceneRequest};
 pub use sense::{SenseRequest, Sensed};
 pub use shown::{ShowRequest, ShownPicture, open_display};
 pub use stages::{

@@ -172,6 +172,7 @@ impl Irradiance {
             pitch_um: Some(self.pitch_um),
             depth: None,
             view: None,
+            light: None,
             largest: self.summary.max.iter().fold(0.0, |a, &b| a.max(b as f32)),
             samples,
             at_once_bytes: STRIP_BYTES,

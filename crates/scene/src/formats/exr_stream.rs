@@ -26,7 +26,7 @@ use super::{
     exr_samples::{ExrSamples, Stored, check_size},
     unusable::{open_new, unwritable},
 };
-use crate::{SceneError, View};
+use crate::{SceneError, SceneLight, View};
 
 /// What is known of a spectral image before its samples.
 #[derive(Clone, Copy, Debug)]
@@ -43,6 +43,8 @@ pub struct SpectralHead<'a> {
     pub depth: Option<&'a DepthMap>,
     /// Pinhole geometry, written as attributes.
     pub view: Option<View>,
+    /// The light on the scene, written as an attribute.
+    pub light: Option<&'a SceneLight>,
     /// The largest sample of all bands, which half floats are fitted to.
     pub largest: f32,
     /// How samples are stored.
@@ -123,7 +125,7 @@ impl Channels {
         let channel = |(name, content): &(String, Content)| ChannelDescription::named(name.as_str(), kind_of(*content));
         let channels = self.by_name.iter().map(channel).collect();
         let mut attributes = LayerAttributes::default();
-        exr_attributes::add_to(&mut attributes, stored.unit.text.as_deref(), head.pitch_um, head.view);
+        exr_attributes::add_to(&mut attributes, stored.unit.text.as_deref(), head.pitch_um, head.view, head.light);
         let (rows, columns) = head.size;
         let header = Header::new(Text::from("bands"), Vec2(columns, rows), channels)
             .with_attributes(attributes)
