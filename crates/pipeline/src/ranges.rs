@@ -57,6 +57,8 @@ const RANGES: &[(Range, &[&str])] = &[
     (or_infinite(1e-6, 1e12, "mm"), &["distance_mm", "DistanceMm", "focus_mm", "distances_mm"]),
     (of(1e-12, 1e12, ""), &["white_level"]),
     (of(1e-30, 1e30, ""), &["scale"]),
+    (of(1.0, 65_536.0, "samples"), &["bin"]),
+    (of(0.0, 270.0, "degrees"), &["rotate_deg"]),
     (of(1e-6, 1e6, "m"), &["baseline_m"]),
     (of(-1e6, 1e6, "samples"), &["offset_px"]),
     (of(1e-9, 1e9, "lux"), &["illuminance_lux"]),
