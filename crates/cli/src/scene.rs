@@ -149,17 +149,23 @@ fn rows(info: &SceneInfo) -> Vec<(&'static str, String)> {
         },
     );
     rows.push(("light", light));
-    rows.push(("depth", match (info.depth_m, info.sky_fraction) {
-        (Some([near, far]), Some(sky)) => format!("{near:.4} to {far:.4} m, {:.1} % infinitely far", 100.0 * sky),
-        _ => "none".to_owned(),
-    }));
-    rows.push(("view", match (info.view, info.field_of_view_deg) {
-        (Some(view), Some(fov)) => format!(
-            "{fov:.3}° wide, focal length {:.3} samples, axis at column {:.3}, row {:.3}",
-            view.focal_px, view.center_x_px, view.center_y_px
-        ),
-        _ => "none".to_owned(),
-    }));
+    rows.push((
+        "depth",
+        match (info.depth_m, info.sky_fraction) {
+            (Some([near, far]), Some(sky)) => format!("{near:.4} to {far:.4} m, {:.1} % infinitely far", 100.0 * sky),
+            _ => "none".to_owned(),
+        },
+    ));
+    rows.push((
+        "view",
+        match (info.view, info.field_of_view_deg) {
+            (Some(view), Some(fov)) => format!(
+                "{fov:.3}° wide, focal length {:.3} samples, axis at column {:.3}, row {:.3}",
+                view.focal_px, view.center_x_px, view.center_y_px
+            ),
+            _ => "none".to_owned(),
+        },
+    ));
     if info.has_hidden_layer {
         rows.push(("hidden layer", "yes".to_owned()));
     }

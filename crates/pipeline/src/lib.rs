@@ -23,8 +23,8 @@ mod paintings;
 mod progress;
 mod quality;
 mod ranges;
-mod schema;
 mod scene_files;
+mod schema;
 mod sense;
 mod shown;
 mod stages;
@@ -60,10 +60,10 @@ pub use paintings::{PaintingFolder, program_build};
 pub use progress::{Clock, ImagingTimes, Progress, Silent, Stage};
 pub use quality::Quality;
 pub use ranges::{Range, range_of};
+pub use scene_files::{SceneInfo, SceneRequest};
 #[cfg(feature = "schema")]
 pub use schema::generated_schemas;
 pub use schema::{CAMERA_SCHEMA, CAMERA_TEMPLATE, SENSOR_SCHEMA};
-pub use scene_files::{SceneInfo, SceneRequest};
 pub use sense::{SenseRequest, Sensed};
 pub use shown::{ShowRequest, ShownPicture, open_display};
 pub use stages::{

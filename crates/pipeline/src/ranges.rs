@@ -64,7 +64,10 @@ const RANGES: &[(Range, &[&str])] = &[
     (of(1e-9, 1e9, "lux"), &["illuminance_lux"]),
     (of(1e-9, 1e9, "cd/m²"), &["mean_luminance_cd_m2", "white_cd_m2"]),
     (of(1e-9, 1e9, "m"), &["unit_m"]),
-    (of(10.0, 1e6, "nm"), &["first_nm", "last_nm", "ListNm", "wavelength_nm", "wavelengths_nm", "scene_wavelengths_nm"]),
+    (
+        of(10.0, 1e6, "nm"),
+        &["first_nm", "last_nm", "ListNm", "wavelength_nm", "wavelengths_nm", "scene_wavelengths_nm"],
+    ),
     (of(1e-3, 1e6, "nm"), &["step_nm"]),
     // The lens.
     (of(0.05, 1e5, ""), &["f_number", "FNumber"]),

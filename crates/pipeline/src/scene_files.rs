@@ -122,9 +122,10 @@ impl SceneInfo {
                 let (near, far) = depth.range_m();
                 [near, far]
             }),
-            sky_fraction: scene.depth.as_ref().map(|depth| {
-                depth.z_m().iter().filter(|z| z.is_infinite()).count() as f64 / n
-            }),
+            sky_fraction: scene
+                .depth
+                .as_ref()
+                .map(|depth| depth.z_m().iter().filter(|z| z.is_infinite()).count() as f64 / n),
             has_hidden_layer: scene.hidden.is_some(),
             view: scene.view,
             field_of_view_deg: scene.view.map(|view| view.horizontal_fov_deg(scene.columns())),

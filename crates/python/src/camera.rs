@@ -127,7 +127,8 @@ impl Camera {
     /// bank_error : float
     ///     Samples the lens as finely as this error at nine tenths of the places needs.
     /// scene : Scene or path
-    /// fov_deg, depth_m, width_mm, distance_mm, fill_depth, hidden, white_level
+    /// fov_deg, depth_m, width_mm, distance_mm, fill_depth, hidden, white_level, quantity, unit, scale, scene_wavelengths_nm, variable,
+    /// axes, no_data, depth, depth_unit, depth_kind, view
     /// illuminant, illuminance_lux, scene_light, mean_luminance_cd_m2
     ///     Of the scene, as of `Scene.read`.
     /// wavelengths_nm : list of float, or "scene"

@@ -52,7 +52,8 @@ impl Observer {
                     let (first, last) = bar.range_nm();
                     // Of a band wider than all that is seen only the part within the table counts.
                     let place = |nm: f64| ((nm - center) / width + 0.5) * n as f64;
-                    let range = place(first).floor().max(0.0) as usize..place(last).ceil().clamp(0.0, n as f64) as usize;
+                    let range =
+                        place(first).floor().max(0.0) as usize..place(last).ceil().clamp(0.0, n as f64) as usize;
                     let mean = range
                         .map(|i| bar.at_or_zero(center + width * ((i as f64 + 0.5) / n as f64 - 0.5)))
                         .sum::<f64>()

@@ -6,8 +6,8 @@ use std::{
 };
 
 use dioptric_scene::{
-    FileReading, FillDepth, Pattern, ReadOptions, Scene, SceneLight, StillLife, Target, TargetLight, View, read_hidden_layer,
-    read_scene,
+    FileReading, FillDepth, Pattern, ReadOptions, Scene, SceneLight, StillLife, Target, TargetLight, View,
+    read_hidden_layer, read_scene,
 };
 use dioptric_spectrum::{DepthMap, Illuminant, WavelengthGrid};
 use serde::{Deserialize, Serialize};
@@ -327,11 +327,7 @@ impl SceneSpec {
     }
 
     /// Reads the scene of a file, a picture no finer than asked for.
-    fn read_file(
-        &self,
-        wanted: Option<&WavelengthGrid>,
-        finest_tangent: Option<f64>,
-    ) -> Result<Scene, PipelineError> {
+    fn read_file(&self, wanted: Option<&WavelengthGrid>, finest_tangent: Option<f64>) -> Result<Scene, PipelineError> {
         let SceneSource::File(path) = &self.source else {
             let reason = "expected the file of a scene".to_owned();
             return Err(PipelineError::Unsuitable { what: "scene", reason });

@@ -10,10 +10,10 @@ use ndarray::Array2;
 use rayon::prelude::*;
 
 use super::{
-    unusable::unreadable,
     contents::Cube,
     picture::decode,
     stated::{name_of, note_of},
+    unusable::unreadable,
 };
 use crate::SceneError;
 
@@ -47,7 +47,11 @@ pub(super) fn band_folder(folder: &Path, told_nm: Option<&[f64]>) -> Result<Cube
     let planes: Result<Vec<_>, _> = pictures.par_iter().map(|(_, path)| gray(path)).collect();
     let planes = planes?;
     if let Some(index) = planes.iter().position(|plane| plane.dim() != planes[0].dim()) {
-        let reason = format!("the rows of a band and its columns are {:?}, those of another {:?}", planes[index].dim(), planes[0].dim());
+        let reason = format!(
+            "the rows of a band and its columns are {:?}, those of another {:?}",
+            planes[index].dim(),
+            planes[0].dim()
+        );
         return Err(unreadable(folder, reason));
     }
     let notes = note_of(folder, "picture", &unused).into_iter().collect();

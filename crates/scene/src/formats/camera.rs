@@ -59,8 +59,7 @@ impl Distortion {
     fn apply(self, (x, y): (f64, f64)) -> (f64, f64) {
         let [k1, k2, p1, p2, k3, k4, k5, k6] = self.0;
         let r2 = x * x + y * y;
-        let radial =
-            (1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))) / (1.0 + r2 * (k4 + r2 * (k5 + r2 * k6)));
+        let radial = (1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))) / (1.0 + r2 * (k4 + r2 * (k5 + r2 * k6)));
         (
             x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x),
             y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y,
@@ -278,7 +277,7 @@ fn of_json(path: &Path, text: &str) -> Result<CameraData, String> {
         // Open3D's nine numbers run down the columns, rows of rows are a table.
         let is_table = matrix.as_array().is_some_and(|rows| rows.iter().any(Value::is_array));
         let [a, b] = if is_table || m.get(6) == Some(&0.0) { [2, 5] } else { [6, 7] };
-        let &[first, .., ] = &m[..] else { return Err("its intrinsic_matrix is empty".to_owned()) };
+        let &[first, ..] = &m[..] else { return Err("its intrinsic_matrix is empty".to_owned()) };
         if m.len() != 9 {
             return Err(format!("its intrinsic_matrix has {} numbers, expected 9", m.len()));
         }
@@ -349,7 +348,8 @@ fn coefficients(list: &[f64]) -> Result<[f64; 8], String> {
 
 /// Reads the first camera of COLMAP's `cameras.txt`: number, model, width, height and parameters, with centers of pixels at halves.
 fn of_colmap(path: &Path, text: &str) -> Result<CameraData, String> {
-    let expected = "expected JSON, OpenCV's YAML, or a line of COLMAP's cameras.txt: number, model, width, height, parameters";
+    let expected =
+        "expected JSON, OpenCV's YAML, or a line of COLMAP's cameras.txt: number, model, width, height, parameters";
     let mut lines = text.lines().map(str::trim).filter(|line| !line.is_empty() && !line.starts_with('#'));
     let line = lines.next().ok_or(expected)?;
     let words: Vec<&str> = line.split_whitespace().collect();
@@ -396,10 +396,14 @@ fn of_opencv(path: &Path, text: &str) -> Result<CameraData, String> {
         if trimmed.is_empty() || trimmed.starts_with(['%', '#']) || trimmed == "---" {
             continue;
         }
-        let Some((key, value)) = trimmed.split_once(':') else { return Err(format!("'{}' is no key: value", short(trimmed))) };
+        let Some((key, value)) = trimmed.split_once(':') else {
+            return Err(format!("'{}' is no key: value", short(trimmed)));
+        };
         let mut value = value.trim().to_owned();
         while value.starts_with('[') && !value.ends_with(']') {
-            let Some(more) = rest.next() else { return Err(format!("the list of '{}' is never closed by ']'", short(key))) };
+            let Some(more) = rest.next() else {
+                return Err(format!("the list of '{}' is never closed by ']'", short(key)));
+            };
             value.push_str(more.trim());
         }
         match (key.trim(), &matrix) {
@@ -423,7 +427,8 @@ fn of_opencv(path: &Path, text: &str) -> Result<CameraData, String> {
     let names = ["distortion_coefficients", "Distortion_Coefficients", "distCoeffs", "D"];
     let k = keys.take_any(&names).map(list).transpose()?.unwrap_or_default();
     let side = |text: Option<String>| text.and_then(|text| text.parse::<usize>().ok());
-    let size = side(keys.take_any(&["image_width", "image_Width"])).zip(side(keys.take_any(&["image_height", "image_Height"])));
+    let size = side(keys.take_any(&["image_width", "image_Width"]))
+        .zip(side(keys.take_any(&["image_height", "image_Height"])));
     Ok(CameraData {
         file: path.to_owned(),
         size,
@@ -539,7 +544,12 @@ mod tests {
             (&GOOD.replace("fx_px", "fx_pix"), 500, 741, "fx_px"),
             (&GOOD.replace("741", "\"wide\""), 500, 741, "width is"),
             (&GOOD.replace("\"source\"", "\"depth_scale\": 0.1, \"source\""), 500, 741, "depth_scale is 0.1"),
-            (&GOOD.replace("\"source\"", "\"camera_model\": \"OPENCV_FISHEYE\", \"source\""), 500, 741, "OPENCV_FISHEYE"),
+            (
+                &GOOD.replace("\"source\"", "\"camera_model\": \"OPENCV_FISHEYE\", \"source\""),
+                500,
+                741,
+                "OPENCV_FISHEYE",
+            ),
             ("{", 500, 741, "EOF"),
             ("[3]", 500, 741, "expected JSON"),
             ("1 FISHEYE 3 4 5", 500, 741, "FISHEYE"),

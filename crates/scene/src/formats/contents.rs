@@ -8,13 +8,13 @@ use ndarray::Array2;
 use rayon::prelude::*;
 
 use super::{
-    unusable::unreadable,
     camera::{CameraData, Straightened},
     depth::RawDepth,
     light_unit::LightUnit,
     no_data::mend,
     read_scene::ReadOptions,
     reading::{FileQuantity, Frame, light_unit},
+    unusable::unreadable,
 };
 use crate::{SceneError, SceneLight};
 
@@ -144,7 +144,9 @@ impl Cube {
                 Some(grid) => grid.centers_nm().to_vec(),
                 None => {
                     let n = planes.len();
-                    let reason = format!("it does not tell the wavelengths of its {n} bands: expected --wavelengths-nm, {n} numbers");
+                    let reason = format!(
+                        "it does not tell the wavelengths of its {n} bands: expected --wavelengths-nm, {n} numbers"
+                    );
                     return Err(unreadable(path, reason));
                 }
             },
@@ -158,7 +160,8 @@ impl Cube {
         let quantity = reading.quantity.or(quantity);
         let unit: Option<LightUnit> = match (quantity, told_unit) {
             (Some(FileQuantity::Reflectance), Some(_)) => {
-                let reason = "a reflectance has no unit: expected --unit or --quantity reflectance, not both".to_owned();
+                let reason =
+                    "a reflectance has no unit: expected --unit or --quantity reflectance, not both".to_owned();
                 return Err(SceneError::Units { file: path.to_owned(), reason });
             }
             (_, Some(unit)) => Some(unit),
@@ -168,17 +171,24 @@ impl Cube {
         let is_reflectance = unit.is_none();
         let scale = reading.scale.unwrap_or(1.0);
         let (level, what) = match (is_reflectance, options.white_level, top) {
-            (false, ..) => (1.0, format!("radiance in {}", reading.unit.as_deref().unwrap_or(match quantity {
-                Some(FileQuantity::Photons) => "photons/s/m^2/sr/nm",
-                _ => "W/m^2/sr/nm",
-            }))),
+            (false, ..) => (
+                1.0,
+                format!(
+                    "radiance in {}",
+                    reading.unit.as_deref().unwrap_or(match quantity {
+                        Some(FileQuantity::Photons) => "photons/s/m^2/sr/nm",
+                        _ => "W/m^2/sr/nm",
+                    })
+                ),
+            ),
             (true, Some(level), _) => (level, format!("reflectance, {level} being a perfect white")),
             (true, None, Some(top)) if reading.scale.is_none() => {
                 (top, format!("reflectance, {top}, its largest code, being a perfect white"))
             }
             (true, None, _) if quantity.is_some() => (1.0, "reflectance, 1 being a perfect white".to_owned()),
             (true, None, _) => {
-                let reason = "it does not tell what its numbers are: expected --quantity radiance, reflectance or photons";
+                let reason =
+                    "it does not tell what its numbers are: expected --quantity radiance, reflectance or photons";
                 return Err(SceneError::Units { file: path.to_owned(), reason: reason.to_owned() });
             }
         };

@@ -9,7 +9,6 @@ use dioptric_pictures::DynamicImage;
 use ndarray::Array2;
 
 use super::{
-    unusable::unreadable,
     camera::beside,
     npy::read_npy,
     pfm::read_pfm,
@@ -18,6 +17,7 @@ use super::{
     spectral_exr::{depth_channel, read_planes_exr},
     stated::name_of,
     tiff_file::{TiffFile, read_tiff},
+    unusable::unreadable,
 };
 use crate::{SceneError, View};
 
@@ -100,7 +100,8 @@ impl RawDepth {
         Err(SceneError::Setting {
             what: "the unit of the depth",
             value: format!("'{}'", words.unit.unwrap_or_default()),
-            expected: "px or 256/px for a disparity, m or 1000/m for an inverse distance, a length for all else".to_owned(),
+            expected: "px or 256/px for a disparity, m or 1000/m for an inverse distance, a length for all else"
+                .to_owned(),
         })
     }
 
@@ -201,7 +202,11 @@ pub(super) fn depth_beside(picture: &Path, words: DepthWords<'_>) -> Result<Opti
     let mut found = files_beside(picture).into_iter();
     let Some(path) = found.next() else { return Ok(None) };
     let mut depth = read_depth(&path, words)?;
-    depth.notes.extend(super::stated::note_of(picture, "depth file", &found.map(|path| name_of(&path)).collect::<Vec<_>>()));
+    depth.notes.extend(super::stated::note_of(
+        picture,
+        "depth file",
+        &found.map(|path| name_of(&path)).collect::<Vec<_>>(),
+    ));
     Ok(Some(depth))
 }
 
@@ -220,7 +225,8 @@ pub(super) fn likely_beside(picture: &Path) -> Vec<String> {
         let name = name_of(path).to_lowercase();
         let ending = name.rsplit('.').next().unwrap_or_default();
         let is_map = ["png", "tif", "tiff", "exr", "pfm", "npy", "dpt"].contains(&ending);
-        let rest = name.strip_prefix(&stem).or_else(|| name.strip_suffix(ending)?.trim_end_matches('.').strip_suffix(&stem));
+        let rest =
+            name.strip_prefix(&stem).or_else(|| name.strip_suffix(ending)?.trim_end_matches('.').strip_suffix(&stem));
         let says = |rest: &str| ["depth", "disp"].iter().any(|word| rest.contains(word));
         is_map && rest.is_some_and(says) && path != picture && !known.contains(path)
     };
@@ -252,7 +258,8 @@ pub(super) fn read_depth(path: &Path, words: DepthWords<'_>) -> Result<RawDepth,
             };
             let top = array.top.filter(|top| *top == 65535.0).map(|_| u16::MAX);
             let is_codes = array.top.is_some_and(|top| top <= 255.0);
-            let values = Array2::from_shape_vec((rows, columns), array.values).map_err(|error| wrong(error.to_string()))?;
+            let values =
+                Array2::from_shape_vec((rows, columns), array.values).map_err(|error| wrong(error.to_string()))?;
             (values, if is_codes { Some(u16::from(u8::MAX)) } else { top.or_else(|| array.top.map(|_| 0)) })
         }
         "exr" => {
@@ -292,7 +299,8 @@ pub(super) fn read_depth(path: &Path, words: DepthWords<'_>) -> Result<RawDepth,
     };
     // Distances that are counted from the camera say so by the name of their channel.
     let kind = if from.contains("'distance'") { DepthKind::Radial } else { DepthKind::Axial };
-    let is_told = words.unit.is_some() || words.kind.is_some_and(|kind| kind != DepthKind::Axial && kind != DepthKind::Radial);
+    let is_told =
+        words.unit.is_some() || words.kind.is_some_and(|kind| kind != DepthKind::Axial && kind != DepthKind::Radial);
     let is_codes = top.is_some();
     let unit_m = match top {
         _ if is_told => 1.0,
@@ -400,7 +408,10 @@ mod tests {
         assert_eq!(flat("disparity:0.2", "256/px", 8 * 256), 2.5);
         assert_eq!(flat("disparity:0.2,3", "px", 5), 2.5);
         let radial = flat("radial", "mm", 2500);
-        assert!((f64::from(radial) - 2.5 / (1.0 + (1.5 / 100.0_f64).powi(2) + (0.5 / 100.0_f64).powi(2)).sqrt()).abs() < 1e-6);
+        assert!(
+            (f64::from(radial) - 2.5 / (1.0 + (1.5 / 100.0_f64).powi(2) + (0.5 / 100.0_f64).powi(2)).sqrt()).abs()
+                < 1e-6
+        );
         let relative = read(&[[0, 65535, 32768, 16384]], words(None, Some("inverse:0.5,inf"))).unwrap();
         assert_eq!((relative[(0, 0)], relative[(0, 1)]), (f32::INFINITY, 0.5));
         assert!((relative[(0, 2)] - 1.0).abs() < 1e-4);
@@ -419,7 +430,8 @@ mod tests {
         fs::write(at("a.npy"), super::super::npy::tests::npy("<f4", false, "(2, 4)", &bytes)).unwrap();
         let upside_down: Vec<u8> = [&bytes[16..], &bytes[..16]].concat();
         fs::write(at("a.pfm"), [&b"Pf\n4 2\n-1.0\n"[..], &upside_down].concat()).unwrap();
-        crate::write_planes_exr(&at("a.exr"), &[("A", &values), ("View.Depth.Z", &values)], crate::ExrSamples::Single).unwrap();
+        crate::write_planes_exr(&at("a.exr"), &[("A", &values), ("View.Depth.Z", &values)], crate::ExrSamples::Single)
+            .unwrap();
         let mut file = fs::File::create(at("a.tif")).unwrap();
         let mut encoder = tiff::encoder::TiffEncoder::new(&mut file).unwrap();
         encoder.write_image::<tiff::encoder::colortype::Gray32Float>(4, 2, values.as_slice().unwrap()).unwrap();

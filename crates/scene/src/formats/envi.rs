@@ -111,7 +111,10 @@ impl EnviFile {
         let wavelengths_nm = match (told_nm, header.wavelengths_nm.take()) {
             (Some(told), own) => {
                 if own.as_ref().is_some_and(|own| own != told) {
-                    return Err(wrong("wavelength", "the header has it: --wavelengths-nm says something else".to_owned()));
+                    return Err(wrong(
+                        "wavelength",
+                        "the header has it: --wavelengths-nm says something else".to_owned(),
+                    ));
                 }
                 told.to_vec()
             }
@@ -119,13 +122,17 @@ impl EnviFile {
             (None, None) => match wanted_nm.filter(|wanted| wanted.len() == header.bands) {
                 Some(wanted) => wanted.to_vec(),
                 None => {
-                    let reason = format!("the header lacks it: expected it there, or --wavelengths-nm, {} numbers", header.bands);
+                    let reason = format!(
+                        "the header lacks it: expected it there, or --wavelengths-nm, {} numbers",
+                        header.bands
+                    );
                     return Err(wrong("wavelength", reason));
                 }
             },
         };
         if wavelengths_nm.len() != header.bands {
-            let reason = format!("{} wavelengths, expected one for each of {} bands", wavelengths_nm.len(), header.bands);
+            let reason =
+                format!("{} wavelengths, expected one for each of {} bands", wavelengths_nm.len(), header.bands);
             return Err(wrong("wavelength", reason));
         }
         let n_bad = header.bad_bands.iter().filter(|bad| **bad).count();
@@ -134,7 +141,10 @@ impl EnviFile {
         }
         if n_bad > 0 {
             let name = name_of(header_path);
-            notes.push(format!("{name}: {n_bad} of {} bands are bad (bbl) and left out: spectra run across", header.bands));
+            notes.push(format!(
+                "{name}: {n_bad} of {} bands are bad (bbl) and left out: spectra run across",
+                header.bands
+            ));
         }
         let data_path = data_file(header_path, &mut notes)?;
         let this = Self { header_path: header_path.to_owned(), data_path, header, wavelengths_nm, notes };
@@ -157,7 +167,8 @@ impl EnviFile {
         let end = self.header.offset.saturating_add(wanted);
         if length > end {
             let name = name_of(&self.data_path);
-            self.notes.push(format!("{name}: {} bytes after those that its header speaks of are not used", length - end));
+            self.notes
+                .push(format!("{name}: {} bytes after those that its header speaks of are not used", length - end));
         }
         Ok(self)
     }
@@ -192,7 +203,10 @@ impl EnviFile {
             && options.white_level.is_none()
         {
             let unit = header.data_units.as_deref().unwrap_or_default();
-            return units(format!("its data units are '{}', which says something else than was asked for", short(unit)));
+            return units(format!(
+                "its data units are '{}', which says something else than was asked for",
+                short(unit)
+            ));
         }
         // Gains without a unit are those of ENVI, W m⁻² sr⁻¹ µm⁻¹.
         let gain_unit = || LightUnit::parse("W/m^2/sr/um").filter(|_| has_gains && !is_reflecting);
@@ -220,7 +234,8 @@ impl EnviFile {
             return Ok((Meaning::Reflectance(scale), "reflectance by its gains".to_owned()));
         }
         if let (Some(white), Some(dark)) = (self.beside("white_reference")?, self.beside("dark_reference")?) {
-            let what = format!("reflectance between {} and {}", name_of(&white.header_path), name_of(&dark.header_path));
+            let what =
+                format!("reflectance between {} and {}", name_of(&white.header_path), name_of(&dark.header_path));
             self.check_reference(&white)?;
             self.check_reference(&dark)?;
             return Ok((Meaning::Between(Box::new([white, dark])), what));
@@ -230,7 +245,8 @@ impl EnviFile {
             return Ok((Meaning::Reflectance(scale), "reflectance, 1 being a perfect white".to_owned()));
         }
         let unknown = header.data_units.as_deref().filter(|text| !text.is_empty());
-        let unknown = unknown.map_or_else(String::new, |text| format!(", and '{}' is no unit of radiance", short(text)));
+        let unknown =
+            unknown.map_or_else(String::new, |text| format!(", and '{}' is no unit of radiance", short(text)));
         units(format!(
             "nothing tells what a perfect white is{unknown}: expected 'reflectance scale factor' in the header, white_reference and \
              dark_reference files beside it, a white level (--white-level), or what the numbers are (--quantity, --unit)"
@@ -355,10 +371,11 @@ impl EnviFile {
 
     /// Returns ranges of lines that fit into memory.
     fn chunks(&self, n_bands: usize) -> impl Iterator<Item = Range<usize>> + use<> {
-        let line = self.header.columns * (4 * n_bands).max(match self.header.interleave {
-            Interleave::Bsq => 1,
-            Interleave::Bil | Interleave::Bip => self.header.bands * self.header.data_type.bytes(),
-        });
+        let line = self.header.columns
+            * (4 * n_bands).max(match self.header.interleave {
+                Interleave::Bsq => 1,
+                Interleave::Bil | Interleave::Bip => self.header.bands * self.header.data_type.bytes(),
+            });
         let (rows, step) = (self.header.rows, (AT_ONCE_BYTES / line).max(1));
         (0..rows).step_by(step).map(move |first| first..(first + step).min(rows))
     }
@@ -384,7 +401,8 @@ impl EnviFile {
     /// Reads lines of bands as they are stored.
     fn read(&self, file: &mut File, bands: &[usize], lines: Range<usize>) -> Result<Vec<Vec<f32>>, SceneError> {
         let (size, columns) = (self.header.data_type.bytes(), self.header.columns);
-        let start = |frame: usize| self.header.offset + frame as u64 * self.frame_bytes() + self.header.frame_offsets[0];
+        let start =
+            |frame: usize| self.header.offset + frame as u64 * self.frame_bytes() + self.header.frame_offsets[0];
         let mut bytes_at = |from: u64, n: usize| -> Result<Vec<u8>, SceneError> {
             let mut bytes = vec![0; n];
             file.seek(SeekFrom::Start(from))
@@ -415,7 +433,9 @@ impl EnviFile {
                     for (samples, &band) in result.iter_mut().zip(bands) {
                         match &whole {
                             Some(bytes) => samples.extend(floats(&bytes[band * line_bytes..(band + 1) * line_bytes])),
-                            None => samples.extend(floats(&bytes_at(start(line) + (band * line_bytes) as u64, line_bytes)?)),
+                            None => {
+                                samples.extend(floats(&bytes_at(start(line) + (band * line_bytes) as u64, line_bytes)?))
+                            }
                         }
                     }
                 }
@@ -589,7 +609,12 @@ mod tests {
         assert_eq!(referred.spectrum_at(0, 0)[1], 0.0);
         // References of other lengths count by their mean line.
         let lines = text.replace("lines = 4", "lines = 2").replace("header offset = 5", "header offset = 0");
-        write(folder.path(), "white_reference_1", &lines, &[200, 200, 200, 202, 202, 202, 200, 200, 200, 202, 202, 202]);
+        write(
+            folder.path(),
+            "white_reference_1",
+            &lines,
+            &[200, 200, 200, 202, 202, 202, 200, 200, 200, 202, 202, 202],
+        );
         assert_eq!(open(&path).unwrap(), referred);
         let units = write(folder.path(), "c", &format!("{text}data units = W/m^2/sr/nm\n"), &bytes);
         assert_eq!(open(&units).unwrap().quantity(), Quantity::Radiance);
@@ -622,7 +647,8 @@ mod tests {
         check("", told, Quantity::Reflectance, [1.12, 0.12]);
         let path = write(folder.path(), "b", &format!("{text}{watts}\n"), &bytes);
         let told = FileReading { quantity: Some(FileQuantity::Reflectance), ..none() };
-        let refused = read_with(&path, &ReadOptions { reading: told, ..ReadOptions::default() }).unwrap_err().to_string();
+        let refused =
+            read_with(&path, &ReadOptions { reading: told, ..ReadOptions::default() }).unwrap_err().to_string();
         assert!(refused.contains("says something else"), "{refused}");
     }
 

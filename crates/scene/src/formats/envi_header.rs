@@ -156,11 +156,13 @@ pub(crate) fn parse(path: &Path, text: &str) -> Result<EnviHeader, SceneError> {
     let mut entries = Entries { path, list: entries(path, text)?, used: vec![] };
     entries.check_kind()?;
     let bands = entries.required("bands")?;
-    let reflecting = [entries.list("data reflectance gain values", bands)?, entries.list("data reflectance offset values", bands)?];
+    let reflecting =
+        [entries.list("data reflectance gain values", bands)?, entries.list("data reflectance offset values", bands)?];
     let plain = [entries.list("data gain values", bands)?, entries.list("data offset values", bands)?];
     let are_gains_of_reflectance = reflecting.iter().any(Option::is_some) && plain.iter().all(Option::is_none);
     let [gains, offsets] = if are_gains_of_reflectance { reflecting.clone() } else { plain };
-    let bad_bands = entries.list("bbl", bands)?.map_or_else(Vec::new, |list| list.iter().map(|good| *good == 0.0).collect());
+    let bad_bands =
+        entries.list("bbl", bands)?.map_or_else(Vec::new, |list| list.iter().map(|good| *good == 0.0).collect());
     let wavelengths_nm = entries.wavelengths_nm()?;
     let frame_offsets = entries.frame_offsets()?;
     let mut header = EnviHeader {
@@ -296,7 +298,8 @@ impl Entries<'_> {
         match self.number::<f64>("file compression")? {
             None | Some(0.0) => Ok(()),
             Some(_) => {
-                let reason = "the file of numbers is compressed, expected a plain one: unpack it and set it to 0".to_owned();
+                let reason =
+                    "the file of numbers is compressed, expected a plain one: unpack it and set it to 0".to_owned();
                 Err(self.wrong("file compression", reason))
             }
         }
@@ -358,8 +361,8 @@ impl Entries<'_> {
             Some("wavenumber" | "cm-1") => Ok(Some(numbers.iter().map(|number| 1e7 / number).collect())),
             Some("index") => Ok(None),
             None | Some("unknown" | "") => {
-                let are_counted = numbers.len() > 1 && numbers.windows(2).all(|pair| pair[1] - pair[0] == 1.0)
-                    && numbers[0] <= 1.0;
+                let are_counted =
+                    numbers.len() > 1 && numbers.windows(2).all(|pair| pair[1] - pair[0] == 1.0) && numbers[0] <= 1.0;
                 let all = |range: std::ops::Range<f64>| numbers.iter().all(|number| range.contains(number));
                 if !are_counted && all(0.15..20.0) {
                     return plain(1000.0);
@@ -443,7 +446,8 @@ mod tests {
 
     #[test]
     fn all_that_a_header_states_is_used_or_named() {
-        let text = GOOD.replace("bands = 2", "bands=2\nbbl = {1, 0}\nDATA_GAIN_VALUES = {2, 3}\ndata ignore value = -9999")
+        let text = GOOD
+            .replace("bands = 2", "bands=2\nbbl = {1, 0}\nDATA_GAIN_VALUES = {2, 3}\ndata ignore value = -9999")
             + "description = { a\n b }\nfrobnicate = {1}\nsamples = 5\nmajor frame offsets = {8, 4}\n";
         let header = parse(Path::new("folder/a.hdr"), &text).unwrap();
         assert_eq!((header.columns, header.frame_offsets, header.ignored), (4, [8, 4], Some(-9999.0)));

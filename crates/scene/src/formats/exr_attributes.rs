@@ -124,7 +124,8 @@ pub(crate) fn from_layer(layer: &LayerAttributes) -> Attributes {
     let light = match get(LIGHT) {
         Some(AttributeValue::Text(text)) => {
             let light = serde_json::from_str::<SceneLight>(&text.to_string()).map_err(|error| error.to_string());
-            let is_light = |light: SceneLight| light.illuminant.check().map(|()| light).map_err(|error| error.to_string());
+            let is_light =
+                |light: SceneLight| light.illuminant.check().map(|()| light).map_err(|error| error.to_string());
             light.and_then(is_light).map(Some)
         }
         _ => Ok(None),

@@ -106,7 +106,9 @@ fn the_light_on_a_scene_comes_back() {
 fn unknown_channels_and_attributes_are_noted() {
     let mut rng = ChaCha8Rng::seed_from_u64(9);
     for _ in 0..40 {
-        let word = |rng: &mut ChaCha8Rng| -> String { (0..rng.random_range(3..9)).map(|_| rng.random_range('a'..='z')).collect() };
+        let word = |rng: &mut ChaCha8Rng| -> String {
+            (0..rng.random_range(3..9)).map(|_| rng.random_range('a'..='z')).collect()
+        };
         let (channel, attribute) = (word(&mut rng), word(&mut rng));
         let file = file();
         let mut channels = vec![("S0.500nm", flat(1.0)), ("Z", flat(1.0)), (channel.as_str(), flat(0.5))];
@@ -121,7 +123,8 @@ fn unknown_channels_and_attributes_are_noted() {
 fn parts_of_bands_are_one_picture() {
     let file = file();
     let part = |name: &str, channels: Vec<(&str, FlatSamples)>| {
-        let list: SmallVec<[_; 4]> = channels.into_iter().map(|(name, samples)| AnyChannel::new(name, samples)).collect();
+        let list: SmallVec<[_; 4]> =
+            channels.into_iter().map(|(name, samples)| AnyChannel::new(name, samples)).collect();
         let attributes = LayerAttributes { layer_name: Some(Text::from(name)), ..LayerAttributes::default() };
         Layer::new((2, 2), attributes, Encoding::FAST_LOSSLESS, AnyChannels::sort(list))
     };
@@ -137,7 +140,10 @@ fn parts_of_bands_are_one_picture() {
         part("depth", vec![("Z", flat(3.0))]),
         part("left", vec![("S0.500nm", flat(9.0))]),
     ]);
-    assert_eq!((scene.radiance.grid().centers_nm(), scene.radiance.spectrum_at(0, 0)), (&[500.0, 600.0][..], vec![1.0, 2.0]));
+    assert_eq!(
+        (scene.radiance.grid().centers_nm(), scene.radiance.spectrum_at(0, 0)),
+        (&[500.0, 600.0][..], vec![1.0, 2.0])
+    );
     assert_eq!(scene.require_depth().unwrap().range_m(), (3.0, 3.0));
     assert!(scene.notes.iter().any(|note| note.contains("its part 'left' is not used")), "{:?}", scene.notes);
     let colors = || vec![("R", flat(1.0)), ("G", flat(1.0)), ("B", flat(1.0)), ("A", flat(1.0))];

@@ -124,7 +124,10 @@ mod tests {
         let message = mended(NoData::Refuse).unwrap_err().to_string();
         assert!(message.contains("a.hdr") && message.contains("row 0, column 1"), "{message}");
         let note = counts.note(Path::new("a.hdr"), NoData::Black).unwrap();
-        assert!(note.starts_with("a.hdr: of 12 samples of all bands 7 without data are black, 1 below 0 are 0"), "{note}");
+        assert!(
+            note.starts_with("a.hdr: of 12 samples of all bands 7 without data are black, 1 below 0 are 0"),
+            "{note}"
+        );
         assert_eq!(Mended::default().note(Path::new("a.hdr"), NoData::Fill), None);
     }
 

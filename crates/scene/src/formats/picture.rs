@@ -111,10 +111,7 @@ pub(super) fn picture_size_of(path: &Path) -> Result<(usize, usize), SceneError>
 ///
 /// # Errors
 /// As [`decode`].
-pub(super) fn oriented(
-    path: &Path,
-    size: Option<(usize, usize)>,
-) -> Result<(DynamicImage, Vec<String>), SceneError> {
+pub(super) fn oriented(path: &Path, size: Option<(usize, usize)>) -> Result<(DynamicImage, Vec<String>), SceneError> {
     let mut picture = match size {
         Some(size) => {
             let curve = Curve {
@@ -136,7 +133,9 @@ pub(super) fn oriented(
         }
         // The name of the usual profile stands in its text, of one byte a letter or of two.
         let profile = decoder.icc_profile().ok().flatten();
-        let says_srgb = |profile: &Vec<u8>| [&b"sRGB"[..], b"s\0R\0G\0B"].iter().any(|name| profile.windows(name.len()).any(|at| at == *name));
+        let says_srgb = |profile: &Vec<u8>| {
+            [&b"sRGB"[..], b"s\0R\0G\0B"].iter().any(|name| profile.windows(name.len()).any(|at| at == *name))
+        };
         if profile.is_some_and(|profile| !profile.is_empty() && !says_srgb(&profile)) {
             let own = ["ICC profile".to_owned()];
             notes.extend(note_of(path, "color space", &own).map(|note| note + ": its codes are taken as sRGB"));

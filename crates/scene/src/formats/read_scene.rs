@@ -586,8 +586,13 @@ fn lit(
             };
             let lux = lux(own_lux);
             let (basis, light) = white_basis(&grid, options.light.as_ref(), lux)?;
-            if grid.range_nm().0 < 380.0 || grid.range_nm().1 > 780.0 {
-                notes.push(format!("{}: a picture has no light below 380 nm and above 780 nm", name_of(path)));
+            let n_dark = (0..grid.len()).filter(|&band| basis.iter().all(|color| color[band] <= 0.0)).count();
+            if n_dark > 0 {
+                let name = name_of(path);
+                notes.push(format!(
+                    "{name}: in {n_dark} of {} bands a display sends no light, nor does the picture",
+                    grid.len()
+                ));
             }
             let image = match colors {
                 Image::Codes(picture) => lifted_codes(path, picture, &basis, &grid)?,
@@ -634,7 +639,9 @@ fn mend_colors(
     let kept: Vec<Array2<bool>> = planes.iter().map(|plane| plane.mapv(|v| v.is_finite() && v < 0.0)).collect();
     let colors = planes.clone();
     let finite = planes.iter_mut().zip(&kept);
-    finite.for_each(|(plane, kept)| ndarray::Zip::from(plane).and(kept).for_each(|v, kept| *v = if *kept { 0.0 } else { *v }));
+    finite.for_each(|(plane, kept)| {
+        ndarray::Zip::from(plane).and(kept).for_each(|v, kept| *v = if *kept { 0.0 } else { *v })
+    });
     let mended = mend(path, bands, planes, choice)?;
     for ((plane, kept), own) in planes.iter_mut().zip(&kept).zip(&colors) {
         ndarray::Zip::from(plane).and(kept).and(own).for_each(|v, kept, own| *v = if *kept { *own } else { *v });
@@ -657,7 +664,8 @@ fn white_basis(
     }
     let display = Display::apple_studio();
     let mut basis = display.srgb_basis(grid, lux / std::f64::consts::PI);
-    let white: Vec<f64> = (0..grid.len()).map(|band| (basis[0][band] + basis[1][band] + basis[2][band]).max(0.0)).collect();
+    let white: Vec<f64> =
+        (0..grid.len()).map(|band| (basis[0][band] + basis[1][band] + basis[2][band]).max(0.0)).collect();
     let Some(wanted) = wanted else {
         // On the picture's own bands: a white from other samples of the display's spectrum would tint it.
         let is_known = grid.len() > 1 && white.iter().any(|v| *v > 0.0);

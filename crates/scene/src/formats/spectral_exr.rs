@@ -111,10 +111,7 @@ pub(super) struct RawFile {
 /// The picture of an EXR file.
 pub(super) enum RawImage {
     /// Light whose unit is not stated is W m⁻² sr⁻¹ nm⁻¹.
-    Spectral {
-        image: SpectralImage,
-        is_unit_stated: bool,
-    },
+    Spectral { image: SpectralImage, is_unit_stated: bool },
     /// Linear red, green and blue of sRGB's primaries, of a file without bands.
     Rgb {
         planes: [Array2<f32>; 3],
@@ -145,7 +142,8 @@ pub(super) fn read_raw_exr(path: &Path) -> Result<RawFile, SceneError> {
         first.name_channels();
     }
     for mut layer in layers {
-        let wavelengths = |layer: &RawLayer| layer.planes.iter().filter_map(|(name, _)| band_name::parse(name)).collect::<Vec<_>>();
+        let wavelengths =
+            |layer: &RawLayer| layer.planes.iter().filter_map(|(name, _)| band_name::parse(name)).collect::<Vec<_>>();
         let own = wavelengths(&first);
         let repeats = wavelengths(&layer).iter().any(|band| own.contains(band));
         if repeats || (layer.size, layer.position) != (size, position) {
@@ -159,7 +157,8 @@ pub(super) fn read_raw_exr(path: &Path) -> Result<RawFile, SceneError> {
     let (rows, columns) = size;
     let frame = Frame { x0: position.0 - head.display.0, y0: position.1 - head.display.1, ..head.frame };
     let view = attributes.view(columns, rows).map_err(|error| unreadable(path, error))?;
-    let light = attributes.light.clone().map_err(|reason| unreadable(path, format!("its sceneLight cannot be: {reason}")))?;
+    let light =
+        attributes.light.clone().map_err(|reason| unreadable(path, format!("its sceneLight cannot be: {reason}")))?;
     let mut channels = Stated::new("channel", std::mem::take(&mut first.planes));
     let bands = channels.take_all(|name| band_name::parse(name).is_some());
     let (image, prefix) = if bands.is_empty() {
@@ -208,13 +207,19 @@ pub(super) fn read_raw_exr(path: &Path) -> Result<RawFile, SceneError> {
 /// them with what stands before their letters.
 fn colors_of(channels: &mut Stated<Array2<f32>>) -> Option<(String, [Array2<f32>; 3])> {
     let names: Vec<String> = channels.names().map(str::to_owned).collect();
-    let full = |prefix: &str, letter: &str| if prefix.is_empty() { letter.to_owned() } else { format!("{prefix}.{letter}") };
-    let prefixes: Vec<&str> = names.iter().filter_map(|name| match name.as_str() {
-        "R" => Some(""),
-        name => name.strip_suffix(".R"),
-    }).filter(|prefix| ["G", "B"].iter().all(|letter| names.contains(&full(prefix, letter)))).collect();
+    let full =
+        |prefix: &str, letter: &str| if prefix.is_empty() { letter.to_owned() } else { format!("{prefix}.{letter}") };
+    let prefixes: Vec<&str> = names
+        .iter()
+        .filter_map(|name| match name.as_str() {
+            "R" => Some(""),
+            name => name.strip_suffix(".R"),
+        })
+        .filter(|prefix| ["G", "B"].iter().all(|letter| names.contains(&full(prefix, letter))))
+        .collect();
     let last = |prefix: &str| prefix.rsplit('.').next().unwrap_or_default().to_ascii_lowercase();
-    let is_beauty = |prefix: &&&str| ["combined", "rgb", "rgba", "color", "beauty", "image"].contains(&last(prefix).as_str());
+    let is_beauty =
+        |prefix: &&&str| ["combined", "rgb", "rgba", "color", "beauty", "image"].contains(&last(prefix).as_str());
     let prefix = prefixes.iter().find(|prefix| prefix.is_empty()).or_else(|| prefixes.iter().find(is_beauty));
     let prefix = prefix.or_else(|| prefixes.first().filter(|_| prefixes.len() == 1)).map(|prefix| (*prefix).to_owned());
     if let Some(prefix) = prefix {
@@ -251,9 +256,7 @@ fn depth_name<'a>(names: impl Iterator<Item = &'a str>, prefix: &str) -> Option<
 }
 
 /// Returns the channel of depth of a file of depth alone, with its name and the names of the others.
-pub(super) fn depth_channel(
-    planes: Vec<(String, Array2<f32>)>,
-) -> Option<(String, Array2<f32>, Vec<String>)> {
+pub(super) fn depth_channel(planes: Vec<(String, Array2<f32>)>) -> Option<(String, Array2<f32>, Vec<String>)> {
     let mut channels = Stated::new("channel", planes);
     let only = || {
         let names: Vec<&str> = channels.names().collect();
@@ -302,9 +305,10 @@ fn srgb_from(own: &Chromaticities) -> Option<[[f64; 3]; 3]> {
     }
     let shares = primaries.inverse() * DVec3::from(w);
     let d65 = Xyz::from_linear_srgb([1.0; 3]);
-    let columns = [r, g, b].into_iter().zip(shares.to_array()).map(|(primary, share)| {
-        adapt_bradford(Xyz(primary.map(|v| v * share)), Xyz(w), d65).to_linear_srgb()
-    });
+    let columns = [r, g, b]
+        .into_iter()
+        .zip(shares.to_array())
+        .map(|(primary, share)| adapt_bradford(Xyz(primary.map(|v| v * share)), Xyz(w), d65).to_linear_srgb());
     let columns: Vec<[f64; 3]> = columns.collect();
     Some([0, 1, 2].map(|i| [columns[0][i], columns[1][i], columns[2][i]]))
 }
@@ -443,7 +447,8 @@ fn read_layers(path: &Path) -> Result<(Head, Vec<RawLayer>), SceneError> {
 
 /// Whether primaries and white are those of sRGB, to the digits that writers have.
 fn are_srgb(own: &Chromaticities) -> bool {
-    let pairs = [(own.red, [0.64, 0.33]), (own.green, [0.30, 0.60]), (own.blue, [0.15, 0.06]), (own.white, [0.3127, 0.329])];
+    let pairs =
+        [(own.red, [0.64, 0.33]), (own.green, [0.30, 0.60]), (own.blue, [0.15, 0.06]), (own.white, [0.3127, 0.329])];
     pairs.iter().all(|(own, srgb)| (own.0 - srgb[0]).abs() < 1e-3 && (own.1 - srgb[1]).abs() < 1e-3)
 }
 
@@ -522,11 +527,7 @@ mod tests {
             white: Vec2(0.32168, 0.33767),
         };
         // AP1 to linear Rec. 709 with Bradford's adaptation, as the ACES documents and colour-science give it.
-        let published = [
-            [1.70505, -0.62179, -0.08326],
-            [-0.13026, 1.14080, -0.01055],
-            [-0.02400, -0.12897, 1.15297],
-        ];
+        let published = [[1.70505, -0.62179, -0.08326], [-0.13026, 1.14080, -0.01055], [-0.02400, -0.12897, 1.15297]];
         for (row, expected) in srgb_from(&ap1).unwrap().iter().zip(published) {
             for (value, expected) in row.iter().zip(expected) {
                 // Four digits of the chromaticities.
@@ -562,7 +563,8 @@ mod tests {
         let take = |names: &[&str]| {
             let planes = names.iter().map(|name| ((*name).to_owned(), Array2::zeros((1, 1)))).collect();
             let mut channels = Stated::new("channel", planes);
-            colors_of(&mut channels).map(|(prefix, _)| (prefix, channels.names().map(str::to_owned).collect::<Vec<_>>()))
+            colors_of(&mut channels)
+                .map(|(prefix, _)| (prefix, channels.names().map(str::to_owned).collect::<Vec<_>>()))
         };
         let pass = |pass: &str| ["R", "G", "B"].map(|letter| format!("{pass}.{letter}"));
         let both = [pass("V.Noisy Image"), pass("V.Combined")].concat();

@@ -21,8 +21,8 @@ const LIMIT_PAGES: usize = 10_000;
 const PAGE_NAME: Tag = Tag::Unknown(285);
 /// Tags that say how samples lie in the file, or what changes nothing: from sizes and strips to who made it when.
 const HARMLESS: [u16; 45] = [
-    254, 255, 256, 257, 258, 259, 262, 263, 266, 269, 270, 271, 272, 273, 277, 278, 279, 282, 283, 284, 285, 288, 289, 292,
-    293, 296, 297, 305, 306, 315, 316, 317, 320, 322, 323, 324, 325, 338, 339, 347, 530, 531, 532, 33432, 42113,
+    254, 255, 256, 257, 258, 259, 262, 263, 266, 269, 270, 271, 272, 273, 277, 278, 279, 282, 283, 284, 285, 288, 289,
+    292, 293, 296, 297, 305, 306, 315, 316, 317, 320, 322, 323, 324, 325, 338, 339, 347, 530, 531, 532, 33432, 42113,
 ];
 
 /// What a TIFF file holds.
@@ -192,7 +192,9 @@ impl Page {
     /// Whether its samples are no gray or colors of a picture.
     fn is_stack(&self) -> bool {
         let is_signed = matches!(self.depth, SampleDepth::Signed(_));
-        is_signed || if self.is_colored { self.n_samples > 4 } else { self.n_samples > 2 } || self.bits > 16 && self.depth != SampleDepth::Float
+        is_signed
+            || if self.is_colored { self.n_samples > 4 } else { self.n_samples > 2 }
+            || self.bits > 16 && self.depth != SampleDepth::Float
     }
 
     fn top(&self) -> Option<f64> {

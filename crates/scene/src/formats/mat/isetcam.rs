@@ -11,11 +11,11 @@ use ndarray::Array2;
 use super::{
     super::{
         axes,
-        unusable::unreadable,
         contents::Cube as NumberCube,
         photons::joules_per_photon,
         reading::{FileQuantity, FileReading},
         stated::note_of,
+        unusable::unreadable,
     },
     container::{Content, Listed, MatArray, MatFile},
 };
@@ -32,8 +32,23 @@ const MOST_REFLECTANCE: f64 = 10.0;
 const LEAST_PHOTONS: f64 = 1e9;
 /// Fields of a scene that change nothing of what it is.
 const HARMLESS: [&str; 17] = [
-    "name", "type", "filename", "metadata", "metaData", "consistency", "chartP", "chartparameters", "cornerpoints", "rect",
-    "magnification", "color", "spectrum", "data", "wAngular", "vAngular", "lightFieldType",
+    "name",
+    "type",
+    "filename",
+    "metadata",
+    "metaData",
+    "consistency",
+    "chartP",
+    "chartparameters",
+    "cornerpoints",
+    "rect",
+    "magnification",
+    "color",
+    "spectrum",
+    "data",
+    "wAngular",
+    "vAngular",
+    "lightFieldType",
 ];
 /// The published cubes that do not list their wavelengths, by variable and bands: first and last, nm.
 const KNOWN: [(&str, usize, [f64; 2]); 4] = [
@@ -146,9 +161,10 @@ fn cube_of(path: &Path, file: &MatFile, name: &str, reading: &FileReading) -> Re
     // A list that counts bands, or of another length, is none of wavelengths.
     let is_bands = |list: &[f64]| array.sides.contains(&list.len()) && list.iter().all(|nm| *nm >= 100.0);
     let waves = waves.filter(|(_, list)| is_bands(list));
-    let known = KNOWN.iter().find(|(own, n, _)| *own == name && array.sides.last() == Some(n)).map(|(_, n, [first, last])| {
-        (0..*n).map(|i| first + (last - first) * i as f64 / (*n as f64 - 1.0)).collect::<Vec<f64>>()
-    });
+    let known =
+        KNOWN.iter().find(|(own, n, _)| *own == name && array.sides.last() == Some(n)).map(|(_, n, [first, last])| {
+            (0..*n).map(|i| first + (last - first) * i as f64 / (*n as f64 - 1.0)).collect::<Vec<f64>>()
+        });
     let own = waves.as_ref().map(|(_, list)| list.clone()).or(known);
     let n_bands = reading.wavelengths_nm.as_ref().or(own.as_ref()).map(Vec::len);
     let planes = axes::planes(&array.sides, reading.axes.as_deref(), n_bands, false, |index| numbers.at(index) as f32)?;
