@@ -7,6 +7,7 @@ use dioptric_golden::shared;
 use dioptric_pipeline::DevelopedFile;
 
 #[dioptric_golden::needs_shared]
+#[test]
 fn an_edge_with_two_percent_of_noise_has_its_mtf50_in_every_region() {
     let path = shared("inputs/sensor/edge_noise2pc.png").unwrap();
     for region in ["20,20,120,120", "0,0,160,160", "30,10,100,140", "40,40,80,80", "10,30,140,100"] {
@@ -24,6 +25,7 @@ fn an_edge_with_two_percent_of_noise_has_its_mtf50_in_every_region() {
 }
 
 #[dioptric_golden::needs_shared]
+#[test]
 fn a_raw_file_is_measured_by_its_raw_frame() {
     let path = shared("inputs/sensor/plain.dng").unwrap();
     // 128 × 96 pixels of RGGB, without an edge: each filter says so, and no preview is looked at.
@@ -44,6 +46,7 @@ fn developed(name: &str) -> DevelopedFile {
 }
 
 #[dioptric_golden::needs_shared]
+#[test]
 fn gains_and_lights_of_raw_files_are_obeyed() {
     let [plain, gained, stated, numbered, exposed] =
         ["plain", "gainmap", "illuminant_data", "two_illuminants", "baseline_0_over_0"].map(developed);

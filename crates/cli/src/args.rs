@@ -16,6 +16,8 @@ use crate::{
     picture_args::PictureArgs,
     ranges,
     render_args::{CompareArgs, LightFieldArgs, RenderArgs, WorldCommand},
+    scene::SceneCommand,
+    scene_args::SceneFileArgs,
     show::ShowArgs,
     sweep::SweepArgs,
     video_args::TurnArgs,
@@ -81,6 +83,9 @@ pub(crate) enum Command {
     /// Lists, describes, analyzes, draws and converts lenses
     #[command(subcommand)]
     Lens(LensCommand),
+    /// Describes files of scenes, and makes spectral EXR of them
+    #[command(subcommand)]
+    Scene(SceneCommand),
     /// Writes, describes and checks camera files
     #[command(subcommand)]
     Camera(CameraCommand),
@@ -158,7 +163,7 @@ pub(crate) enum QualityKind {
 pub(crate) struct RunArgs {
     /// The camera file; without it, the built-in demo camera
     pub(crate) camera: Option<PathBuf>,
-    /// Scene to photograph: spectral EXR, ENVI header, `ISETCam` .mat, folder of band PNGs, or a picture
+    /// Scene to photograph: spectral EXR, ENVI, .mat, .npy, TIFF stack, folder of band pictures, or a picture
     #[arg(long, value_name = "FILE", help_heading = heading::SCENE)]
     pub(crate) scene: Option<PathBuf>,
     /// Folder for the results [default: dioptric-out; with --from DIR, DIR-changed]
@@ -192,15 +197,11 @@ pub(crate) struct RunArgs {
     /// Distance of a flat scene from the first vertex of the lens, mm
     #[arg(long, value_name = "D", requires = "width_mm", help_heading = heading::SCENE)]
     pub(crate) distance_mm: Option<f64>,
-    /// Depth where none was measured: beside (the farther of those beside it), far (the farthest of the scene), or metres
-    #[arg(long, value_name = "FILL", help_heading = heading::SCENE)]
-    pub(crate) fill_depth: Option<String>,
     /// What lies behind the first surface of the scene's file: a file of radiance and depth of the same samples
     #[arg(long, value_name = "FILE", help_heading = heading::SCENE)]
     pub(crate) hidden: Option<PathBuf>,
-    /// Number that a perfect white has in an ENVI file that does not state it
-    #[arg(long, value_name = "N", help_heading = heading::SCENE)]
-    pub(crate) white_level: Option<f64>,
+    #[command(flatten)]
+    pub(crate) scene_file: SceneFileArgs,
     /// Light to put the scene under: A, D50, D55, D65, D75, E, FL2, FL11, LED-B3, a temperature (3200K), a chromaticity
     /// (0.46,0.414) or a CSV file of its spectrum; scenes of unknown light cannot be relit
     #[arg(long, value_name = "LIGHT", help_heading = heading::SCENE)]
@@ -208,6 +209,9 @@ pub(crate) struct RunArgs {
     /// Illuminance on the scene, or of a picture's white, lux
     #[arg(long, value_name = "LUX", help_heading = heading::SCENE)]
     pub(crate) illuminance_lux: Option<f64>,
+    /// Scales the radiance to this mean luminance, cd/m²
+    #[arg(long, alias = "mean-luminance", value_name = "L", help_heading = heading::SCENE)]
+    pub(crate) mean_luminance_cd_m2: Option<f64>,
     /// Light that is on a scene of radiance whose file does not state it, as --illuminant has it
     #[arg(long, value_name = "LIGHT", help_heading = heading::SCENE)]
     pub(crate) scene_light: Option<String>,

@@ -26,6 +26,8 @@ mod ranges;
 mod render;
 mod render_args;
 mod run;
+mod scene;
+mod scene_args;
 mod sense;
 mod show;
 mod studio;
@@ -78,6 +80,7 @@ fn dispatch(Cli { command, common }: Cli) -> anyhow::Result<()> {
     match command {
         Command::Run(arguments) => run::run(&arguments, &common),
         Command::Lens(command) => lens::run(&command, &common),
+        Command::Scene(command) => scene::run(&command, &common),
         Command::Camera(command) => camera::run(&command, &common),
         Command::Sensor(command) => camera::run_sensor(&command, &common),
         Command::Filter(command) => filter::run(&command, &common),

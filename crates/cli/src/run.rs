@@ -14,9 +14,9 @@ use dioptric_analysis::{Run, RunReport, RunTimes};
 use dioptric_files::memory;
 use dioptric_pipeline::{
     BlurSpec, Camera, Clock as PartClock, Diffraction, FilmSpec, FlatSize, FocusSpec, FrameFile, FramesSpec,
-    ImagingTimes, KeptCamera, LensReadOptions, LensSpec, Progress, Quality, RetiredBank, SceneSource, SceneSpec, SensorOptions,
-    SensorSpec, Silent, Stage, Staged, StopSpec, WavelengthSpec, display, number, parse_illuminant, parse_numbers,
-    with_exposure_s,
+    ImagingTimes, KeptCamera, LensReadOptions, LensSpec, Progress, Quality, RetiredBank, SceneSource, SceneSpec,
+    SensorOptions, SensorSpec, Silent, Stage, Staged, StopSpec, WavelengthSpec, display, number, parse_illuminant,
+    parse_numbers, with_exposure_s,
 };
 use dioptric_report::write_run;
 use dioptric_spectrum::Cancel;
@@ -70,6 +70,10 @@ pub(crate) fn run(arguments: &RunArgs, common: &Common) -> anyhow::Result<()> {
                      film (--film scene) or a wider scene";
         remark(common.quiet, &format!("{percent:.1} % of the film gets no light; {words}"));
     }
+    if report.sensor.exposure_time_s > LONGEST_EXPOSURE_S {
+        let words = "is the scene as dark as that? What its file means can be said: --quantity, --unit, --scale";
+        remark(common.quiet, &format!("the exposure takes {:.1e} s: {words}", report.sensor.exposure_time_s));
+    }
     let is_coarse = matches!(capture.quality, Quality::Preview | Quality::Sketch);
     if is_coarse && matches!(capture.camera.blur, BlurSpec::Views(_)) {
         remark(common.quiet, "a preview has layers of depth in place of views through parts of the pupil");
@@ -88,6 +92,9 @@ fn beside(from: &Path) -> PathBuf {
     name.push("-changed");
     from.with_file_name(name)
 }
+
+/// Exposures longer than this are asked about: an hour.
+const LONGEST_EXPOSURE_S: f64 = 3600.0;
 
 /// What is to be known of a budget for a run that is continued.
 const MEMORY_WITH_FROM: &str =
@@ -204,11 +211,9 @@ fn change_scene(camera: &mut Camera, arguments: &RunArgs) -> anyhow::Result<()> 
         (scene.field_of_view_deg, scene.depth_m) = (None, None);
         scene.flat = Some(FlatSize { width_mm, distance_mm });
     }
-    if let Some(fill) = &arguments.fill_depth {
-        scene.fill_depth = Some(fill.parse().map_err(dioptric_pipeline::PipelineError::from)?);
-    }
     scene.hidden = arguments.hidden.clone().or_else(|| scene.hidden.take());
-    scene.white_level = arguments.white_level.or(scene.white_level);
+    arguments.scene_file.change(scene)?;
+    scene.mean_luminance_cd_m2 = arguments.mean_luminance_cd_m2.or(scene.mean_luminance_cd_m2);
     scene.illuminance_lux = arguments.illuminance_lux.or(scene.illuminance_lux);
     if let Some(name) = &arguments.illuminant {
         scene.illuminant = Some(parse_illuminant(name)?);
@@ -339,7 +344,7 @@ pub(crate) fn parse_size(text: &str) -> anyhow::Result<(usize, usize)> {
 
 pub(crate) fn summary(report: &RunReport, total_s: f64, out: &Path) -> String {
     format!(
-        "{}: {} × {} pixels of {} µm on {}, {} bands, {:.2} ms, {:.1} s\n{}{}\n",
+        "{}: {} × {} pixels of {} µm on {}, {} bands, {:.2} ms, {:.1} s\n{}\n",
         report.camera.name,
         report.film.columns,
         report.film.rows,

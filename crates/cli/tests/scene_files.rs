@@ -28,7 +28,9 @@ fn isetcam_scene_is_photographed() {
     let report = report(folder.path(), &run);
     assert_eq!((report["scene"]["columns"].as_u64(), report["scene"]["rows"].as_u64()), (Some(6), Some(4)));
     assert!(report["scene"]["light"]["illuminance_lux"].as_f64().unwrap() > 100.0);
-    let note = report["scene"]["notes"][0].as_str().unwrap();
+    let understood = report["scene"]["notes"][0].as_str().unwrap();
+    assert!(understood.starts_with("iset_scene.mat: radiance of its photons, 5 bands of 420–700 nm"), "{understood}");
+    let note = report["scene"]["notes"][1].as_str().unwrap();
     assert!(note.starts_with("5 bands of 420–700 nm, 60 to 80 nm apart become 3 bands"), "{note}");
     let old = scenes.join("iset_scene_v73.mat");
     let refused = dioptric(folder.path(), &["run", "camera.ron", "--scene", old.to_str().unwrap(), "--out", "bad"]);
@@ -105,5 +107,97 @@ fn hidden_layer_is_seen_past_an_edge() {
     assert!(known.0 > 1.15 * guessed.0, "{known:?} {guessed:?}");
     for (known, guessed) in [(known.1, guessed.1), (known.2, guessed.2)] {
         assert!((known / guessed - 1.0).abs() < 0.02, "{known} {guessed}");
+    }
+}
+
+/// Writes a file of 7 bands whose header says more than numbers, and a picture.
+fn files(folder: &Path) {
+    let header = "ENVI\nsamples = 8\nlines = 6\nbands = 7\ndata type = 12\ninterleave = bil\nwavelength units = nm\n\
+                  wavelength = {400, 450, 500, 550, 600, 650, 700}\nreflectance scale factor = 1000\ndata ignore value = 9\n\
+                  frobnicate = 3\n";
+    fs::write(folder.join("cube.hdr"), header).unwrap();
+    let codes: Vec<u8> = (0..8 * 6 * 7).flat_map(|i| (if i == 5 { 9_u16 } else { 500 }).to_le_bytes()).collect();
+    fs::write(folder.join("cube.raw"), codes).unwrap();
+    let picture = image::RgbImage::from_pixel(60, 40, image::Rgb([255, 255, 255]));
+    dioptric_pictures::save(&picture.into(), &folder.join("white.png")).unwrap();
+}
+
+#[test]
+fn scene_info_says_what_was_understood() {
+    let folder = folder();
+    files(folder.path());
+    let text = output(folder.path(), &["scene", "info", "cube.hdr", "--depth-m", "2", "-o", "cube.png"]);
+    for words in [
+        "reflectance, 1000 being a perfect white, 7 bands of 400–700 nm",
+        "'frobnicate'",
+        "1 without data are black",
+        "no field of view",
+    ] {
+        assert!(text.contains(words), "'{words}' in: {text}");
+    }
+    assert!(folder.path().join("cube.png").is_file());
+    // White of half reflectance under 1000 lx, written once and read again to the bit.
+    let convert = ["scene", "convert", "cube.hdr", "cube.exr", "--depth-m", "2", "--fov-deg", "20", "--quiet"];
+    output(folder.path(), &convert);
+    let of = |arguments: &[&str]| report(folder.path(), &[&["scene", "info"], arguments].concat());
+    let (own, made) = (of(&["cube.hdr", "--depth-m", "2", "--fov-deg", "20"]), of(&["cube.exr"]));
+    for key in ["mean_radiance", "largest_radiance", "depth_m", "view", "light", "wavelengths_nm"] {
+        assert_eq!(own[key], made[key], "{key}");
+    }
+    let luminance = own["mean_luminance_cd_m2"].as_f64().unwrap();
+    // Seven bands of 50 nm sum a spectrum to 3 %, and one of 336 samples is black.
+    assert!((luminance / (0.5 * 1000.0 / std::f64::consts::PI) - 1.0).abs() < 0.03, "{luminance}");
+    let part = of(&["cube.exr", "--crop", "2,1,4,3", "--rotate-deg", "90"]);
+    assert_eq!((part["columns"].as_u64(), part["rows"].as_u64()), (Some(3), Some(4)));
+}
+
+/// White under any light is white in the picture.
+#[test]
+fn relit_picture_is_white() {
+    let folder = folder();
+    files(folder.path());
+    for light in ["D65", "A"] {
+        let run = [
+            "run",
+            "camera.ron",
+            "--scene",
+            "white.png",
+            "--fov-deg",
+            "30",
+            "--depth-m",
+            "2",
+            "--illuminant",
+            light,
+            "--noise",
+            "none",
+            "--wavelengths-nm",
+            "400:700:20",
+            "--out",
+            "out",
+        ];
+        let text = dioptric(folder.path(), &run);
+        assert!(text.status.success(), "{}", String::from_utf8_lossy(&text.stderr));
+        let said = String::from_utf8_lossy(&text.stderr).into_owned();
+        assert!(said.contains("white.png: a picture as a display shows it (sRGB of 8 bits)"), "{said}");
+        let picture = common::read_picture(&folder.path().join("out/picture.png")).into_rgb8();
+        let pixel = picture.get_pixel(24, 16).0.map(i32::from);
+        assert!(pixel.iter().all(|v| (v - pixel[1]).abs() <= 2) && pixel[1] > 100, "{light}: {pixel:?}");
+    }
+}
+
+#[test]
+fn what_does_not_apply_is_refused_by_its_option() {
+    let folder = folder();
+    files(folder.path());
+    for (options, words) in [
+        (&["--white-level", "255"][..], &["white.png", "--white-level"][..]),
+        (&["--unit", "W/m^2/sr/nm"], &["white.png", "--unit"]),
+        (&["--unit", "lumen"], &["'lumen'"]),
+        (&["--depth-unit", "mm"], &["white.png", "--depth FILE"]),
+        (&["--depth", "none.png"], &["none.png"]),
+        (&["--view", "cube.hdr"], &["cube.hdr", "expected JSON"]),
+    ] {
+        let run = ["run", "camera.ron", "--scene", "white.png", "--depth-m", "2", "--out", "bad"];
+        common::check_error(folder.path(), &[&run[..], options].concat(), words);
     }
 }

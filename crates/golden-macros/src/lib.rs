@@ -11,6 +11,7 @@ use proc_macro::TokenStream;
 ///
 /// ```text
 /// #[dioptric_golden::needs_shared]
+#[test]
 /// #[test]
 /// fn rays_agree_with_the_reference() {}
 /// ```

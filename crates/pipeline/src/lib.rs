@@ -23,6 +23,7 @@ mod paintings;
 mod progress;
 mod quality;
 mod ranges;
+mod scene_files;
 mod schema;
 mod sense;
 mod shown;
@@ -36,13 +37,16 @@ pub use ndarray;
 pub use dioptric_backward::{BandSampling, LightPaths, MicroArray, MicroElements, MicroLayout, Renderer, Rendering};
 pub use dioptric_optics::{GlassRange, MissingGlass, SeqNumbers, SurfaceChange};
 pub use dioptric_psf::Diffraction;
-pub use dioptric_scene::{ExrSamples, FillDepth};
+pub use dioptric_scene::{
+    DepthKind, ExrSamples, FileQuantity, FileReading, FillDepth, NoData, may_be_read_with as may_be_read_with_scene,
+};
 
 pub use camera::{
     BlurSpec, BorderSpec, Camera, CameraTurn, Crop, DualPixelSpec, Exposed, FilmSpec, FilterSpec, FlatSize, FocusSpec,
     FramesSpec, LensReadOptions, LensSpec, LightFieldSpec, Movements, PhotodiodeReads, Photodiodes,
     REFERENCE_WAVELENGTH_NM, RenderEffort, RenderMethod, RetiredBank, SceneSource, SceneSpec, SensorOptions,
-    SensorSpec, StopSpec, TurnPath, VideoSpec, WavelengthSpec, WorldLamp, WorldSky, WorldSpec, WorldView, nearest_to_reference_nm,
+    SensorSpec, StopSpec, TurnPath, VideoSpec, WavelengthSpec, WorldLamp, WorldSky, WorldSpec, WorldView,
+    nearest_to_reference_nm,
 };
 pub use capture_files::{irradiance_files, write_capture, write_frames_and_depth, write_irradiance, write_scene};
 pub use develop::DevelopedFile;
@@ -57,6 +61,7 @@ pub use paintings::{PaintingFolder, program_build};
 pub use progress::{Clock, ImagingTimes, Progress, Silent, Stage};
 pub use quality::Quality;
 pub use ranges::{Range, range_of};
+pub use scene_files::{SceneInfo, SceneRequest};
 #[cfg(feature = "schema")]
 pub use schema::generated_schemas;
 pub use schema::{CAMERA_SCHEMA, CAMERA_TEMPLATE, SENSOR_SCHEMA};

@@ -56,6 +56,11 @@ const RANGES: &[(Range, &[&str])] = &[
     (of(1e-6, 1e9, "mm"), &["width_mm"]),
     (or_infinite(1e-6, 1e12, "mm"), &["distance_mm", "DistanceMm", "focus_mm", "distances_mm"]),
     (of(1e-12, 1e12, ""), &["white_level"]),
+    (of(1e-30, 1e30, ""), &["scale"]),
+    (of(1.0, 65_536.0, "samples"), &["bin"]),
+    (of(0.0, 270.0, "degrees"), &["rotate_deg"]),
+    (of(1e-6, 1e6, "m"), &["baseline_m"]),
+    (of(-1e6, 1e6, "samples"), &["offset_px"]),
     (of(1e-9, 1e9, "lux"), &["illuminance_lux"]),
     (of(1e-9, 1e9, "cd/m²"), &["mean_luminance_cd_m2", "white_cd_m2"]),
     (of(1e-9, 1e9, "m"), &["unit_m"]),
@@ -66,7 +71,10 @@ const RANGES: &[(Range, &[&str])] = &[
     (of(-360.0, 360.0, "degrees"), &["azimuth_deg"]),
     (of(1.7, 10.0, ""), &["turbidity"]),
     (of(1e-9, 1e12, "lm"), &["lumens"]),
-    (of(10.0, 1e6, "nm"), &["first_nm", "last_nm", "ListNm", "wavelength_nm", "wavelengths_nm"]),
+    (
+        of(10.0, 1e6, "nm"),
+        &["first_nm", "last_nm", "ListNm", "wavelength_nm", "wavelengths_nm", "scene_wavelengths_nm"],
+    ),
     (of(1e-3, 1e6, "nm"), &["step_nm"]),
     // The lens.
     (of(0.05, 1e5, ""), &["f_number", "FNumber"]),

@@ -214,6 +214,7 @@ fn sensed_irradiance_is_the_picture_of_the_run() {
         exit_pupil_mm: shot.place.exit_pupil_distance_mm,
         f_number: None,
         seed: camera.seed,
+        chip_seed: camera.chip_seed,
         outputs: camera.outputs.clone(),
     };
     let sensed = request.sense(&path).unwrap();

@@ -124,7 +124,8 @@ impl Camera {
     /// blur : {"layered", "pointwise", "views:N"}
     ///     Layers of depth; each sample on its own, as in the paper; layers through N parts of the pupil.
     /// scene : Scene or path
-    /// fov_deg, depth_m, width_mm, distance_mm, fill_depth, hidden, white_level
+    /// fov_deg, depth_m, width_mm, distance_mm, fill_depth, hidden, white_level, quantity, unit, scale, scene_wavelengths_nm, variable,
+    /// axes, no_data, depth, depth_unit, depth_kind, view
     /// illuminant, illuminance_lux, scene_light, mean_luminance_cd_m2
     ///     Of the scene, as of `Scene.read`.
     /// wavelengths_nm : list of float, or "scene"

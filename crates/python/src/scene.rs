@@ -6,10 +6,14 @@ use std::{
 };
 
 use dioptric_pipeline::{
-    Camera, FillDepth, FlatSize, Given, KeptCamera, PipelineError, SceneSource, SceneSpec, parse_illuminant,
+    Camera, FileQuantity, FillDepth, FlatSize, Given, KeptCamera, PipelineError, SceneSource, SceneSpec,
+    parse_illuminant,
 };
-use dioptric_scene::{ExrSamples, Pattern, Scene as RadianceScene, SceneLight, View, write_scene_exr};
-use dioptric_spectrum::{DepthMap, Quantity, SpectralImage, WavelengthGrid};
+use dioptric_scene::{
+    ExrSamples, Pattern, Scene as RadianceScene, SceneError, SceneLight, View, filled_depth, joules_per_photon,
+    reflectance_under, write_scene_exr,
+};
+use dioptric_spectrum::{Illuminant, Quantity, SpectralImage, WavelengthGrid};
 use ndarray::{Array2, Array3, ArrayView1, Axis, Ix2, Ix3};
 use pyo3::{prelude::*, types::PyDict};
 
@@ -90,26 +94,46 @@ impl Scene {
     /// Parameters
     /// ----------
     /// radiance : array_like, (bands, rows, columns)
-    ///     Spectral radiance, W m⁻² sr⁻¹ nm⁻¹, finite and not negative; copied, as 32-bit floats.
+    ///     What `quantity` says, finite and not negative; copied, as 32-bit floats.
     /// wavelengths_nm : list of float
     ///     Centers of the bands, ascending.
     /// depth_m : float or array_like (rows, columns)
     ///     Depth along the axis, above 0; ``inf`` is allowed.
-    /// fov_deg : float
+    /// fov_deg : float, optional
     ///     Horizontal field of view from edge to edge.
+    /// intrinsics : (float, float, float), optional
+    ///     In place of it the focal length, and the column and the row of the axis, in samples; their centers are at whole numbers.
+    /// quantity : {"radiance", "reflectance", "photons"}
+    ///     Spectral radiance, W m⁻² sr⁻¹ nm⁻¹; reflectance, which is lit by ``light`` (D65) of ``illuminance_lux`` (1000); or
+    ///     photons s⁻¹ m⁻² sr⁻¹ nm⁻¹.
     /// light : str, optional
     ///     The light on it, where that is known, as ``"D65"``: what white balance goes by.
+    /// illuminance_lux : float, optional
+    /// fill_depth : {"beside", "far"} or float, optional
+    ///     The depth where it is 0 or NaN, as of `Scene.read`.
     /// name : str
     #[staticmethod]
-    #[pyo3(signature = (radiance, wavelengths_nm, *, depth_m, fov_deg, light=None, name="scene"))]
+    #[pyo3(signature = (radiance, wavelengths_nm, *, depth_m, fov_deg=None, intrinsics=None, quantity="radiance", light=None,
+        illuminance_lux=None, fill_depth=None, name="scene"))]
+    #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
     fn from_array(
         radiance: &Bound<'_, PyAny>,
         wavelengths_nm: &Bound<'_, PyAny>,
         depth_m: &Bound<'_, PyAny>,
-        fov_deg: f64,
+        fov_deg: Option<f64>,
+        intrinsics: Option<[f64; 3]>,
+        quantity: &str,
         light: Option<&str>,
+        illuminance_lux: Option<f64>,
+        fill_depth: Option<&Bound<'_, PyAny>>,
         name: &str,
     ) -> PyResult<Self> {
+        let quantity: FileQuantity = quantity.parse().map_err(|error| exception(PipelineError::from(error)))?;
+        let fill = fill_depth.map(|value| fill_of("fill_depth", value)).transpose()?;
+        if fov_deg.is_some() == intrinsics.is_some() {
+            let found = if fov_deg.is_some() { "given beside intrinsics" } else { "missing" };
+            return Err(wrong("fov_deg", found, "either a field of view or intrinsics"));
+        }
         let cube = owned_f32("radiance", radiance, "(bands, rows, columns)", &[3])?;
         let cube: Array3<f32> = cube.into_dimensionality::<Ix3>().expect("three axes were checked");
         let depth = match is_single(depth_m) {
@@ -125,12 +149,17 @@ impl Scene {
                 let grid = WavelengthGrid::new(wavelengths_nm)?;
                 let (_, rows, columns) = cube.dim();
                 let planes = cube.axis_iter(Axis(0)).map(|plane| plane.to_owned()).collect();
-                let mut scene = RadianceScene::new(name, SpectralImage::new(Quantity::Radiance, grid, planes)?);
-                scene.depth = Some(DepthMap::new(depth)?);
-                scene.view = Some(View::from_horizontal_fov_deg(fov_deg, columns, rows)?);
-                if let Some(light) = light {
-                    scene.light = Some(SceneLight { illuminant: parse_illuminant(light)?, illuminance_lux: None });
-                }
+                let light = light.map(parse_illuminant).transpose()?;
+                let (radiance, light) = radiance_of(quantity, grid, planes, light, illuminance_lux)?;
+                let mut scene = RadianceScene::new(name, radiance);
+                let (depth, note) = filled_depth(name, depth, fill)?;
+                scene.depth = Some(depth);
+                scene.notes.extend(note);
+                scene.view = Some(match (fov_deg, intrinsics) {
+                    (None, Some([focal_px, center_x_px, center_y_px])) => View { focal_px, center_x_px, center_y_px },
+                    (fov_deg, _) => View::from_horizontal_fov_deg(fov_deg.unwrap_or(f64::NAN), columns, rows)?,
+                });
+                scene.light = light;
                 scene.validate()?;
                 Ok(scene)
             };
@@ -155,7 +184,18 @@ impl Scene {
     /// hidden : str or os.PathLike, optional
     ///     A file of what lies behind the first surface: radiance and depth of the same samples.
     /// white_level : float, optional
-    ///     The number that a perfect white has in an ENVI file that does not state it.
+    ///     The number that a perfect white has in a cube that does not state it.
+    /// quantity : {"radiance", "reflectance", "photons"}, optional
+    /// unit, variable, axes : str, optional
+    /// scale : float, optional
+    /// scene_wavelengths_nm : list of float, optional
+    ///     What a cube's numbers are, where its file does not say so.
+    /// no_data : {"black", "fill", "refuse"}, optional
+    ///     What becomes of samples that are no light.
+    /// depth, view : str or os.PathLike, optional
+    ///     Files of the depth and of the camera data, in place of those in the file or beside it.
+    /// depth_unit, depth_kind : str, optional
+    ///     What the depth's numbers are, as ``"5000/m"``, ``"radial"``, ``"inverse:0.5,20"``, ``"disparity:0.193"``.
     /// illuminant : str, optional
     ///     The light that it is put under, as ``"D65"``, ``"3200K"``, or a CSV file.
     /// illuminance_lux : float, optional
@@ -334,6 +374,17 @@ pub(crate) const SCENE_OPTIONS: &[&str] = &[
     "fill_depth",
     "hidden",
     "white_level",
+    "quantity",
+    "unit",
+    "scale",
+    "scene_wavelengths_nm",
+    "variable",
+    "axes",
+    "no_data",
+    "depth",
+    "depth_unit",
+    "depth_kind",
+    "view",
     "illuminant",
     "illuminance_lux",
     "light",
@@ -360,13 +411,19 @@ pub(crate) fn set_scene_option(spec: &mut SceneSpec, key: &str, value: &Bound<'_
             Some(flat) => flat.distance_mm = number(key, value)?,
             None => return Err(wrong(key, number(key, value)?, "'width_mm' with it, the width of a flat scene")),
         },
-        "fill_depth" => {
-            let fill = match value.extract::<f64>() {
-                Ok(z_m) => FillDepth::Metres(z_m),
-                Err(_) => word(key, value)?.parse().map_err(exception)?,
-            };
-            fill.check().map_err(exception)?;
-            spec.fill_depth = Some(fill);
+        "fill_depth" => spec.fill_depth = Some(fill_of(key, value)?),
+        "quantity" => spec.reading.quantity = Some(parsed(key, value)?),
+        "unit" => spec.reading.unit = Some(word(key, value)?),
+        "scale" => spec.reading.scale = Some(number(key, value)?),
+        "scene_wavelengths_nm" => spec.reading.wavelengths_nm = Some(numbers(key, value)?),
+        "variable" => spec.reading.variable = Some(word(key, value)?),
+        "axes" => spec.reading.axes = Some(word(key, value)?),
+        "no_data" => spec.reading.no_data = Some(parsed(key, value)?),
+        "depth_unit" => spec.reading.depth_unit = Some(word(key, value)?),
+        "depth_kind" => spec.reading.depth_kind = Some(parsed(key, value)?),
+        "depth" | "view" => {
+            let path: PathBuf = value.extract().map_err(|_| wrong_type(key, type_name(value), "a path"))?;
+            if key == "depth" { spec.reading.depth = Some(path) } else { spec.reading.view = Some(path) }
         }
         "hidden" => {
             let expected = "a path: a file of what lies behind the first surface";
@@ -379,6 +436,47 @@ pub(crate) fn set_scene_option(spec: &mut SceneSpec, key: &str, value: &Bound<'_
         _ => spec.mean_luminance_cd_m2 = Some(number(key, value)?),
     }
     Ok(())
+}
+
+/// Returns a choice by its word.
+fn parsed<T: std::str::FromStr<Err = SceneError>>(key: &str, value: &Bound<'_, PyAny>) -> PyResult<T> {
+    word(key, value)?.parse().map_err(|error| exception(PipelineError::from(error)))
+}
+
+fn fill_of(key: &str, value: &Bound<'_, PyAny>) -> PyResult<FillDepth> {
+    let fill = match value.extract::<f64>() {
+        Ok(z_m) => FillDepth::Metres(z_m),
+        Err(_) => word(key, value)?.parse().map_err(exception)?,
+    };
+    fill.check().map_err(exception)?;
+    Ok(fill)
+}
+
+/// Returns the radiance of numbers, and the light on them.
+fn radiance_of(
+    quantity: FileQuantity,
+    grid: WavelengthGrid,
+    planes: Vec<Array2<f32>>,
+    light: Option<Illuminant>,
+    illuminance_lux: Option<f64>,
+) -> Result<(SpectralImage, Option<SceneLight>), PipelineError> {
+    match quantity {
+        FileQuantity::Reflectance => {
+            let light = SceneLight::new(light.unwrap_or(Illuminant::D65), illuminance_lux.unwrap_or(1000.0));
+            let white = light.illuminant.white_radiance(&grid, illuminance_lux.unwrap_or(1000.0));
+            let image = SpectralImage::new(Quantity::Reflectance, grid, planes)?;
+            Ok((reflectance_under(&image, &white)?, Some(light)))
+        }
+        FileQuantity::Radiance | FileQuantity::Photons => {
+            let mut image = SpectralImage::new(Quantity::Radiance, grid.clone(), planes)?;
+            if quantity == FileQuantity::Photons {
+                for (mut plane, &nm) in image.planes_mut().zip(grid.centers_nm()) {
+                    plane.mapv_inplace(|v| (f64::from(v) * joules_per_photon(nm)) as f32);
+                }
+            }
+            Ok((image, light.map(|illuminant| SceneLight { illuminant, illuminance_lux })))
+        }
+    }
 }
 
 /// Refuses the width of a flat scene without its distance.

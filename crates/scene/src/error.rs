@@ -47,12 +47,23 @@ pub enum SceneError {
     },
     /// A file whose name does not determine its kind.
     #[error(
-        "{}: expected a .exr, .hdr (ENVI), .mat (ISETCam), .png, .jpg or .tif file, or a folder with one picture a band",
+        "{}: expected a .exr, .hdr (ENVI or Radiance), .mat, .npy, .tif, .png, .jpg, .webp, .bmp, .ppm or .pfm file, or a folder with \
+         one picture a band",
         file.display()
     )]
     UnknownKind {
         /// The file.
         file: PathBuf,
+    },
+    /// Something that is said of a file that leaves nothing open there.
+    #[error("{}: {what} cannot be said of it, since it is {kind}: expected it left out", file.display())]
+    DoesNotApply {
+        /// The file.
+        file: PathBuf,
+        /// What was said.
+        what: &'static str,
+        /// What the file is.
+        kind: String,
     },
     /// A picture without a single spectral band.
     #[error("{}: no spectral band found: expected {expected}", file.display())]

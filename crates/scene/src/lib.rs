@@ -35,9 +35,10 @@ pub use ndarray;
 pub use display_model::{DisplayCurve, DisplayModel, PixelLayout};
 pub use error::SceneError;
 pub use formats::{
-    EnviCube, ExrParts, ExrSamples, FillDepth, IsetScene, PictureSamples, ReadOptions, SpectralFile, SpectralHead,
-    read_band_folder, read_envi, read_exr_light, read_hidden_layer, read_iset_mat, read_picture, read_picture_samples,
-    read_planes_exr, read_scene, read_spectral_exr, write_planes_exr, write_scene_exr, write_spectral_exr,
+    DepthKind, ExrParts, ExrSamples, FileQuantity, FileReading, FillDepth, NoData, PictureSamples, ReadOptions,
+    SpectralFile, SpectralHead, filled_depth, joules_per_photon, may_be_read_with, read_exr_light, read_hidden_layer,
+    read_picture, read_picture_samples, read_planes_exr, read_scene, read_spectral_exr, write_planes_exr,
+    write_scene_exr, write_spectral_exr,
 };
 pub use light::SceneLight;
 pub use preview::{srgb_preview, write_preview_png};

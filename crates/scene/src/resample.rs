@@ -32,7 +32,10 @@ fn weighted_sum(image: &SpectralImage, weights: &[(usize, f64)]) -> Array2<f32> 
 }
 
 /// Returns for each new band the old bands that it is made of, with their weights, which sum to 1.
-fn resampling_weights(from: &WavelengthGrid, to: &WavelengthGrid) -> Result<Vec<Vec<(usize, f64)>>, SceneError> {
+pub(crate) fn resampling_weights(
+    from: &WavelengthGrid,
+    to: &WavelengthGrid,
+) -> Result<Vec<Vec<(usize, f64)>>, SceneError> {
     let ((first, last), n) = (from.range_nm(), from.len());
     let (margin_first, margin_last) = (from.widths_nm()[0], from.widths_nm()[n - 1]);
     let (new_first, new_last) = to.range_nm();

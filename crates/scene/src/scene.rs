@@ -236,6 +236,32 @@ impl Scene {
         self.with_samples(image, depth, self.view.map(|view| view.binned(factor)))
     }
 
+    /// Returns the scene turned clockwise by quarters of a turn.
+    ///
+    /// # Errors
+    /// None: a turned scene is one.
+    pub fn turned(self, quarters: usize) -> Result<Self, SceneError> {
+        let mut scene = self;
+        for _ in 0..quarters % 4 {
+            let rows = scene.rows() as f64;
+            let turn = |plane: &Array2<f32>| {
+                let mut turned = plane.t().to_owned();
+                turned.invert_axis(ndarray::Axis(1));
+                turned.as_standard_layout().into_owned()
+            };
+            let image = |image: &SpectralImage| {
+                SpectralImage::new(image.quantity(), image.grid().clone(), image.planes().iter().map(turn).collect())
+            };
+            let view = scene.view.map(|view| View {
+                center_x_px: rows - 1.0 - view.center_y_px,
+                center_y_px: view.center_x_px,
+                ..view
+            });
+            scene = scene.with_samples(image, |depth| DepthMap::new(turn(depth.z_m())), view)?;
+        }
+        Ok(scene)
+    }
+
     /// Returns the scene on other bands.
     ///
     /// Between band centers radiance runs in straight lines; a band wider than those of the scene takes the mean
@@ -320,6 +346,18 @@ mod tests {
         assert_eq!(part.radiance.spectrum_at(0, 0), scene.radiance.spectrum_at(1, 2));
         assert_eq!(part.view.unwrap().tan_at(0.0, 0.0), scene.view.unwrap().tan_at(1.0, 2.0));
         assert!(scene.cropped(0..6, 0..1).is_err() && scene.cropped(2..2, 0..1).is_err());
+    }
+
+    #[test]
+    fn turned_scene_keeps_its_directions() {
+        let scene = scene().cropped(0..4, 1..6).unwrap();
+        let turned = scene.clone().turned(1).unwrap();
+        assert_eq!((turned.rows(), turned.columns()), (5, 4));
+        // What was at the left of the last row is at the top left.
+        assert_eq!(turned.radiance.spectrum_at(0, 0), scene.radiance.spectrum_at(3, 0));
+        let ((x, y), (u, v)) = (scene.view.unwrap().tan_at(3.0, 0.0), turned.view.unwrap().tan_at(0.0, 0.0));
+        assert!((u - y).abs() < 1e-12 && (v + x).abs() < 1e-12);
+        assert_eq!(turned.turned(3).unwrap(), scene);
     }
 
     #[test]

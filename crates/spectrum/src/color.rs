@@ -49,7 +49,12 @@ impl Observer {
                 .map(|(&center, &width)| {
                     // The table is given every nanometer: a mean of points half a nanometer apart is exact to 1e-4.
                     let n = (2.0 * width).ceil().max(1.0) as usize;
-                    let mean = (0..n)
+                    let (first, last) = bar.range_nm();
+                    // Of a band wider than all that is seen only the part within the table counts.
+                    let place = |nm: f64| ((nm - center) / width + 0.5) * n as f64;
+                    let range =
+                        place(first).floor().max(0.0) as usize..place(last).ceil().clamp(0.0, n as f64) as usize;
+                    let mean = range
                         .map(|i| bar.at_or_zero(center + width * ((i as f64 + 0.5) / n as f64 - 0.5)))
                         .sum::<f64>()
                         / n as f64;

@@ -161,9 +161,13 @@ impl Illuminant {
     }
 
     /// Returns the relative spectral power; the scale is that of its table (100 at 560 nm for most).
+    ///
+    /// From 830 nm to 2500 nm, where no table reaches, daylights go on as a black body of 5800 K does (within some tens of percent of
+    /// sunlight between the bands of water), black bodies by Planck's law, and fluorescent lights and LEDs have nothing.
     pub fn spectrum(&self) -> Spectrum {
         let table = |name| Spectrum::from_embedded_csv(ILLUMINANTS, name).expect("the embedded table has this column");
-        match self {
+        let infrared = |kelvin: f64| move |nm: f64| planck(nm, kelvin) / planck(TABLES_END_NM, kelvin);
+        let spectrum = match self {
             Self::A => blackbody(2855.5).scaled(100.0 / blackbody(2855.5).at_held(560.0)),
             Self::D50 => table("D50"),
             Self::D55 => table("D55"),
@@ -177,6 +181,24 @@ impl Illuminant {
             Self::Daylight(kelvin) => daylight(*kelvin),
             Self::Chromaticity { x, y } => of_chromaticity([*x, *y]),
             Self::Spectrum(spectrum) => spectrum.clone(),
+        };
+        match self {
+            Self::D50 | Self::D55 | Self::D65 | Self::D75 | Self::Daylight(_) => beyond(spectrum, infrared(SUN_K)),
+            // Its own temperature where it is a black body's.
+            Self::Chromaticity { .. } => {
+                let kelvin = self.base_kelvin();
+                beyond(spectrum, infrared(if kelvin < DAYLIGHT_FROM_K { kelvin } else { SUN_K }))
+            }
+            Self::Fl2 | Self::Fl11 | Self::LedB3 => beyond(spectrum, |_| 0.0),
+            Self::A | Self::E | Self::Blackbody(_) | Self::Spectrum(_) => spectrum,
+        }
+    }
+
+    /// Returns the color temperature that a light of a chromaticity starts from.
+    fn base_kelvin(&self) -> f64 {
+        match self {
+            Self::Chromaticity { x, y } => ColorTemperature::of_chromaticity([*x, *y]).kelvin,
+            _ => SUN_K,
         }
     }
 
@@ -190,6 +212,29 @@ impl Illuminant {
         let scale = illuminance_lux / std::f64::consts::PI / luminance;
         spectrum.sample_held(grid).iter().map(|v| v * scale).collect()
     }
+}
+
+/// Where the tables of lights end, and up to where they are continued, nm.
+const TABLES_END_NM: f64 = 830.0;
+const INFRARED_END_NM: f64 = 2500.0;
+/// The temperature of a black body that sunlight in the infrared is like.
+const SUN_K: f64 = 5800.0;
+
+/// Returns a table continued by what a light is relative to its last value, which is held up to the end of tables.
+fn beyond(table: Spectrum, ratio: impl Fn(f64) -> f64) -> Spectrum {
+    const STEP_NM: f64 = 10.0;
+    let (mut wavelengths_nm, mut values) = (table.wavelengths_nm().to_vec(), table.values().to_vec());
+    let last = values[values.len() - 1];
+    if table.range_nm().1 < TABLES_END_NM {
+        wavelengths_nm.push(TABLES_END_NM);
+        values.push(last);
+    }
+    let n = ((INFRARED_END_NM - TABLES_END_NM) / STEP_NM) as usize;
+    for nm in (1..=n).map(|i| TABLES_END_NM + STEP_NM * i as f64) {
+        wavelengths_nm.push(nm);
+        values.push(last * ratio(nm));
+    }
+    Spectrum::new(wavelengths_nm, values).expect("wavelengths ascend")
 }
 
 /// Where the CIE turns from black bodies to daylights as reference lights (CIE 13.3), K.
@@ -303,11 +348,11 @@ fn planck(wavelength_nm: f64, kelvin: f64) -> f64 {
     1e-9 * C1L / (m.powi(5) * (C2 / (m * kelvin)).exp_m1())
 }
 
-/// Returns the spectral radiance of a black body, W m⁻² sr⁻¹ nm⁻¹, every 5 nm from 300 to 1100 nm.
+/// Returns the spectral radiance of a black body, W m⁻² sr⁻¹ nm⁻¹, every 5 nm from 300 to 2500 nm.
 ///
 /// Planck's law with c₂ = 1.438 776 877 × 10⁻² m K.
 pub fn blackbody(kelvin: f64) -> Spectrum {
-    let wavelengths_nm: Vec<f64> = (0..=160).map(|i| 300.0 + 5.0 * f64::from(i)).collect();
+    let wavelengths_nm: Vec<f64> = (0..=440).map(|i| 300.0 + 5.0 * f64::from(i)).collect();
     let values = wavelengths_nm.iter().map(|&nm| planck(nm, kelvin)).collect();
     Spectrum::new(wavelengths_nm, values).expect("Planck's law is finite at a positive temperature")
 }
@@ -375,6 +420,23 @@ mod tests {
             assert_abs_diff_eq!(cx, x, epsilon = 1.5e-4);
             assert_abs_diff_eq!(cy, y, epsilon = 1.5e-4);
         }
+    }
+
+    #[test]
+    fn lights_go_on_in_the_infrared() {
+        let at = |light: &Illuminant, nm: f64| light.spectrum().at_held(nm);
+        for light in [Illuminant::D50, Illuminant::D65, Illuminant::Daylight(6500.0)] {
+            let ratio = at(&light, 1700.0) / at(&light, 830.0);
+            // Planck's law at 5800 K: λ⁻⁵ / (exp(c₂ / λT) − 1).
+            let planck = |um: f64| um.powi(-5) / ((14_387.77 / (um * 5800.0)).exp() - 1.0);
+            assert!((ratio / (planck(1.7) / planck(0.83)) - 1.0).abs() < 2e-3, "{ratio}");
+        }
+        let a = Illuminant::A;
+        assert!(at(&a, 1600.0) < at(&a, 1000.0) && at(&a, 2500.0) > 0.2 * at(&a, 1000.0));
+        for light in [Illuminant::Fl2, Illuminant::Fl11, Illuminant::LedB3] {
+            assert_eq!(at(&light, 900.0), 0.0);
+        }
+        assert_eq!(at(&Illuminant::E, 2000.0), 100.0);
     }
 
     #[test]

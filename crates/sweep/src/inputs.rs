@@ -9,7 +9,7 @@ use std::{
     time::SystemTime,
 };
 
-use dioptric_pipeline::{Camera, FilterSpec, SceneSource, SensorSpec};
+use dioptric_pipeline::{Camera, FilterSpec, SceneSource, SensorSpec, may_be_read_with_scene};
 
 use crate::SweepError;
 
@@ -93,6 +93,8 @@ fn paths(camera: &mut Camera) -> Vec<&mut PathBuf> {
         .chain(camera.filters.iter_mut().filter_map(FilterSpec::file_mut))
         .chain(scene)
         .chain(&mut camera.scene.hidden)
+        .chain(&mut camera.scene.reading.depth)
+        .chain(&mut camera.scene.reading.view)
         .collect()
 }
 
@@ -118,7 +120,7 @@ impl Input {
 }
 
 /// Adds a file and those that reading it may read: the files of a folder, those beside it that differ in their ending alone
-/// (the samples of a header, the glasses of a lens), and those that a world names in quotes.
+/// (the samples of a header, the glasses of a lens) or belong to a scene (its depth, its camera), and those that a world names in quotes.
 fn collect(path: &Path, files: &mut BTreeSet<PathBuf>) -> Result<(), SweepError> {
     let data = fs::metadata(path).map_err(SweepError::reading(path))?;
     let folder = if data.is_dir() { path } else { path.parent().unwrap_or(Path::new("")) };
@@ -129,7 +131,8 @@ fn collect(path: &Path, files: &mut BTreeSet<PathBuf>) -> Result<(), SweepError>
     for entry in fs::read_dir(listed).map_err(SweepError::reading(listed))? {
         let name = entry.map_err(SweepError::reading(listed))?.file_name();
         let beside = folder.join(&name);
-        if (data.is_dir() || beside.file_stem() == path.file_stem()) && beside.is_file() {
+        let belongs = beside.file_stem() == path.file_stem() || may_be_read_with_scene(path, &beside);
+        if (data.is_dir() || belongs) && beside.is_file() {
             files.insert(beside);
         }
     }

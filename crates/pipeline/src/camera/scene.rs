@@ -6,8 +6,8 @@ use std::{
 };
 
 use dioptric_scene::{
-    FillDepth, Pattern, ReadOptions, Scene, SceneLight, StillLife, Target, TargetLight, View, read_hidden_layer,
-    read_scene,
+    FileReading, FillDepth, Pattern, ReadOptions, Scene, SceneLight, StillLife, Target, TargetLight, View,
+    read_hidden_layer, read_scene,
 };
 use dioptric_spectrum::{DepthMap, Illuminant, WavelengthGrid};
 use serde::{Deserialize, Serialize};
@@ -41,9 +41,12 @@ pub struct SceneSpec {
     /// known. A layer `hidden` of the file itself does as well.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub hidden: Option<PathBuf>,
-    /// The number that a perfect white has in an ENVI file that does not state it.
+    /// The number that a perfect white has in a cube that does not state it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub white_level: Option<f64>,
+    /// What else a file does not state itself: what its numbers are, and where depth and camera data are.
+    #[serde(default, skip_serializing_if = "is_unsaid")]
+    pub reading: FileReading,
     /// The light that the scene is put under: it lights reflectances and targets (D65 if left out), and takes the place of
     /// the light on all others (their own if left out), where that is known.
     #[serde(default)]
@@ -59,6 +62,11 @@ pub struct SceneSpec {
     /// Scales the radiance to this mean luminance, cd/m²; nothing is scaled unless this is given.
     #[serde(default)]
     pub mean_luminance_cd_m2: Option<f64>,
+}
+
+/// Whether nothing is said of a file.
+fn is_unsaid(reading: &FileReading) -> bool {
+    *reading == FileReading::default()
 }
 
 /// The size and the place of a flat scene that faces the camera.
@@ -108,7 +116,8 @@ impl FlatSize {
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub enum SceneSource {
-    /// A spectral EXR, an ENVI header, an `ISETCam` scene (`.mat`), a folder of band pictures, or an ordinary picture.
+    /// A spectral EXR, an ENVI header or its file of numbers, a MATLAB file, an array of NumPy, a stack of TIFF pages, a folder of band
+    /// pictures, or an ordinary picture.
     File(PathBuf),
     /// The built-in still life, with objects at several depths.
     StillLife {
@@ -144,6 +153,7 @@ impl SceneSpec {
             fill_depth: None,
             hidden: None,
             white_level: None,
+            reading: FileReading::default(),
             illuminant: None,
             illuminance_lux: None,
             light: None,
@@ -168,6 +178,15 @@ impl SceneSpec {
             checker.wrong("fill_depth", &z_m.to_string(), "Beside, Far, or Metres above 0")?;
         }
         self.check_flat(checker)?;
+        if let Err(error) = self.reading.check() {
+            checker.wrong("reading", &error.to_string(), "what can be said of a file")?;
+        }
+        if !is_unsaid(&self.reading) && !matches!(self.source, SceneSource::File(_)) {
+            checker.wrong("reading", "what is said of a file", "a source that is a file")?;
+        }
+        if self.white_level.is_some() && !matches!(self.source, SceneSource::File(_)) {
+            checker.wrong("white_level", "what is said of a file", "a source that is a file")?;
+        }
         if self.hidden.is_some() && !matches!(self.source, SceneSource::File(_)) {
             checker.wrong("hidden", "a file", "a source that is a file as well")?;
         }
@@ -267,23 +286,8 @@ impl SceneSpec {
         let light = self.illuminant.clone().unwrap_or(Illuminant::D65);
         let illuminance_lux = self.illuminance_lux.unwrap_or(USUAL_LUX);
         let mut scene = match &self.source {
-            SceneSource::File(path) => {
-                let options = ReadOptions {
-                    grid: wanted.cloned(),
-                    light,
-                    illuminance_lux,
-                    picture_white_cd_m2: illuminance_lux / PI,
-                    depth_m: self.depth_m,
-                    horizontal_fov_deg: self.field_of_view_deg,
-                    fill_depth: self.fill_depth,
-                    finest_tangent,
-                    white_level: self.white_level,
-                    ..ReadOptions::default()
-                };
-                let mut scene = read_scene(path, &options)?;
-                if let Some(hidden) = &self.hidden {
-                    scene.hidden = Some(read_hidden_layer(hidden, &options, &scene)?);
-                }
+            SceneSource::File(_) => {
+                let scene = self.read_file(wanted, finest_tangent)?;
                 self.lay_flat(scene)?
             }
             SceneSource::World(world) => {
@@ -308,6 +312,41 @@ impl SceneSpec {
             .scene(&bands_or_own(wanted)?)?,
         };
         self.light_up(&mut scene)?;
+        scene.require_depth_and_view()?;
+        Ok(scene)
+    }
+
+    /// Returns the scene of a file as it is, with or without depth and view.
+    ///
+    /// # Errors
+    /// When the file cannot be read.
+    pub fn look(&self, wanted: Option<&WavelengthGrid>) -> Result<Scene, PipelineError> {
+        let mut scene = self.read_file(wanted, None)?;
+        self.light_up(&mut scene)?;
+        Ok(scene)
+    }
+
+    /// Reads the scene of a file, a picture no finer than asked for.
+    fn read_file(&self, wanted: Option<&WavelengthGrid>, finest_tangent: Option<f64>) -> Result<Scene, PipelineError> {
+        let SceneSource::File(path) = &self.source else {
+            let reason = "expected the file of a scene".to_owned();
+            return Err(PipelineError::Unsuitable { what: "scene", reason });
+        };
+        let options = ReadOptions {
+            grid: wanted.cloned(),
+            light: self.illuminant.clone(),
+            illuminance_lux: self.illuminance_lux,
+            depth_m: self.depth_m,
+            horizontal_fov_deg: self.field_of_view_deg,
+            fill_depth: self.fill_depth,
+            finest_tangent,
+            white_level: self.white_level,
+            reading: self.reading.clone(),
+        };
+        let mut scene = read_scene(path, &options)?;
+        if let Some(hidden) = &self.hidden {
+            scene.hidden = Some(read_hidden_layer(hidden, &options, &scene)?);
+        }
         Ok(scene)
     }
 
@@ -328,6 +367,7 @@ impl SceneSpec {
         }
         scene.validate()?;
         self.light_up(&mut scene)?;
+        scene.require_depth_and_view()?;
         Ok(scene)
     }
 
@@ -349,9 +389,14 @@ impl SceneSpec {
         if self.illuminant.is_some() || self.illuminance_lux.is_some() {
             scene.relight(self.illuminant.as_ref(), self.illuminance_lux)?;
         }
-        scene.require_depth_and_view()?;
         if let Some(wanted_cd_m2) = self.mean_luminance_cd_m2 {
-            scene.scale(wanted_cd_m2 / scene.mean_luminance_cd_m2())?;
+            let factor = wanted_cd_m2 / scene.mean_luminance_cd_m2();
+            scene.scale(factor)?;
+            // The light on it is so many times as strong too.
+            if let Some(lux) = scene.light.as_mut().and_then(|light| light.illuminance_lux.as_mut()) {
+                *lux *= factor;
+            }
+            scene.notes.push(format!("its radiance is multiplied by {factor:.4e}, to {wanted_cd_m2} cd/m² on average"));
         }
         Ok(())
     }
@@ -363,8 +408,8 @@ impl SceneSpec {
             SceneSource::World(_) => {}
             SceneSource::StillLife { .. } | SceneSource::Target { .. } => {}
         }
-        if let Some(hidden) = &mut self.hidden {
-            *hidden = folder.join(&hidden);
+        for file in [&mut self.hidden, &mut self.reading.depth, &mut self.reading.view].into_iter().flatten() {
+            *file = folder.join(&file);
         }
     }
 }

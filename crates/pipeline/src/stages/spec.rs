@@ -11,7 +11,7 @@ use std::{
 use dioptric_backward::MicroArray;
 use dioptric_forward::Film;
 use dioptric_optics::Lens;
-use dioptric_scene::{FillDepth, Scene};
+use dioptric_scene::{FileReading, FillDepth, Scene, may_be_read_with};
 use dioptric_sensor::{ExposureControl, Noise, OpticalFilter, Processing, Sensor, WhiteBalance};
 use dioptric_spectrum::Illuminant;
 use serde::{Deserialize, Serialize};
@@ -36,14 +36,17 @@ pub(crate) struct FileStamp {
 
 impl FileStamp {
     /// Returns the stamps of all that reading a path may read: the files of a folder, or a file and those beside it that
-    /// differ in their ending alone (the samples of a header, the glasses of a lens).
+    /// differ in their ending alone (the samples of a header, the glasses of a lens) or belong to a scene (its depth, its camera).
     fn all_of(path: &Path) -> Vec<Self> {
         let folder = if path.is_dir() { Some(path) } else { path.parent() };
         let folder = folder.filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
         let entries = fs::read_dir(folder).into_iter().flatten().filter_map(|entry| Some(entry.ok()?.path()));
         let mut beside: Vec<PathBuf> = match path.is_dir() {
             true => entries.collect(),
-            false => entries.filter(|entry| entry.file_stem() == path.file_stem() && entry.is_file()).collect(),
+            false => {
+                let belongs = |entry: &PathBuf| entry.file_stem() == path.file_stem() || may_be_read_with(path, entry);
+                entries.filter(|entry| belongs(entry) && entry.is_file()).collect()
+            }
         };
         beside.retain(|entry| entry.file_name() != path.file_name());
         beside.sort();
@@ -103,6 +106,7 @@ pub(crate) struct SceneInputs {
     pub(crate) light: Option<Illuminant>,
     pub(crate) mean_luminance_cd_m2: Option<f64>,
     pub(crate) white_level: Option<f64>,
+    pub(crate) reading: FileReading,
 }
 
 /// A world, read from its files.
@@ -290,6 +294,7 @@ impl SceneInputs {
             fill_depth: *fill_depth,
             hidden: hidden.clone(),
             white_level: self.white_level,
+            reading: self.reading.clone(),
             illuminant: self.illuminant.clone(),
             light: self.light.clone(),
             illuminance_lux: self.illuminance_lux,
@@ -315,8 +320,9 @@ impl SceneInputs {
                 frame: None,
                 files: match &scene.source {
                     SceneSource::File(path) if given.scene.is_none() => {
-                        let hidden = scene.hidden.iter().flat_map(|path| FileStamp::all_of(path));
-                        FileStamp::all_of(path).into_iter().chain(hidden).collect()
+                        let others = [&scene.hidden, &scene.reading.depth, &scene.reading.view];
+                        let others = others.into_iter().flatten().flat_map(|path| FileStamp::all_of(path));
+                        FileStamp::all_of(path).into_iter().chain(others).collect()
                     }
                     SceneSource::World(world) if !world.is_still_life() => FileStamp::all_of(&world.file),
                     _ => Vec::new(),
@@ -327,6 +333,7 @@ impl SceneInputs {
             illuminance_lux: scene.illuminance_lux,
             mean_luminance_cd_m2: scene.mean_luminance_cd_m2,
             white_level: scene.white_level,
+            reading: scene.reading.clone(),
         }
     }
 }
@@ -372,6 +379,7 @@ fn is_large_picture(scene: &SceneSpec) -> bool {
     let ending = path.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
     is_flat
         && scene.hidden.is_none()
+        && scene.reading.depth.is_none()
         && ["png", "jpg", "jpeg", "tif", "tiff"].contains(&ending.as_str())
         && dioptric_pictures::size_of(path)
             .is_ok_and(|(columns, rows)| (columns as u64 * rows as u64).saturating_mul(4 * USUAL_BANDS) > LARGE_BYTES)

@@ -6,49 +6,65 @@ use std::{
 };
 
 use dioptric_pictures::DynamicImage;
-use dioptric_spectrum::{Quantity, SpectralImage, WavelengthGrid};
 use ndarray::Array2;
 use rayon::prelude::*;
 
-use super::{picture::decode, unusable::unreadable};
+use super::{
+    contents::Cube,
+    picture::decode,
+    stated::{name_of, note_of},
+    unusable::unreadable,
+};
 use crate::SceneError;
 
 /// Names of a text file with the wavelengths of numbered pictures, nm.
 const LISTS: [&str; 2] = ["wavelengths.txt", "wavelengths.csv"];
 
-/// Reads a folder of gray PNG or TIFF pictures, one a band, as reflectances: the largest code is 1, linear.
+/// Reads a folder of gray PNG or TIFF pictures, one a band, whose codes are linear; the largest of them is 1.
 ///
 /// Names end in the wavelength in nm (`toys_400.png`, `toys-400.5nm.png`) or in a number (`toys_ms_01.png`). Numbered
-/// pictures take their wavelengths, in the order of their numbers, from `wavelengths`, from a file `wavelengths.txt` in
+/// pictures take their wavelengths, in the order of their numbers, from those told, from a file `wavelengths.txt` in
 /// the folder (nm, separated by anything), or, when there are 31 named `…_ms_NN`, from CAVE's 400–700 nm every 10 nm.
 ///
 /// # Errors
 /// When there is no such picture, wavelengths are missing, or the pictures differ in size.
-pub fn read_band_folder(folder: &Path, wavelengths: Option<&WavelengthGrid>) -> Result<SpectralImage, SceneError> {
-    let pictures = numbered_pictures(folder)?;
+pub(super) fn band_folder(folder: &Path, told_nm: Option<&[f64]>) -> Result<Cube, SceneError> {
+    let (pictures, unused) = numbered_pictures(folder)?;
     if pictures.is_empty() {
         return Err(SceneError::NoBands {
             file: folder.to_owned(),
             expected: "PNG or TIFF pictures whose names end in a wavelength in nm or in a number",
         });
     }
-    let values = |reason| SceneError::Values { file: folder.to_owned(), reason };
-    let grid = match wavelengths {
-        Some(grid) => grid.clone(),
-        None => WavelengthGrid::new(wavelengths_of(folder, &pictures)?).map_err(values)?,
+    let wavelengths_nm = match told_nm {
+        Some(told) => told.to_vec(),
+        None => wavelengths_of(folder, &pictures)?,
     };
-    if grid.len() != pictures.len() {
-        let reason = format!("{} pictures of bands, but {} wavelengths", pictures.len(), grid.len());
+    if wavelengths_nm.len() != pictures.len() {
+        let reason = format!("{} pictures of bands, but {} wavelengths", pictures.len(), wavelengths_nm.len());
         return Err(unreadable(folder, reason));
     }
     let planes: Result<Vec<_>, _> = pictures.par_iter().map(|(_, path)| gray(path)).collect();
-    SpectralImage::new(Quantity::Reflectance, grid, planes?).map_err(values)
+    let planes = planes?;
+    if let Some(index) = planes.iter().position(|plane| plane.dim() != planes[0].dim()) {
+        let reason = format!(
+            "the rows of a band and its columns are {:?}, those of another {:?}",
+            planes[index].dim(),
+            planes[0].dim()
+        );
+        return Err(unreadable(folder, reason));
+    }
+    let notes = note_of(folder, "picture", &unused).into_iter().collect();
+    Ok(Cube { planes, top: Some(1.0), wavelengths_nm: Some(wavelengths_nm), quantity: None, notes })
 }
 
-/// Returns the pictures whose names end in a number, with the number, in its order.
-fn numbered_pictures(folder: &Path) -> Result<Vec<(f64, PathBuf)>, SceneError> {
+/// A picture with the number that its name ends in.
+type Numbered = (f64, PathBuf);
+
+/// Returns the pictures whose names end in a number, with the number, in its order; and the names of the others.
+fn numbered_pictures(folder: &Path) -> Result<(Vec<Numbered>, Vec<String>), SceneError> {
     let entries = fs::read_dir(folder).map_err(|error| unreadable(folder, error))?;
-    let mut pictures = Vec::new();
+    let (mut pictures, mut unused) = (Vec::new(), Vec::new());
     for entry in entries {
         let path = entry.map_err(|error| unreadable(folder, error))?.path();
         let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
@@ -56,12 +72,14 @@ fn numbered_pictures(folder: &Path) -> Result<Vec<(f64, PathBuf)>, SceneError> {
             continue;
         }
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-        if let Some(number) = number_at_end(&stem) {
-            pictures.push((number, path));
+        match number_at_end(&stem) {
+            Some(number) => pictures.push((number, path)),
+            None => unused.push(name_of(&path)),
         }
     }
     pictures.sort_by(|a, b| a.0.total_cmp(&b.0).then_with(|| a.1.cmp(&b.1)));
-    Ok(pictures)
+    unused.sort();
+    Ok((pictures, unused))
 }
 
 /// Returns the number that a stem ends in, before an optional `nm`.
@@ -106,8 +124,17 @@ fn gray(path: &Path) -> Result<Array2<f32>, SceneError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{ReadOptions, formats::contents::Image};
     use dioptric_pictures::save;
+    use dioptric_spectrum::{Quantity, SpectralImage, WavelengthGrid};
     use image::{ImageBuffer, Luma};
+
+    fn read_band_folder(folder: &Path, told_nm: Option<&[f64]>) -> Result<SpectralImage, SceneError> {
+        match band_folder(folder, told_nm)?.into_contents(folder, &ReadOptions::default())?.image {
+            Image::Spectral(image) => Ok(image),
+            _ => panic!("a picture"),
+        }
+    }
 
     fn folder_of(names: &[&str]) -> tempfile::TempDir {
         let folder = tempfile::tempdir().unwrap();
@@ -133,8 +160,7 @@ mod tests {
     fn numbered_pictures_need_a_list() {
         let folder = folder_of(&["b_1.png", "b_2.png", "b_10.png"]);
         assert!(read_band_folder(folder.path(), None).unwrap_err().to_string().contains("wavelengths.txt"));
-        let given = WavelengthGrid::uniform(500.0, 700.0, 100.0).unwrap();
-        let image = read_band_folder(folder.path(), Some(&given)).unwrap();
+        let image = read_band_folder(folder.path(), Some(&[500.0, 600.0, 700.0])).unwrap();
         assert!(image.spectrum_at(0, 0)[2] > image.spectrum_at(0, 0)[1]);
         fs::write(folder.path().join("wavelengths.txt"), "wavelength_nm\n450\n550\n650\n").unwrap();
         assert_eq!(read_band_folder(folder.path(), None).unwrap().grid().centers_nm(), [450.0, 550.0, 650.0]);

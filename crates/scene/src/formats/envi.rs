@@ -3,208 +3,478 @@
 use std::{
     fs::{self, File},
     io::{Read, Seek, SeekFrom},
+    ops::Range,
     path::{Path, PathBuf},
 };
 
 use dioptric_spectrum::{Quantity, SpectralImage, WavelengthGrid};
 use ndarray::Array2;
+use rayon::prelude::*;
 
 use super::{
+    contents::{Contents, Image},
     envi_header::{self, DataType, EnviHeader, Interleave},
     light_unit::LightUnit,
-    unusable::{check_memory, unreadable},
+    no_data::mend,
+    read_scene::ReadOptions,
+    reading::{FileQuantity, light_unit},
+    stated::{name_of, note_of, short},
+    unusable::{check_made, unreadable},
 };
-use crate::SceneError;
+use crate::{SceneError, resample::resampling_weights};
 
 /// A text header longer than this is none.
 const LIMIT_HEADER_BYTES: u64 = 64 << 20;
+/// Bytes of the file, and of its numbers as floats, that are in memory at a time; a line of the wanted bands is at least.
+const AT_ONCE_BYTES: usize = 8 << 20;
 /// Endings of the file of numbers beside `NAME.hdr`; none at all as well.
-const DATA_ENDINGS: [&str; 8] = ["", "raw", "img", "dat", "bsq", "bil", "bip", "bin"];
+const DATA_ENDINGS: [&str; 9] = ["", "raw", "img", "dat", "bsq", "bil", "bip", "bin", "cube"];
 
-/// The numbers of an ENVI file, as stored, with what its header states of them.
-#[derive(Clone, Debug, PartialEq)]
-pub struct EnviCube {
-    file: PathBuf,
-    /// The bands, in ascending order.
-    pub grid: WavelengthGrid,
-    /// The numbers as stored, one plane a band.
-    pub planes: Vec<Array2<f32>>,
-    /// What the header says a perfect white is stored as.
-    pub reflectance_scale: Option<f64>,
-    /// What the header says of units.
-    pub data_units: Option<String>,
+/// Reads an ENVI header and the file of numbers beside it: BSQ, BIL or BIP, any real data type and byte order. Of the file only what
+/// the wanted bands need is read, a few lines at a time.
+///
+/// Numbers are light where the header's `data units` say so (`W/m^2/sr/nm`, `uW/(cm^2 sr nm)`, `photons/s/m^2/sr/nm` and their like)
+/// or `data gain values` make them so, or else reflectances relative to, in this order: the white level of the options, the header's
+/// `reflectance scale factor`, or the cubes `white_reference*.hdr` and `dark_reference*.hdr` beside the file.
+///
+/// # Errors
+/// Names the line and key of the header that is wrong, the file of numbers when it is absent or too short, or what is missing to
+/// know what the numbers are.
+pub(super) fn contents_of_envi(path: &Path, options: &ReadOptions) -> Result<Contents, SceneError> {
+    let wanted_nm = options.grid.as_ref().map(WavelengthGrid::centers_nm);
+    let file = EnviFile::open(path, options.reading.wavelengths_nm.as_deref(), wanted_nm)?;
+    let (meaning, what) = file.meaning(options)?;
+    let mut notes: Vec<String> = file.notes.clone();
+    let order = file.order();
+    let own = WavelengthGrid::new(order.iter().map(|&band| file.wavelengths_nm[band]).collect())
+        .map_err(|reason| SceneError::Values { file: path.to_owned(), reason })?;
+    let wanted = options.grid.clone().unwrap_or_else(|| own.clone());
+    // Each wanted band with those of the file that it is made of.
+    let weights = if wanted == own {
+        (0..own.len()).map(|band| vec![(band, 1.0)]).collect()
+    } else {
+        resampling_weights(&own, &wanted)?
+    };
+    let mut planes = file.planes(&order, &weights, &meaning)?;
+    let choice = options.reading.no_data.unwrap_or_default();
+    notes.extend(mend(path, &wanted, &mut planes, choice)?.note(path, choice));
+    let quantity = if matches!(meaning, Meaning::Light(..)) { Quantity::Radiance } else { Quantity::Reflectance };
+    let image = SpectralImage::new(quantity, wanted, planes)
+        .map_err(|reason| SceneError::Values { file: path.to_owned(), reason })?;
+    Ok(Contents { notes, own_grid: Some(own), ..Contents::of(Image::Spectral(image), what) })
 }
 
-impl EnviCube {
-    /// Returns the cube as an image: radiance where the header's `data units` are of radiance (`W/m^2/sr/nm`, `uW/(cm^2 sr nm)`,
-    /// `photons/s/m^2/sr/nm` and their like), or else the reflectance.
-    ///
-    /// Reflectance is relative to, in this order: `white_level`, the header's `reflectance scale factor`, or the cubes
-    /// `white_reference*.hdr` and `dark_reference*.hdr` beside the file. Numbers below 0, which the noise of a dark
-    /// sample gives, become 0.
-    ///
-    /// # Errors
-    /// When nothing states what a perfect white is.
-    pub fn into_image(self, white_level: Option<f64>) -> Result<SpectralImage, SceneError> {
-        let unit = self.data_units.as_deref().and_then(LightUnit::parse);
-        if let (None, Some(unit)) = (white_level, unit.filter(|unit| unit.quantity == Quantity::Radiance)) {
-            return self.radiance(unit);
-        }
-        if let Some(scale) = white_level.or(self.reflectance_scale) {
-            let mut scaled = self;
-            scaled.planes.iter_mut().for_each(|plane| plane.mapv_inplace(|v| (f64::from(v) / scale) as f32));
-            return scaled.clipped().image(Quantity::Reflectance);
-        }
-        let (white, dark) = (self.beside("white_reference")?, self.beside("dark_reference")?);
-        match (white, dark) {
-            (Some(white), Some(dark)) => self.reflectance(&white, &dark),
-            _ => Err(SceneError::Units {
-                file: self.file,
-                reason: "nothing tells what a perfect white is: expected 'reflectance scale factor' in the header, \
-                    white_reference and dark_reference files beside it, or a white level"
-                    .to_owned(),
-            }),
-        }
-    }
+/// Returns the header that belongs to a file: itself, or `a.raw.hdr` or `a.hdr` for `a.raw`.
+pub(super) fn header_of(path: &Path) -> Option<PathBuf> {
+    let appended = |ending: &str| {
+        let mut name = path.as_os_str().to_owned();
+        name.push(ending);
+        PathBuf::from(name)
+    };
+    let candidates = [appended(".hdr"), path.with_extension("hdr"), appended(".HDR"), path.with_extension("HDR")];
+    candidates.into_iter().find(|header| header != path && header.is_file())
+}
 
-    /// Returns the reflectance (sample − dark) / (white − dark) from cubes of a perfect white and of no light.
-    ///
-    /// The references may be of the cube's size, or of one line, which then serves for every line. A sample whose white
-    /// is not above its dark is 0.
-    ///
-    /// # Errors
-    /// When the references have other bands or another size.
-    pub fn reflectance(mut self, white: &Self, dark: &Self) -> Result<SpectralImage, SceneError> {
-        let (rows, columns) = self.planes[0].dim();
-        for reference in [white, dark] {
-            let (found_rows, found_columns) = reference.planes[0].dim();
-            if reference.planes.len() != self.planes.len()
-                || found_columns != columns
-                || (found_rows != rows && found_rows != 1)
-            {
-                let reason = format!(
-                    "{found_rows} × {found_columns} samples in {} bands: expected {rows} × {columns} in {}, as in {}",
-                    reference.planes.len(),
-                    self.planes.len(),
-                    self.file.display()
-                );
-                return Err(unreadable(&reference.file, reason));
+/// What makes light or reflectances of the numbers of each band.
+enum Meaning {
+    /// Light: a factor a band.
+    Light(Vec<f64>),
+    /// A reflectance: a factor.
+    Reflectance(f64),
+    /// A reflectance between cubes of a perfect white and of no light.
+    Between(Box<[EnviFile; 2]>),
+}
+
+/// A header, and where its numbers are.
+struct EnviFile {
+    header_path: PathBuf,
+    data_path: PathBuf,
+    header: EnviHeader,
+    wavelengths_nm: Vec<f64>,
+    notes: Vec<String>,
+}
+
+impl EnviFile {
+    /// Reads the header and finds the file of numbers. Bands whose wavelengths nothing states are those wanted, where there are as many.
+    fn open(header_path: &Path, told_nm: Option<&[f64]>, wanted_nm: Option<&[f64]>) -> Result<Self, SceneError> {
+        let mut bytes = Vec::new();
+        let file = File::open(header_path).map_err(|error| unreadable(header_path, error))?;
+        file.take(LIMIT_HEADER_BYTES).read_to_end(&mut bytes).map_err(|error| unreadable(header_path, error))?;
+        let mut header = envi_header::parse(header_path, &String::from_utf8_lossy(&bytes))?;
+        let mut notes: Vec<String> = header.note.take().into_iter().collect();
+        let wrong = |key: &str, reason: String| SceneError::Header {
+            file: header_path.to_owned(),
+            line: 0,
+            key: key.to_owned(),
+            reason,
+        };
+        let wavelengths_nm = match (told_nm, header.wavelengths_nm.take()) {
+            (Some(told), own) => {
+                if own.as_ref().is_some_and(|own| own != told) {
+                    return Err(wrong(
+                        "wavelength",
+                        "the header has it: --wavelengths-nm says something else".to_owned(),
+                    ));
+                }
+                told.to_vec()
             }
+            (None, Some(own)) => own,
+            (None, None) => match wanted_nm.filter(|wanted| wanted.len() == header.bands) {
+                Some(wanted) => wanted.to_vec(),
+                None => {
+                    let reason = format!(
+                        "the header lacks it: expected it there, or --wavelengths-nm, {} numbers",
+                        header.bands
+                    );
+                    return Err(wrong("wavelength", reason));
+                }
+            },
+        };
+        if wavelengths_nm.len() != header.bands {
+            let reason =
+                format!("{} wavelengths, expected one for each of {} bands", wavelengths_nm.len(), header.bands);
+            return Err(wrong("wavelength", reason));
         }
-        for ((plane, white), dark) in self.planes.iter_mut().zip(&white.planes).zip(&dark.planes) {
-            for ((row, column), sample) in plane.indexed_iter_mut() {
-                let at = |reference: &Array2<f32>| reference[(row % reference.nrows(), column)];
-                let (white, dark) = (at(white), at(dark));
-                *sample = if white > dark { (*sample - dark) / (white - dark) } else { 0.0 };
-            }
+        let n_bad = header.bad_bands.iter().filter(|bad| **bad).count();
+        if n_bad == header.bands {
+            return Err(wrong("bbl", "all bands are bad".to_owned()));
         }
-        self.clipped().image(Quantity::Reflectance)
-    }
-
-    /// Returns the radiance of numbers in a unit.
-    fn radiance(mut self, unit: LightUnit) -> Result<SpectralImage, SceneError> {
-        for (plane, &wavelength_nm) in self.planes.iter_mut().zip(self.grid.centers_nm()) {
-            unit.convert(plane, wavelength_nm);
+        if n_bad > 0 {
+            let name = name_of(header_path);
+            notes.push(format!(
+                "{name}: {n_bad} of {} bands are bad (bbl) and left out: spectra run across",
+                header.bands
+            ));
         }
-        self.image(Quantity::Radiance)
+        let data_path = data_file(header_path, &mut notes)?;
+        let this = Self { header_path: header_path.to_owned(), data_path, header, wavelengths_nm, notes };
+        this.checked()
     }
 
-    fn clipped(mut self) -> Self {
-        self.planes.iter_mut().for_each(|plane| plane.mapv_inplace(|v| if v < 0.0 { 0.0 } else { v }));
-        self
+    /// Checks that the file of numbers is as long as the header says.
+    fn checked(mut self) -> Result<Self, SceneError> {
+        let wanted = self.frame_bytes().saturating_mul(self.n_frames());
+        let length = fs::metadata(&self.data_path).map_err(|error| unreadable(&self.data_path, error))?.len();
+        // What follows the last frame may be left out.
+        let needed = self.header.offset.saturating_add(wanted).saturating_sub(self.header.frame_offsets[1]);
+        if length < needed {
+            let reason = format!(
+                "it holds {length} bytes, but its header asks for {wanted} after an offset of {}: truncated?",
+                self.header.offset
+            );
+            return Err(unreadable(&self.data_path, reason));
+        }
+        let end = self.header.offset.saturating_add(wanted);
+        if length > end {
+            let name = name_of(&self.data_path);
+            self.notes
+                .push(format!("{name}: {} bytes after those that its header speaks of are not used", length - end));
+        }
+        Ok(self)
     }
 
-    fn image(self, quantity: Quantity) -> Result<SpectralImage, SceneError> {
-        let values = |reason| SceneError::Values { file: self.file.clone(), reason };
-        let image = SpectralImage::new(quantity, self.grid, self.planes).map_err(values)?;
-        image.check_samples().map_err(values)?;
-        Ok(image)
+    /// Returns the good bands by ascending wavelength.
+    fn order(&self) -> Vec<usize> {
+        let is_good = |band: &usize| !self.header.bad_bands.get(*band).copied().unwrap_or(false);
+        let mut order: Vec<usize> = (0..self.header.bands).filter(is_good).collect();
+        order.sort_by(|&a, &b| self.wavelengths_nm[a].total_cmp(&self.wavelengths_nm[b]));
+        order
     }
 
-    /// Reads the cube beside this one whose name starts so, if there is one.
+    /// Decides what the numbers are, and says so.
+    fn meaning(&self, options: &ReadOptions) -> Result<(Meaning, String), SceneError> {
+        let (header, reading) = (&self.header, &options.reading);
+        let scale = reading.scale.unwrap_or(1.0);
+        let units = |reason: String| Err(SceneError::Units { file: self.header_path.clone(), reason });
+        let own_unit = header.data_units.as_deref().and_then(LightUnit::parse);
+        let own_unit = own_unit.filter(|unit| unit.quantity == Quantity::Radiance);
+        let has_gains = header.gains.is_some() || header.offsets.is_some();
+        let is_reflecting = header.are_gains_of_reflectance || header.reflectance_scale.is_some();
+        let told_unit = reading.unit.as_deref().map(light_unit).transpose()?;
+        let wants_light = match reading.quantity {
+            Some(FileQuantity::Reflectance) => Some(false),
+            Some(_) => Some(true),
+            None if told_unit.is_some() => Some(true),
+            None if options.white_level.is_some() => Some(false),
+            None => None,
+        };
+        if let (Some(wanted), Some(_)) = (wants_light, own_unit)
+            && (!wanted || told_unit.is_some_and(|told| Some(told) != own_unit))
+            && options.white_level.is_none()
+        {
+            let unit = header.data_units.as_deref().unwrap_or_default();
+            return units(format!(
+                "its data units are '{}', which says something else than was asked for",
+                short(unit)
+            ));
+        }
+        // Gains without a unit are those of ENVI, W m⁻² sr⁻¹ µm⁻¹.
+        let gain_unit = || LightUnit::parse("W/m^2/sr/um").filter(|_| has_gains && !is_reflecting);
+        let is_light = wants_light.unwrap_or(own_unit.is_some() || gain_unit().is_some());
+        if is_light {
+            let by_quantity = || reading.quantity.and_then(FileQuantity::light_unit);
+            let unit = told_unit.or(own_unit).or_else(by_quantity).or_else(gain_unit).unwrap_or(LightUnit::RADIANCE);
+            let words = match (reading.unit.as_deref(), header.data_units.as_deref().filter(|_| own_unit.is_some())) {
+                (Some(told), _) => told.to_owned(),
+                (None, Some(own)) => short(own),
+                (None, None) if reading.quantity == Some(FileQuantity::Photons) => "photons/s/m^2/sr/nm".to_owned(),
+                (None, None) if reading.quantity.is_none() => "W/m^2/sr/um by its gains".to_owned(),
+                (None, None) => "W/m^2/sr/nm".to_owned(),
+            };
+            let factor = scale / header.radiance_scale.unwrap_or(1.0);
+            let of_band = |&nm: &f64| factor * unit.factor_at(nm);
+            let factors = self.wavelengths_nm.iter().map(of_band).collect();
+            return Ok((Meaning::Light(factors), format!("radiance in {words}")));
+        }
+        let level = options.white_level.or(header.reflectance_scale);
+        if let Some(level) = level {
+            return Ok((Meaning::Reflectance(scale / level), format!("reflectance, {level} being a perfect white")));
+        }
+        if header.are_gains_of_reflectance {
+            return Ok((Meaning::Reflectance(scale), "reflectance by its gains".to_owned()));
+        }
+        if let (Some(white), Some(dark)) = (self.beside("white_reference")?, self.beside("dark_reference")?) {
+            let what =
+                format!("reflectance between {} and {}", name_of(&white.header_path), name_of(&dark.header_path));
+            self.check_reference(&white)?;
+            self.check_reference(&dark)?;
+            return Ok((Meaning::Between(Box::new([white, dark])), what));
+        }
+        let is_float = matches!(header.data_type, DataType::F32 | DataType::F64);
+        if wants_light == Some(false) && (is_float || reading.scale.is_some()) {
+            return Ok((Meaning::Reflectance(scale), "reflectance, 1 being a perfect white".to_owned()));
+        }
+        let unknown = header.data_units.as_deref().filter(|text| !text.is_empty());
+        let unknown =
+            unknown.map_or_else(String::new, |text| format!(", and '{}' is no unit of radiance", short(text)));
+        units(format!(
+            "nothing tells what a perfect white is{unknown}: expected 'reflectance scale factor' in the header, white_reference and \
+             dark_reference files beside it, a white level (--white-level), or what the numbers are (--quantity, --unit)"
+        ))
+    }
+
+    /// Checks that a reference has the bands and columns of this cube.
+    fn check_reference(&self, reference: &Self) -> Result<(), SceneError> {
+        let (own, found) = (&self.header, &reference.header);
+        if (found.bands, found.columns) == (own.bands, own.columns) {
+            return Ok(());
+        }
+        let reason = format!(
+            "{} columns in {} bands: expected {} in {}, as in {}",
+            found.columns,
+            found.bands,
+            own.columns,
+            own.bands,
+            self.header_path.display()
+        );
+        Err(unreadable(&reference.header_path, reason))
+    }
+
+    /// Opens the cube beside this one whose name starts so, if there is one.
     fn beside(&self, start: &str) -> Result<Option<Self>, SceneError> {
-        let folder = self.file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let folder = self.header_path.parent().filter(|folder| !folder.as_os_str().is_empty());
+        let folder = folder.unwrap_or(Path::new("."));
         let entries = fs::read_dir(folder).map_err(|error| unreadable(folder, error))?;
         let mut found: Vec<PathBuf> = entries
             .filter_map(|entry| Some(entry.ok()?.path()))
-            .filter(|path| path.extension().is_some_and(|e| e == "hdr"))
+            .filter(|path| path.extension().is_some_and(|e| e == "hdr") && *path != self.header_path)
             .filter(|path| path.file_name().is_some_and(|name| name.to_string_lossy().starts_with(start)))
             .collect();
         found.sort();
-        found.first().map(|path| read_envi(path)).transpose()
+        found.first().map(|path| Self::open(path, None, Some(&self.wavelengths_nm))).transpose()
     }
-}
 
-/// Reads an ENVI header and the file of numbers beside it: BSQ, BIL or BIP, any real data type and byte order.
-///
-/// # Errors
-/// Names the line and key of the header that is wrong, or the file of numbers when it is absent or too short.
-pub fn read_envi(header_path: &Path) -> Result<EnviCube, SceneError> {
-    let mut bytes = Vec::new();
-    let file = File::open(header_path).map_err(|error| unreadable(header_path, error))?;
-    file.take(LIMIT_HEADER_BYTES).read_to_end(&mut bytes).map_err(|error| unreadable(header_path, error))?;
-    let header = envi_header::parse(header_path, &String::from_utf8_lossy(&bytes))?;
-    let data_path = data_file(header_path)?;
-    let bytes = read_samples(&data_path, &header)?;
-    let mut bands: Vec<(f64, Array2<f32>)> =
-        header.wavelengths_nm.iter().enumerate().map(|(band, &nm)| (nm, plane(&header, &bytes, band))).collect();
-    bands.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let (wavelengths_nm, planes) = bands.into_iter().unzip();
-    let grid = WavelengthGrid::new(wavelengths_nm)
-        .map_err(|reason| SceneError::Values { file: header_path.to_owned(), reason })?;
-    Ok(EnviCube {
-        file: header_path.to_owned(),
-        grid,
-        planes,
-        reflectance_scale: header.reflectance_scale,
-        data_units: header.data_units,
-    })
+    /// Reads the planes that are sums of bands (by their places in `order`, with weights).
+    fn planes(
+        &self,
+        order: &[usize],
+        weights: &[Vec<(usize, f64)>],
+        meaning: &Meaning,
+    ) -> Result<Vec<Array2<f32>>, SceneError> {
+        let (rows, columns) = (self.header.rows, self.header.columns);
+        // What is wanted of it, and a few lines at a time.
+        let bytes = [rows, columns, weights.len(), 4].iter().fold(1_u64, |n, &side| n.saturating_mul(side as u64));
+        check_made(&self.data_path, bytes.saturating_add(2 * AT_ONCE_BYTES as u64))?;
+        let mut needed: Vec<usize> = weights.iter().flatten().map(|(place, _)| order[*place]).collect();
+        needed.sort_unstable();
+        needed.dedup();
+        let references = match meaning {
+            Meaning::Between(pair) => Some([pair[0].lines(&needed, rows)?, pair[1].lines(&needed, rows)?]),
+            _ => None,
+        };
+        let mut planes: Vec<Array2<f32>> = weights.iter().map(|_| Array2::zeros((rows, columns))).collect();
+        let mut file = File::open(&self.data_path).map_err(|error| unreadable(&self.data_path, error))?;
+        for lines in self.chunks(needed.len()) {
+            let mut raw = self.read(&mut file, &needed, lines.clone())?;
+            raw.par_iter_mut().zip(&needed).enumerate().for_each(|(index, (samples, &band))| match meaning {
+                Meaning::Light(factors) => self.convert(samples, band, factors[band]),
+                Meaning::Reflectance(factor) => self.convert(samples, band, *factor),
+                Meaning::Between(_) => {
+                    self.convert(samples, band, 1.0);
+                    let Some([white, dark]) = &references else { return };
+                    for (at, sample) in samples.iter_mut().enumerate() {
+                        let (row, column) = (lines.start + at / columns, at % columns);
+                        let of = |lines: &[Array2<f32>]| lines[index][(row % lines[index].nrows(), column)];
+                        let (white, dark) = (of(white), of(dark));
+                        *sample = if white > dark { (*sample - dark) / (white - dark) } else { f32::NAN };
+                    }
+                }
+            });
+            let place = |band: usize| needed.binary_search(&band).expect("it was asked for");
+            planes.par_iter_mut().zip(weights).for_each(|(plane, weights)| {
+                let mut part = plane.slice_mut(ndarray::s![lines.clone(), ..]);
+                let part = part.as_slice_mut().expect("whole rows of a new plane follow each other");
+                if let [(only, 1.0)] = weights[..] {
+                    part.copy_from_slice(&raw[place(order[only])]);
+                    return;
+                }
+                let bands: Vec<(&[f32], f64)> =
+                    weights.iter().map(|&(at, weight)| (raw[place(order[at])].as_slice(), weight)).collect();
+                for (at, sample) in part.iter_mut().enumerate() {
+                    *sample = bands.iter().map(|(samples, weight)| weight * f64::from(samples[at])).sum::<f64>() as f32;
+                }
+            });
+        }
+        Ok(planes)
+    }
+
+    /// Returns a reference's lines: as many as the cube has, or else their mean.
+    fn lines(&self, bands: &[usize], cube_rows: usize) -> Result<Vec<Array2<f32>>, SceneError> {
+        let (rows, columns) = (self.header.rows, self.header.columns);
+        let is_whole = rows == cube_rows;
+        let mut sums = vec![Array2::<f64>::zeros((if is_whole { rows } else { 1 }, columns)); bands.len()];
+        let mut file = File::open(&self.data_path).map_err(|error| unreadable(&self.data_path, error))?;
+        for lines in self.chunks(bands.len()) {
+            let mut raw = self.read(&mut file, bands, lines.clone())?;
+            for ((samples, &band), sum) in raw.iter_mut().zip(bands).zip(&mut sums) {
+                self.convert(samples, band, 1.0);
+                for (at, sample) in samples.iter().enumerate() {
+                    let row = if is_whole { lines.start + at / columns } else { 0 };
+                    sum[(row, at % columns)] += f64::from(*sample);
+                }
+            }
+        }
+        let share = if is_whole { 1.0 } else { 1.0 / rows as f64 };
+        Ok(sums.into_iter().map(|sum| sum.mapv(|v| (v * share) as f32)).collect())
+    }
+
+    /// Makes what the header says of numbers as they are stored, and a factor more; those to be ignored become no numbers.
+    fn convert(&self, samples: &mut [f32], band: usize, factor: f64) {
+        let of = |list: &Option<Vec<f64>>, usual: f64| list.as_ref().map_or(usual, |list| list[band]);
+        let (gain, offset) = (of(&self.header.gains, 1.0), of(&self.header.offsets, 0.0));
+        let ignored = self.header.ignored.map(|v| v as f32);
+        for sample in samples {
+            let is_ignored = ignored.is_some_and(|ignored| *sample == ignored);
+            *sample = if is_ignored { f32::NAN } else { ((f64::from(*sample) * gain + offset) * factor) as f32 };
+        }
+    }
+
+    /// Returns ranges of lines that fit into memory.
+    fn chunks(&self, n_bands: usize) -> impl Iterator<Item = Range<usize>> + use<> {
+        let line = self.header.columns
+            * (4 * n_bands).max(match self.header.interleave {
+                Interleave::Bsq => 1,
+                Interleave::Bil | Interleave::Bip => self.header.bands * self.header.data_type.bytes(),
+            });
+        let (rows, step) = (self.header.rows, (AT_ONCE_BYTES / line).max(1));
+        (0..rows).step_by(step).map(move |first| first..(first + step).min(rows))
+    }
+
+    /// Bytes of a frame with what is skipped before and after it.
+    fn frame_bytes(&self) -> u64 {
+        let (rows, columns, bands) = (self.header.rows as u64, self.header.columns as u64, self.header.bands as u64);
+        let samples = match self.header.interleave {
+            Interleave::Bsq => rows.saturating_mul(columns),
+            Interleave::Bil | Interleave::Bip => columns.saturating_mul(bands),
+        };
+        let [before, after] = self.header.frame_offsets;
+        samples.saturating_mul(self.header.data_type.bytes() as u64).saturating_add(before).saturating_add(after)
+    }
+
+    fn n_frames(&self) -> u64 {
+        match self.header.interleave {
+            Interleave::Bsq => self.header.bands as u64,
+            Interleave::Bil | Interleave::Bip => self.header.rows as u64,
+        }
+    }
+
+    /// Reads lines of bands as they are stored.
+    fn read(&self, file: &mut File, bands: &[usize], lines: Range<usize>) -> Result<Vec<Vec<f32>>, SceneError> {
+        let (size, columns) = (self.header.data_type.bytes(), self.header.columns);
+        let start =
+            |frame: usize| self.header.offset + frame as u64 * self.frame_bytes() + self.header.frame_offsets[0];
+        let mut bytes_at = |from: u64, n: usize| -> Result<Vec<u8>, SceneError> {
+            let mut bytes = vec![0; n];
+            file.seek(SeekFrom::Start(from))
+                .and_then(|_| file.read_exact(&mut bytes))
+                .map_err(|error| unreadable(&self.data_path, error))?;
+            Ok(bytes)
+        };
+        let floats = |bytes: &[u8]| -> Vec<f32> {
+            let (kind, is_big) = (self.header.data_type, self.header.is_big_endian);
+            bytes.chunks_exact(size).map(|number_bytes| number(number_bytes, kind, is_big)).collect()
+        };
+        let line_bytes = columns * size;
+        match self.header.interleave {
+            Interleave::Bsq => {
+                let of_band = |&band: &usize| {
+                    Ok(floats(&bytes_at(start(band) + (lines.start * line_bytes) as u64, lines.len() * line_bytes)?))
+                };
+                bands.iter().map(of_band).collect()
+            }
+            Interleave::Bil => {
+                let mut result = vec![Vec::with_capacity(lines.len() * columns); bands.len()];
+                for line in lines {
+                    // Most bands are read in one go, few each by itself.
+                    let whole = match 4 * bands.len() >= self.header.bands {
+                        true => Some(bytes_at(start(line), self.header.bands * line_bytes)?),
+                        false => None,
+                    };
+                    for (samples, &band) in result.iter_mut().zip(bands) {
+                        match &whole {
+                            Some(bytes) => samples.extend(floats(&bytes[band * line_bytes..(band + 1) * line_bytes])),
+                            None => {
+                                samples.extend(floats(&bytes_at(start(line) + (band * line_bytes) as u64, line_bytes)?))
+                            }
+                        }
+                    }
+                }
+                Ok(result)
+            }
+            Interleave::Bip => {
+                let stride = self.header.bands * size;
+                let n = lines.len() * columns;
+                let [before, after] = self.header.frame_offsets;
+                let mut bytes = Vec::new();
+                if before + after == 0 {
+                    bytes = bytes_at(start(lines.start), n * stride)?;
+                } else {
+                    for line in lines {
+                        bytes.extend(bytes_at(start(line), columns * stride)?);
+                    }
+                }
+                let (kind, is_big) = (self.header.data_type, self.header.is_big_endian);
+                let of_band = |&band: &usize| -> Vec<f32> {
+                    (0..n).map(|at| number(&bytes[at * stride + band * size..][..size], kind, is_big)).collect()
+                };
+                Ok(bands.par_iter().map(of_band).collect())
+            }
+        }
+    }
 }
 
 /// Returns the file of numbers: `a.raw` and the like beside `a.hdr`, or `a.raw` beside `a.raw.hdr`.
-fn data_file(header_path: &Path) -> Result<PathBuf, SceneError> {
-    let found = DATA_ENDINGS.iter().map(|ending| header_path.with_extension(ending)).find(|path| path.is_file());
-    found.ok_or_else(|| {
+fn data_file(header_path: &Path, notes: &mut Vec<String>) -> Result<PathBuf, SceneError> {
+    let upper = DATA_ENDINGS.iter().map(|ending| ending.to_uppercase());
+    let endings = DATA_ENDINGS.iter().map(|ending| (*ending).to_owned()).chain(upper.skip(1));
+    let mut found = endings.map(|ending| header_path.with_extension(ending)).filter(|path| path.is_file());
+    let first = found.next().ok_or_else(|| {
         let names = format!("{}[.raw, .img, …]", header_path.with_extension("").display());
         unreadable(header_path, format!("its file of numbers, {names}, is not there"))
-    })
-}
-
-/// Reads exactly the samples that the header promises.
-fn read_samples(path: &Path, header: &EnviHeader) -> Result<Vec<u8>, SceneError> {
-    let wanted = [header.columns, header.rows, header.bands]
-        .iter()
-        .fold(header.data_type.bytes() as u64, |product, &n| product.saturating_mul(n as u64));
-    let samples = wanted / header.data_type.bytes() as u64;
-    let mut file = File::open(path).map_err(|error| unreadable(path, error))?;
-    let length = file.metadata().map_err(|error| unreadable(path, error))?.len();
-    // The bytes of the file, and the single floats that they become.
-    check_memory(path, wanted.saturating_add(samples.saturating_mul(4)), length)?;
-    if length < header.offset.saturating_add(wanted) {
-        let reason = format!(
-            "it holds {length} bytes, but its header asks for {wanted} after an offset of {}: truncated?",
-            header.offset
-        );
-        return Err(unreadable(path, reason));
-    }
-    let mut bytes = vec![0; wanted as usize];
-    file.seek(SeekFrom::Start(header.offset))
-        .and_then(|_| file.read_exact(&mut bytes))
-        .map_err(|error| unreadable(path, error))?;
-    Ok(bytes)
-}
-
-fn plane(header: &EnviHeader, bytes: &[u8], band: usize) -> Array2<f32> {
-    let (rows, columns, bands) = (header.rows, header.columns, header.bands);
-    let size = header.data_type.bytes();
-    Array2::from_shape_fn((rows, columns), |(row, column)| {
-        let index = match header.interleave {
-            Interleave::Bsq => (band * rows + row) * columns + column,
-            Interleave::Bil => (row * bands + band) * columns + column,
-            Interleave::Bip => (row * columns + column) * bands + band,
-        };
-        number(&bytes[index * size..(index + 1) * size], header.data_type, header.is_big_endian)
-    })
+    })?;
+    let is_other = |path: &PathBuf| fs::canonicalize(path).ok() != fs::canonicalize(&first).ok();
+    notes.extend(note_of(header_path, "file", &found.filter(is_other).map(|path| name_of(&path)).collect::<Vec<_>>()));
+    Ok(first)
 }
 
 fn number(bytes: &[u8], data_type: DataType, is_big_endian: bool) -> f32 {
@@ -231,8 +501,22 @@ fn number(bytes: &[u8], data_type: DataType, is_big_endian: bool) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{FileReading, ReadOptions};
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
+
+    fn read_with(path: &Path, options: &ReadOptions) -> Result<(SpectralImage, Vec<String>), SceneError> {
+        let contents = contents_of_envi(path, options)?;
+        match contents.image {
+            Image::Spectral(image) => Ok((image, contents.notes)),
+            _ => panic!("a picture"),
+        }
+    }
+
+    /// Reads the numbers as they are.
+    fn read_plain(path: &Path) -> Result<SpectralImage, SceneError> {
+        Ok(read_with(path, &ReadOptions { white_level: Some(1.0), ..ReadOptions::default() })?.0)
+    }
 
     /// The number of sample (band, row, column) of the test cubes.
     fn value(band: usize, row: usize, column: usize) -> u8 {
@@ -292,12 +576,12 @@ mod tests {
                 for order in [0, 1] {
                     let text = header(data_type, interleave, order);
                     let path = write(folder.path(), "a", &text, &samples(data_type, interleave, order));
-                    let cube = read_envi(&path).unwrap();
+                    let cube = read_plain(&path).unwrap();
                     // The header lists the bands downwards; they come back upwards.
-                    assert_eq!(cube.grid.centers_nm(), [500.0, 600.0]);
+                    assert_eq!(cube.grid().centers_nm(), [500.0, 600.0]);
                     for (place, band) in [(0, 1), (1, 0)] {
                         let expected = Array2::from_shape_fn((4, 3), |(r, c)| f32::from(value(band, r, c)));
-                        assert_eq!(cube.planes[place], expected, "{interleave} {data_type} {order}");
+                        assert_eq!(cube.planes()[place], expected, "{interleave} {data_type} {order}");
                     }
                 }
             }
@@ -309,34 +593,141 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let (text, bytes) = (header(1, "bsq", 0), samples(1, "bsq", 0));
         let path = write(folder.path(), "a", &text, &bytes);
-        let cube = read_envi(&path).unwrap();
-        let message = cube.clone().into_image(None).unwrap_err().to_string();
+        let open = |path: &Path| read_with(path, &ReadOptions::default()).map(|(image, _)| image);
+        let message = open(&path).unwrap_err().to_string();
         assert!(message.contains("a.hdr") && message.contains("reflectance scale factor"), "{message}");
-        let given = cube.clone().into_image(Some(100.0)).unwrap();
+        let told = ReadOptions { white_level: Some(100.0), ..ReadOptions::default() };
+        let (given, _) = read_with(&path, &told).unwrap();
         assert_eq!(given.spectrum_at(0, 1), [1.01_f32, 0.01].map(f64::from));
         let scaled = write(folder.path(), "b", &format!("{text}reflectance scale factor = 100\n"), &bytes);
-        assert_eq!(read_envi(&scaled).unwrap().into_image(None).unwrap(), given);
+        assert_eq!(open(&scaled).unwrap(), given);
         write(folder.path(), "white_reference_1", &text, &[201; 29]);
         write(folder.path(), "dark_reference_1", &text, &[1; 29]);
-        let referred = cube.into_image(None).unwrap();
+        let referred = open(&path).unwrap();
         // (101 − 1) / (201 − 1), and a sample below the dark is 0.
         assert_eq!(referred.spectrum_at(0, 1)[0], 0.5);
         assert_eq!(referred.spectrum_at(0, 0)[1], 0.0);
+        // References of other lengths count by their mean line.
+        let lines = text.replace("lines = 4", "lines = 2").replace("header offset = 5", "header offset = 0");
+        write(
+            folder.path(),
+            "white_reference_1",
+            &lines,
+            &[200, 200, 200, 202, 202, 202, 200, 200, 200, 202, 202, 202],
+        );
+        assert_eq!(open(&path).unwrap(), referred);
         let units = write(folder.path(), "c", &format!("{text}data units = W/m^2/sr/nm\n"), &bytes);
-        assert_eq!(read_envi(&units).unwrap().into_image(None).unwrap().quantity(), Quantity::Radiance);
+        assert_eq!(open(&units).unwrap().quantity(), Quantity::Radiance);
+    }
+
+    #[test]
+    fn gains_offsets_and_scale_factors_are_obeyed() {
+        let folder = tempfile::tempdir().unwrap();
+        let (text, bytes) = (header(1, "bil", 0), samples(1, "bil", 0));
+        let check = |more: &str, reading: FileReading, quantity: Quantity, expected: [f64; 2]| {
+            let path = write(folder.path(), "a", &format!("{text}{more}\n"), &bytes);
+            let (image, _) = read_with(&path, &ReadOptions { reading, ..ReadOptions::default() }).unwrap();
+            assert_eq!(image.quantity(), quantity, "{more}");
+            for (found, expected) in image.spectrum_at(1, 2).iter().zip(expected) {
+                assert!((found / expected - 1.0).abs() < 1e-6, "{more}: {found} {expected}");
+            }
+        };
+        let none = FileReading::default;
+        // Sample 12 of band 0 (600 nm) and 112 of band 1 (500 nm), which comes first.
+        let watts = "data units = W/m^2/sr/nm";
+        check(&format!("{watts}\ndata gain values = {{2, 3}}"), none(), Quantity::Radiance, [336.0, 24.0]);
+        check(&format!("{watts}\ndata offset values = {{1, 5}}"), none(), Quantity::Radiance, [117.0, 13.0]);
+        check(&format!("{watts}\nradiance scale factor = 100"), none(), Quantity::Radiance, [1.12, 0.12]);
+        // Gains alone are those of ENVI, W m⁻² sr⁻¹ µm⁻¹.
+        check("data gain values = {2, 3}", none(), Quantity::Radiance, [0.336, 0.024]);
+        check("data reflectance gain values = {0.01, 0.005}", none(), Quantity::Reflectance, [0.56, 0.12]);
+        let told = FileReading { unit: Some("mW/m^2/sr/nm".to_owned()), scale: Some(10.0), ..none() };
+        check("", told, Quantity::Radiance, [1.12, 0.12]);
+        let told = FileReading { quantity: Some(FileQuantity::Reflectance), scale: Some(0.01), ..none() };
+        check("", told, Quantity::Reflectance, [1.12, 0.12]);
+        let path = write(folder.path(), "b", &format!("{text}{watts}\n"), &bytes);
+        let told = FileReading { quantity: Some(FileQuantity::Reflectance), ..none() };
+        let refused =
+            read_with(&path, &ReadOptions { reading: told, ..ReadOptions::default() }).unwrap_err().to_string();
+        assert!(refused.contains("says something else"), "{refused}");
+    }
+
+    #[test]
+    fn ignored_values_and_bad_bands_are_left_out() {
+        let folder = tempfile::tempdir().unwrap();
+        let text = header(1, "bip", 0) + "reflectance scale factor = 100\n";
+        let bytes = samples(1, "bip", 0);
+        let path = write(folder.path(), "a", &format!("{text}data ignore value = 112\n"), &bytes);
+        let (image, notes) = read_with(&path, &ReadOptions::default()).unwrap();
+        assert_eq!(image.spectrum_at(1, 2), [0.0, f64::from(0.12_f32)]);
+        assert!(notes[0].starts_with("a.hdr: of 24 samples of all bands 1 without data are black"), "{notes:?}");
+        let path = write(folder.path(), "b", &format!("{text}bbl = {{1, 0}}\n"), &bytes);
+        let (image, notes) = read_with(&path, &ReadOptions::default()).unwrap();
+        assert_eq!(image.grid().centers_nm(), [600.0]);
+        assert!(notes[0].contains("1 of 2 bands are bad"), "{notes:?}");
+    }
+
+    #[test]
+    fn frames_with_bytes_between_are_read() {
+        let folder = tempfile::tempdir().unwrap();
+        for interleave in ["bsq", "bil", "bip"] {
+            let plain = samples(1, interleave, 0);
+            let frame = if interleave == "bsq" { 12 } else { 6 };
+            let framed = plain[5..].chunks(frame).flat_map(|frame| [&[9; 3], frame, &[9; 2]].concat());
+            let framed: Vec<u8> = plain[..5].iter().copied().chain(framed).collect();
+            let text = header(1, interleave, 0);
+            let usual = read_plain(&write(folder.path(), "a", &text, &plain)).unwrap();
+            let path = write(folder.path(), "b", &format!("{text}major frame offsets = {{3, 2}}\n"), &framed);
+            assert_eq!(read_plain(&path).unwrap(), usual, "{interleave}");
+        }
+    }
+
+    #[test]
+    fn wanted_bands_are_those_of_the_whole_cube() {
+        let folder = tempfile::tempdir().unwrap();
+        let (rows, columns, n_bands) = (5, 4, 30);
+        let mut rng = ChaCha8Rng::seed_from_u64(7);
+        let values: Vec<f32> = (0..rows * columns * n_bands).map(|_| rng.random()).collect();
+        let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
+        let wavelengths = (0..n_bands).map(|i| format!("{}", 400 + 10 * i)).collect::<Vec<_>>().join(", ");
+        for interleave in ["bsq", "bil", "bip"] {
+            let text = format!(
+                "ENVI\nsamples = {columns}\nlines = {rows}\nbands = {n_bands}\ndata type = 4\ninterleave = {interleave}\n\
+                 wavelength units = nm\nwavelength = {{{wavelengths}}}\n"
+            );
+            let path = write(folder.path(), "a", &text, &bytes);
+            let whole = read_plain(&path).unwrap();
+            for wanted in [vec![450.0, 555.0, 680.0], vec![500.0, 600.0]] {
+                let grid = Some(WavelengthGrid::new(wanted).unwrap());
+                let options = ReadOptions { white_level: Some(1.0), grid: grid.clone(), ..ReadOptions::default() };
+                let (part, _) = read_with(&path, &options).unwrap();
+                assert_eq!(part, crate::resampled(&whole, &grid.unwrap()).unwrap(), "{interleave}");
+            }
+        }
+    }
+
+    #[test]
+    fn file_of_numbers_leads_to_its_header() {
+        let folder = tempfile::tempdir().unwrap();
+        let header_path = write(folder.path(), "a", &header(1, "bsq", 0), &samples(1, "bsq", 0));
+        assert_eq!(header_of(&folder.path().join("a.raw")), Some(header_path.clone()));
+        fs::rename(&header_path, folder.path().join("a.raw.hdr")).unwrap();
+        assert_eq!(header_of(&folder.path().join("a.raw")), Some(folder.path().join("a.raw.hdr")));
+        assert_eq!(header_of(&folder.path().join("b.raw")), None);
+        read_plain(&folder.path().join("a.raw.hdr")).unwrap();
     }
 
     #[test]
     fn a_short_or_absent_file_of_numbers_is_refused() {
         let folder = tempfile::tempdir().unwrap();
         let path = write(folder.path(), "a", &header(4, "bsq", 0), &samples(1, "bsq", 0));
-        let message = read_envi(&path).unwrap_err().to_string();
+        let message = read_plain(&path).unwrap_err().to_string();
         assert!(message.contains("a.raw") && message.contains("truncated"), "{message}");
         fs::remove_file(folder.path().join("a.raw")).unwrap();
-        assert!(read_envi(&path).unwrap_err().to_string().contains("is not there"));
+        assert!(read_plain(&path).unwrap_err().to_string().contains("is not there"));
         let huge = header(4, "bsq", 0).replace("samples = 3", "samples = 99999999999");
         let path = write(folder.path(), "a", &huge, &[]);
-        assert!(matches!(read_envi(&path), Err(SceneError::TooLarge { .. })));
+        assert!(read_plain(&path).unwrap_err().to_string().contains("truncated"));
     }
 
     #[test]
@@ -355,7 +746,7 @@ mod tests {
             }
             let text = String::from_utf8_lossy(&bytes).into_owned();
             let path = write(folder.path(), "a", &text, &samples(12, "bil", 0));
-            n_refused += usize::from(read_envi(&path).is_err());
+            n_refused += usize::from(read_plain(&path).is_err());
         }
         assert!(n_refused > 1000, "{n_refused} of 3000 refused");
     }
@@ -367,9 +758,8 @@ mod tests {
         else {
             return;
         };
-        let cube = read_envi(&path).unwrap();
-        assert_eq!((cube.grid.len(), cube.planes[0].dim()), (580, (31, 43)));
-        let image = cube.into_image(None).unwrap();
+        let (image, _) = read_with(&path, &ReadOptions::default()).unwrap();
+        assert_eq!((image.grid().len(), image.planes()[0].dim()), (580, (31, 43)));
         let (row, column) = (15, 21);
         let at = |nm: f64| image.spectrum_at(row, column)[image.grid().nearest(nm)];
         // A yellow kernel: blue is absorbed, red is not.

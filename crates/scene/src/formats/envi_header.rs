@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use super::stated::note_of;
 use crate::SceneError;
 
 /// How the samples of a cube follow each other.
@@ -50,28 +51,124 @@ pub(crate) struct EnviHeader {
     pub(crate) data_type: DataType,
     pub(crate) interleave: Interleave,
     pub(crate) is_big_endian: bool,
-    pub(crate) wavelengths_nm: Vec<f64>,
+    /// Bytes to be skipped before and after each frame: a band of band after band, a line of the others.
+    pub(crate) frame_offsets: [u64; 2],
+    /// The center of each band, where the header has them.
+    pub(crate) wavelengths_nm: Option<Vec<f64>>,
+    /// Bands that are marked as bad.
+    pub(crate) bad_bands: Vec<bool>,
+    /// What each number is multiplied by, and what is then added, a band each.
+    pub(crate) gains: Option<Vec<f64>>,
+    pub(crate) offsets: Option<Vec<f64>>,
+    /// Whether these make reflectances of the numbers.
+    pub(crate) are_gains_of_reflectance: bool,
+    /// The number that stands for none.
+    pub(crate) ignored: Option<f64>,
     /// What a perfect white is stored as.
     pub(crate) reflectance_scale: Option<f64>,
+    /// What radiances are to be divided by.
+    pub(crate) radiance_scale: Option<f64>,
     /// `data units`, as written.
     pub(crate) data_units: Option<String>,
+    /// What of the header is not used.
+    pub(crate) note: Option<String>,
 }
 
 /// A `key = value` of the header and the line it starts on.
+#[derive(Clone)]
 struct Entry {
     line: usize,
     key: String,
     value: String,
 }
 
+/// Keys that change nothing of what the numbers are: names, places on the globe, how they were once displayed.
+const HARMLESS: [&str; 38] = [
+    "description",
+    "band names",
+    "default bands",
+    "default stretch",
+    "fwhm",
+    "sensor type",
+    "acquisition time",
+    "cloud cover",
+    "coordinate system string",
+    "dem band",
+    "dem file",
+    "geo points",
+    "map info",
+    "pixel size",
+    "projection info",
+    "read procedures",
+    "rpc info",
+    "security tag",
+    "solar irradiance",
+    "spectra names",
+    "sun azimuth",
+    "sun elevation",
+    "timestamp",
+    "x start",
+    "y start",
+    "z plot average",
+    "z plot range",
+    "z plot titles",
+    "errors",
+    "fps",
+    "tint",
+    "binning",
+    "himg",
+    "vimg",
+    "hroi",
+    "vroi",
+    "camera id",
+    "serial number",
+];
+
+/// Keys that are used. A writer may leave out the spaces in them, or put underscores in their place.
+const USED: [&str; 23] = [
+    "samples",
+    "lines",
+    "bands",
+    "header offset",
+    "data type",
+    "interleave",
+    "byte order",
+    "file type",
+    "file compression",
+    "major frame offsets",
+    "minor frame offsets",
+    "wavelength",
+    "wavelength units",
+    "bbl",
+    "data gain values",
+    "data offset values",
+    "data reflectance gain values",
+    "data reflectance offset values",
+    "data ignore value",
+    "reflectance scale factor",
+    "radiance scale factor",
+    "data units",
+    "classes",
+];
+
 /// Reads the text of a header.
 pub(crate) fn parse(path: &Path, text: &str) -> Result<EnviHeader, SceneError> {
-    let entries = Entries { path, list: entries(path, text)? };
+    let mut entries = Entries { path, list: entries(path, text)?, used: vec![] };
+    entries.check_kind()?;
+    let bands = entries.required("bands")?;
+    let reflecting =
+        [entries.list("data reflectance gain values", bands)?, entries.list("data reflectance offset values", bands)?];
+    let plain = [entries.list("data gain values", bands)?, entries.list("data offset values", bands)?];
+    let are_gains_of_reflectance = reflecting.iter().any(Option::is_some) && plain.iter().all(Option::is_none);
+    let [gains, offsets] = if are_gains_of_reflectance { reflecting.clone() } else { plain };
+    let bad_bands =
+        entries.list("bbl", bands)?.map_or_else(Vec::new, |list| list.iter().map(|good| *good == 0.0).collect());
     let wavelengths_nm = entries.wavelengths_nm()?;
-    let header = EnviHeader {
+    let frame_offsets = entries.frame_offsets()?;
+    let mut header = EnviHeader {
         columns: entries.required("samples")?,
         rows: entries.required("lines")?,
-        bands: entries.required("bands")?,
+        bands,
         offset: entries.number("header offset")?.unwrap_or(0),
         data_type: entries.data_type()?,
         interleave: entries.interleave()?,
@@ -80,40 +177,70 @@ pub(crate) fn parse(path: &Path, text: &str) -> Result<EnviHeader, SceneError> {
             Some(1) => true,
             Some(other) => return Err(entries.wrong("byte order", format!("{other}, expected 0 or 1"))),
         },
+        frame_offsets,
         wavelengths_nm,
-        reflectance_scale: entries.number("reflectance scale factor")?,
-        data_units: entries.get("data units").map(|entry| entry.value.clone()),
+        bad_bands,
+        gains,
+        offsets,
+        are_gains_of_reflectance,
+        ignored: entries.number("data ignore value")?,
+        reflectance_scale: entries.positive("reflectance scale factor")?,
+        radiance_scale: entries.positive("radiance scale factor")?,
+        data_units: entries.get("data units").map(|entry| entry.value.trim_matches(['{', '}']).trim().to_owned()),
+        note: None,
     };
     if header.columns == 0 || header.rows == 0 || header.bands == 0 {
         return Err(entries.wrong("samples", "a cube without samples".to_owned()));
     }
-    if header.wavelengths_nm.len() != header.bands {
-        let reason =
-            format!("{} wavelengths, expected one for each of {} bands", header.wavelengths_nm.len(), header.bands);
+    if let Some(found) = header.wavelengths_nm.as_ref().map(Vec::len).filter(|found| *found != header.bands) {
+        let reason = format!("{found} wavelengths, expected one for each of {} bands", header.bands);
         return Err(entries.wrong("wavelength", reason));
     }
-    if header.reflectance_scale.is_some_and(|scale| !(scale.is_finite() && scale > 0.0)) {
-        return Err(entries.wrong("reflectance scale factor", "expected a number above 0".to_owned()));
+    if header.radiance_scale.is_some_and(|scale| scale < 1.0) {
+        let reason = "below 1: some divide by it and some multiply, expected --scale in its place".to_owned();
+        return Err(entries.wrong("radiance scale factor", reason));
     }
+    if !are_gains_of_reflectance && reflecting.iter().any(Option::is_some) {
+        // Both kinds of gains: those of radiance are used, the others named.
+        entries.used.retain(|key| !key.starts_with("data reflectance"));
+    }
+    header.note = entries.note();
     Ok(header)
 }
 
 struct Entries<'a> {
     path: &'a Path,
     list: Vec<Entry>,
+    used: Vec<String>,
 }
 
 impl Entries<'_> {
-    fn get(&self, key: &str) -> Option<&Entry> {
-        self.list.iter().find(|entry| entry.key == key)
+    fn get(&mut self, key: &str) -> Option<Entry> {
+        let found = self.list.iter().find(|entry| entry.key == key).cloned();
+        self.used.extend(found.iter().map(|entry| entry.key.clone()));
+        found
+    }
+
+    /// Names the keys that nothing asked for, and those that stand twice.
+    fn note(&self) -> Option<String> {
+        let mut seen: Vec<&str> = vec![];
+        let mut left = vec![];
+        for entry in &self.list {
+            let is_known = self.used.contains(&entry.key) || HARMLESS.contains(&entry.key.as_str());
+            if !is_known || (seen.contains(&entry.key.as_str()) && self.used.contains(&entry.key)) {
+                left.push(entry.key.clone());
+            }
+            seen.push(&entry.key);
+        }
+        note_of(self.path, "key", &left)
     }
 
     fn wrong(&self, key: &str, reason: String) -> SceneError {
-        let line = self.get(key).map_or(0, |entry| entry.line);
+        let line = self.list.iter().find(|entry| entry.key == key).map_or(0, |entry| entry.line);
         SceneError::Header { file: self.path.to_owned(), line, key: key.to_owned(), reason }
     }
 
-    fn number<T: std::str::FromStr>(&self, key: &str) -> Result<Option<T>, SceneError> {
+    fn number<T: std::str::FromStr>(&mut self, key: &str) -> Result<Option<T>, SceneError> {
         let Some(entry) = self.get(key) else { return Ok(None) };
         match entry.value.parse() {
             Ok(number) => Ok(Some(number)),
@@ -121,11 +248,76 @@ impl Entries<'_> {
         }
     }
 
-    fn required(&self, key: &str) -> Result<usize, SceneError> {
+    fn positive(&mut self, key: &str) -> Result<Option<f64>, SceneError> {
+        let number = self.number::<f64>(key)?;
+        if number.is_some_and(|number| !(number.is_finite() && number > 0.0)) {
+            return Err(self.wrong(key, "expected a number above 0".to_owned()));
+        }
+        Ok(number)
+    }
+
+    fn required(&mut self, key: &str) -> Result<usize, SceneError> {
         self.number(key)?.ok_or_else(|| self.wrong(key, "the header lacks it".to_owned()))
     }
 
-    fn data_type(&self) -> Result<DataType, SceneError> {
+    /// Returns the numbers of a list in braces.
+    fn numbers(&mut self, key: &str) -> Result<Option<Vec<f64>>, SceneError> {
+        let Some(entry) = self.get(key) else { return Ok(None) };
+        let words = entry.value.trim_start_matches('{').trim_end_matches('}').split(',').map(str::trim);
+        let mut numbers = Vec::new();
+        for word in words.filter(|word| !word.is_empty()) {
+            match word.parse::<f64>() {
+                Ok(number) => numbers.push(number),
+                Err(_) => return Err(self.wrong(key, format!("'{}' is not a number", shown(word)))),
+            }
+        }
+        Ok(Some(numbers))
+    }
+
+    /// Returns the numbers of a list that has one a band.
+    fn list(&mut self, key: &str, bands: usize) -> Result<Option<Vec<f64>>, SceneError> {
+        let Some(list) = self.numbers(key)? else { return Ok(None) };
+        if list.len() != bands || list.iter().any(|number| !number.is_finite()) {
+            let reason = format!("{} numbers, expected a finite one for each of {bands} bands", list.len());
+            return Err(self.wrong(key, reason));
+        }
+        Ok(Some(list))
+    }
+
+    /// Refuses files whose samples are no plain numbers of an image.
+    fn check_kind(&mut self) -> Result<(), SceneError> {
+        const OTHERS: [&str; 9] =
+            ["library", "classification", "tiff", "hdf", "nitf", "meta", "jpeg", "virtual", "mosaic"];
+        if let Some(entry) = self.get("file type") {
+            let kind = entry.value.to_ascii_lowercase();
+            if OTHERS.iter().any(|other| kind.contains(other)) {
+                let reason = format!("'{}', expected ENVI Standard, an image of plain numbers", shown(&entry.value));
+                return Err(self.wrong("file type", reason));
+            }
+        }
+        match self.number::<f64>("file compression")? {
+            None | Some(0.0) => Ok(()),
+            Some(_) => {
+                let reason =
+                    "the file of numbers is compressed, expected a plain one: unpack it and set it to 0".to_owned();
+                Err(self.wrong("file compression", reason))
+            }
+        }
+    }
+
+    fn frame_offsets(&mut self) -> Result<[u64; 2], SceneError> {
+        if self.numbers("minor frame offsets")?.is_some_and(|list| list.iter().any(|n| *n != 0.0)) {
+            return Err(self.wrong("minor frame offsets", "expected 0, samples that follow each other".to_owned()));
+        }
+        let Some(list) = self.numbers("major frame offsets")? else { return Ok([0, 0]) };
+        let is_count = |n: f64| (0.0..1e15).contains(&n) && n.fract() == 0.0;
+        match list[..] {
+            [before, after] if is_count(before) && is_count(after) => Ok([before as u64, after as u64]),
+            _ => Err(self.wrong("major frame offsets", "expected two numbers of bytes, as {0, 0}".to_owned())),
+        }
+    }
+
+    fn data_type(&mut self) -> Result<DataType, SceneError> {
         Ok(match self.required("data type")? {
             1 => DataType::U8,
             2 => DataType::I16,
@@ -140,7 +332,7 @@ impl Entries<'_> {
         })
     }
 
-    fn interleave(&self) -> Result<Interleave, SceneError> {
+    fn interleave(&mut self) -> Result<Interleave, SceneError> {
         let value = self.get("interleave").map(|entry| entry.value.to_ascii_lowercase());
         match value.as_deref() {
             Some("bsq") => Ok(Interleave::Bsq),
@@ -151,36 +343,48 @@ impl Entries<'_> {
         }
     }
 
-    fn wavelengths_nm(&self) -> Result<Vec<f64>, SceneError> {
-        let Some(entry) = self.get("wavelength") else {
-            return Err(self.wrong("wavelength", "the header lacks it".to_owned()));
+    fn wavelengths_nm(&mut self) -> Result<Option<Vec<f64>>, SceneError> {
+        let unit = self.get("wavelength units").map(|entry| entry.value.to_ascii_lowercase());
+        let Some(numbers) = self.numbers("wavelength")? else { return Ok(None) };
+        let plain = |factor: f64| {
+            // A product of 1.0 keeps the number to the bit.
+            Ok(Some(numbers.iter().map(|number| number * factor).collect()))
         };
-        let words = entry.value.trim_start_matches('{').trim_end_matches('}').split(',').map(str::trim);
-        let mut numbers = Vec::new();
-        for word in words.filter(|word| !word.is_empty()) {
-            match word.parse::<f64>() {
-                Ok(number) => numbers.push(number),
-                Err(_) => return Err(self.wrong("wavelength", format!("'{}' is not a number", shown(word)))),
-            }
-        }
-        let factor = match self.get("wavelength units").map(|entry| entry.value.to_ascii_lowercase()).as_deref() {
-            Some("nm" | "nanometers" | "nanometer" | "nanometres") => 1.0,
-            Some("um" | "µm" | "μm" | "micrometers" | "micrometer" | "micrometres" | "microns") => 1000.0,
-            // Nobody writes visible light as 0.4 nm or as 400 µm.
+        match unit.as_deref() {
+            Some("nm" | "nanometers" | "nanometer" | "nanometres" | "nanometre") => plain(1.0),
+            Some(
+                "um" | "µm" | "μm" | "micrometers" | "micrometer" | "micrometres" | "micrometre" | "microns" | "micron",
+            ) => plain(1000.0),
+            Some("mm" | "millimeters" | "millimetres") => plain(1e6),
+            Some("m" | "meters" | "metres") => plain(1e9),
+            Some("angstroms" | "angstrom" | "å") => plain(0.1),
+            Some("wavenumber" | "cm-1") => Ok(Some(numbers.iter().map(|number| 1e7 / number).collect())),
+            Some("index") => Ok(None),
             None | Some("unknown" | "") => {
-                if numbers.iter().all(|&number| number < 50.0) {
-                    1000.0
-                } else {
-                    1.0
+                let are_counted =
+                    numbers.len() > 1 && numbers.windows(2).all(|pair| pair[1] - pair[0] == 1.0) && numbers[0] <= 1.0;
+                let all = |range: std::ops::Range<f64>| numbers.iter().all(|number| range.contains(number));
+                if !are_counted && all(0.15..20.0) {
+                    return plain(1000.0);
                 }
+                if all(150.0..20_000.0) {
+                    return plain(1.0);
+                }
+                let reason = "the header does not say their unit, and they are no likely nm or µm: expected 'wavelength units' in \
+                              the header, or --wavelengths-nm";
+                Err(self.wrong("wavelength", reason.to_owned()))
             }
-            Some(other) => {
-                return Err(self.wrong("wavelength units", format!("'{}', expected nm or µm", shown(other))));
-            }
-        };
-        // A product of 1.0 keeps the number to the bit.
-        Ok(numbers.into_iter().map(|number| number * factor).collect())
+            Some(other) => Err(self.wrong("wavelength units", format!("'{}', expected nm or µm", shown(other)))),
+        }
     }
+}
+
+/// Returns a key as it is known, whatever its spaces.
+fn known_key(key: &str) -> String {
+    let squeezed = |text: &str| text.chars().filter(|c| !c.is_whitespace() && *c != '_').collect::<String>();
+    let own = squeezed(key);
+    let known = USED.iter().chain(&HARMLESS).find(|known| squeezed(known) == own);
+    known.map_or_else(|| key.to_owned(), |known| (*known).to_owned())
 }
 
 /// Splits the text into entries; a value in braces may run over many lines.
@@ -212,7 +416,7 @@ fn entries(path: &Path, text: &str) -> Result<Vec<Entry>, SceneError> {
             }
         }
         let key = key.split_whitespace().collect::<Vec<_>>().join(" ").to_ascii_lowercase();
-        list.push(Entry { line, key, value });
+        list.push(Entry { line, key: known_key(&key), value });
     }
     Ok(list)
 }
@@ -236,7 +440,34 @@ mod tests {
         assert_eq!((header.columns, header.rows, header.bands, header.offset), (4, 3, 2, 16));
         assert_eq!((header.data_type, header.interleave), (DataType::U16, Interleave::Bil));
         assert!(header.is_big_endian);
-        assert_eq!((header.wavelengths_nm, header.reflectance_scale), (vec![500.0, 600.0], Some(10000.0)));
+        assert_eq!((header.wavelengths_nm, header.reflectance_scale), (Some(vec![500.0, 600.0]), Some(10000.0)));
+        assert_eq!(header.note, None);
+    }
+
+    #[test]
+    fn all_that_a_header_states_is_used_or_named() {
+        let text = GOOD
+            .replace("bands = 2", "bands=2\nbbl = {1, 0}\nDATA_GAIN_VALUES = {2, 3}\ndata ignore value = -9999")
+            + "description = { a\n b }\nfrobnicate = {1}\nsamples = 5\nmajor frame offsets = {8, 4}\n";
+        let header = parse(Path::new("folder/a.hdr"), &text).unwrap();
+        assert_eq!((header.columns, header.frame_offsets, header.ignored), (4, [8, 4], Some(-9999.0)));
+        assert_eq!((header.bad_bands, header.gains), (vec![false, true], Some(vec![2.0, 3.0])));
+        assert_eq!(header.note.as_deref(), Some("a.hdr: its keys 'frobnicate', 'samples' are not used"));
+    }
+
+    #[test]
+    fn wavelengths_without_a_unit_are_not_guessed() {
+        let read = |units: &str, list: &str| {
+            let text = GOOD.replace("Wavelength Units = Micrometers", units).replace("{0.5,\n 0.6,\n}", list);
+            parse(Path::new("a.hdr"), &text).map(|header| header.wavelengths_nm)
+        };
+        assert_eq!(read("", "{0.5, 0.6}").unwrap(), Some(vec![500.0, 600.0]));
+        assert_eq!(read("", "{500, 600}").unwrap(), Some(vec![500.0, 600.0]));
+        assert_eq!(read("wavelength units = Index", "{1, 2}").unwrap(), None);
+        assert_eq!(read("wavelength units = Wavenumber", "{20000, 10000}").unwrap(), Some(vec![500.0, 1000.0]));
+        for list in ["{1, 2}", "{0, 1}", "{30, 40}", "{0.5, 600}"] {
+            assert!(read("", list).unwrap_err().to_string().contains("--wavelengths-nm"), "{list}");
+        }
     }
 
     #[test]
@@ -254,6 +485,12 @@ mod tests {
             (" 0.6,\n}", "}", "1 wavelengths, expected one for each of 2"),
             (" 0.6,", " six,", "'six'"),
             ("10000.0", "-1", "above 0"),
+            ("interleave", "file type = ENVI Spectral Library\ninterleave", "ENVI Standard"),
+            ("interleave", "file compression = 1\ninterleave", "compressed"),
+            ("interleave", "bbl = {1}\ninterleave", "1 numbers, expected"),
+            ("interleave", "data gain values = {1, nan}\ninterleave", "finite"),
+            ("interleave", "radiance scale factor = 0.1\ninterleave", "--scale"),
+            ("interleave", "minor frame offsets = {1, 0}\ninterleave", "expected 0"),
             ("byte order = 1", "byte order", "expected 'key = value'"),
         ] {
             let message = parse(Path::new("a.hdr"), &GOOD.replace(from, to)).unwrap_err().to_string();

@@ -2,8 +2,8 @@
 
 use exr::prelude::{AttributeValue, LayerAttributes, Text};
 
-use super::light_unit::LightUnit;
-use crate::{SceneError, View};
+use super::{light_unit::LightUnit, stated::Stated};
+use crate::{SceneError, SceneLight, View};
 
 const LAYOUT_VERSION: &str = "spectralLayoutVersion";
 const UNITS: &str = "emissiveUnits";
@@ -12,6 +12,8 @@ const FOCAL: &str = "viewFocalPx";
 const CENTER_X: &str = "viewCenterXPx";
 const CENTER_Y: &str = "viewCenterYPx";
 const FOV: &str = "viewHorizontalFovDeg";
+/// The light on a scene, as JSON.
+const LIGHT: &str = "sceneLight";
 
 /// What the header of a layer states.
 #[derive(Clone, Debug)]
@@ -23,6 +25,49 @@ pub(crate) struct Attributes {
     center_x_px: Option<f64>,
     center_y_px: Option<f64>,
     fov_deg: Option<f64>,
+    /// The light on the scene; or what is wrong with it.
+    pub(super) light: Result<Option<SceneLight>, String>,
+    /// The luminance of red, green and blue of 1, cd/m².
+    pub(super) white_cd_m2: Option<f64>,
+    /// Whether the picture is one of all directions.
+    pub(super) is_environment: bool,
+    /// What else there is.
+    pub(super) others: Stated<()>,
+}
+
+/// Attributes that change nothing of what a picture is: who made it when, with what, and how it was rendered.
+pub(super) fn is_harmless(name: &str) -> bool {
+    const NAMES: [&str; 27] = [
+        "BlenderMultiChannel",
+        "Camera",
+        "Date",
+        "DateTime",
+        "File",
+        "Frame",
+        "RenderTime",
+        "Scene",
+        "Time",
+        "Note",
+        "Software",
+        "software",
+        "Copyright",
+        "comments",
+        "generatedBy",
+        "version",
+        "log",
+        "samplesPerPixel",
+        "renderTimeSeconds",
+        "MSE",
+        "cameraFromWorld",
+        "NDCFromWorld",
+        "worldFromCamera",
+        "worldToCamera",
+        "compressionLevel",
+        "scanlineimage",
+        "dwaCompressionLevel",
+    ];
+    const STARTS: [&str; 8] = ["oiio:", "nuke/", "cycles.", "Exif", "exif", "IPTC:", "input/", "cryptomatte/"];
+    NAMES.contains(&name) || STARTS.iter().any(|start| name.starts_with(start))
 }
 
 impl Attributes {
@@ -60,7 +105,36 @@ pub(crate) fn from_layer(layer: &LayerAttributes) -> Attributes {
         }
         _ => Ok(None),
     };
+    let ours = [LAYOUT_VERSION, UNITS, PITCH, FOCAL, CENTER_X, CENTER_Y, FOV, LIGHT];
+    let own = layer.other.keys().map(ToString::to_string).filter(|name| !ours.contains(&name.as_str()));
+    // Attributes of the standard that would change where or how bright things are.
+    let standard = [
+        ("adoptedNeutral", layer.adopted_neutral.is_some()),
+        ("lookModTransform", layer.look_modification_transform_name.is_some()),
+        ("renderingTransform", layer.rendering_transform_name.is_some()),
+        ("multiView", layer.multi_view_names.is_some()),
+        ("fieldOfViewHorizontal", layer.horizontal_field_of_view.is_some()),
+        ("fieldOfViewVertical", layer.vertical_field_of_view.is_some()),
+        ("screenWindowWidth", layer.screen_window_width != 1.0),
+        ("screenWindowCenter", layer.screen_window_center.0 != 0.0 || layer.screen_window_center.1 != 0.0),
+    ];
+    let standard = standard.into_iter().filter(|(_, is_there)| *is_there).map(|(name, _)| name.to_owned());
+    let mut others: Vec<String> = own.chain(standard).collect();
+    others.sort();
+    let light = match get(LIGHT) {
+        Some(AttributeValue::Text(text)) => {
+            let light = serde_json::from_str::<SceneLight>(&text.to_string()).map_err(|error| error.to_string());
+            let is_light =
+                |light: SceneLight| light.illuminant.check().map(|()| light).map_err(|error| error.to_string());
+            light.and_then(is_light).map(Some)
+        }
+        _ => Ok(None),
+    };
     Attributes {
+        light,
+        white_cd_m2: layer.white_luminance.map(f64::from),
+        is_environment: layer.environment_map.is_some(),
+        others: Stated::new("attribute", others.into_iter().map(|name| (name, ())).collect()),
         unit,
         pitch_um: number(PITCH).filter(|pitch| pitch.is_finite() && *pitch > 0.0),
         focal_px: number(FOCAL),
@@ -70,8 +144,14 @@ pub(crate) fn from_layer(layer: &LayerAttributes) -> Attributes {
     }
 }
 
-/// Adds the attributes of the spectral layout, the unit of light, the pitch and the camera data to a layer.
-pub(super) fn add_to(layer: &mut LayerAttributes, unit: Option<&str>, pitch_um: Option<f64>, view: Option<View>) {
+/// Adds the attributes of the spectral layout, the unit of light, the pitch, the camera data and the light on the scene to a layer.
+pub(super) fn add_to(
+    layer: &mut LayerAttributes,
+    unit: Option<&str>,
+    pitch_um: Option<f64>,
+    view: Option<View>,
+    light: Option<&SceneLight>,
+) {
     let mut put = |name: &str, value| layer.other.insert(Text::from(name), value);
     put(LAYOUT_VERSION, AttributeValue::Text(Text::from("1.0")));
     if let Some(unit) = unit {
@@ -79,6 +159,9 @@ pub(super) fn add_to(layer: &mut LayerAttributes, unit: Option<&str>, pitch_um: 
     }
     if let Some(pitch_um) = pitch_um {
         put(PITCH, AttributeValue::F64(pitch_um));
+    }
+    if let Some(light) = light.and_then(|light| serde_json::to_string(light).ok()) {
+        put(LIGHT, AttributeValue::Text(Text::from(light.as_str())));
     }
     if let Some(view) = view {
         put(FOCAL, AttributeValue::F64(view.focal_px));
@@ -89,7 +172,7 @@ pub(super) fn add_to(layer: &mut LayerAttributes, unit: Option<&str>, pitch_um: 
 
 #[cfg(test)]
 mod tests {
-    use dioptric_spectrum::Quantity;
+    use dioptric_spectrum::{Illuminant, Quantity};
 
     use super::*;
 
@@ -97,11 +180,13 @@ mod tests {
     fn attributes_there_and_back() {
         let view = View { focal_px: 100.0 / 3.0, center_x_px: 1.5, center_y_px: 2.0 };
         let mut layer = LayerAttributes::default();
-        add_to(&mut layer, Some("W.m^-2"), Some(1.4), Some(view));
+        let light = SceneLight::new(Illuminant::Chromaticity { x: 0.4, y: 0.41 }, 100.0 / 3.0);
+        add_to(&mut layer, Some("W.m^-2"), Some(1.4), Some(view), Some(&light));
         let back = from_layer(&layer);
         let quantity = back.unit.clone().unwrap().map(|unit| unit.quantity);
         assert_eq!((quantity, back.pitch_um), (Some(Quantity::Irradiance), Some(1.4)));
         assert_eq!(back.view(10, 10).unwrap(), Some(view));
+        assert_eq!(back.light, Ok(Some(light)));
     }
 
     #[test]

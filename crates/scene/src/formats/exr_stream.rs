@@ -26,7 +26,7 @@ use super::{
     exr_samples::{ExrSamples, Stored, check_size},
     unusable::{open_new, unreadable, unwritable},
 };
-use crate::{SceneError, View};
+use crate::{SceneError, SceneLight, View};
 
 /// What is known of a spectral image before its samples.
 #[derive(Clone, Copy, Debug)]
@@ -43,8 +43,10 @@ pub struct SpectralHead<'a> {
     pub depth: Option<&'a DepthMap>,
     /// Pinhole geometry, written as attributes.
     pub view: Option<View>,
+    /// The light on the scene, written as an attribute.
+    pub light: Option<&'a SceneLight>,
     /// The light on the scene, in words of whoever reads it.
-    pub light: Option<&'a str>,
+    pub light_words: Option<&'a str>,
     /// The largest sample of all bands, which half floats are fitted to.
     pub largest: f32,
     /// How samples are stored.
@@ -141,8 +143,8 @@ impl Channels {
         let channel = |(name, content): &(String, Content)| ChannelDescription::named(name.as_str(), kind_of(*content));
         let channels = self.by_name.iter().map(channel).collect();
         let mut attributes = LayerAttributes::default();
-        exr_attributes::add_to(&mut attributes, stored.unit.text.as_deref(), head.pitch_um, head.view);
-        if let Some(light) = head.light {
+        exr_attributes::add_to(&mut attributes, stored.unit.text.as_deref(), head.pitch_um, head.view, head.light);
+        if let Some(light) = head.light_words {
             attributes.other.insert(Text::from(LIGHT), AttributeValue::Text(Text::from(light)));
         }
         let (rows, columns) = head.size;

@@ -12,7 +12,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::*;
-use crate::{HiddenLayer, Scene, SceneError, View};
+use crate::{HiddenLayer, ReadOptions, Scene, SceneError, SceneLight, View, read_scene};
 
 const ROWS: usize = 5;
 const COLUMNS: usize = 7;
@@ -88,6 +88,68 @@ fn a_scene_comes_back_to_the_bit() {
         let back = read_spectral_exr(&file.path).unwrap();
         assert_eq!((back.image, back.hidden), (scene.radiance, scene.hidden));
     }
+}
+
+#[test]
+fn the_light_on_a_scene_comes_back() {
+    let (file, mut scene) = (file(), scene());
+    scene.light = Some(SceneLight::new(dioptric_spectrum::Illuminant::A, 321.5));
+    write_scene_exr(&file.path, &scene, ExrSamples::Single).unwrap();
+    assert_eq!(read_scene(&file.path, &ReadOptions::default()).unwrap().light, scene.light);
+    write_raw(&file.path, vec![("S0.500nm", flat(1.0))], &[("sceneLight", "{\"illuminant\": 3}")]);
+    let message = read_scene(&file.path, &ReadOptions::default()).unwrap_err().to_string();
+    assert!(message.contains("sceneLight"), "{message}");
+}
+
+/// Names that no reader knows, put into a file at random, are named each time.
+#[test]
+fn unknown_channels_and_attributes_are_noted() {
+    let mut rng = ChaCha8Rng::seed_from_u64(9);
+    for _ in 0..40 {
+        let word = |rng: &mut ChaCha8Rng| -> String {
+            (0..rng.random_range(3..9)).map(|_| rng.random_range('a'..='z')).collect()
+        };
+        let (channel, attribute) = (word(&mut rng), word(&mut rng));
+        let file = file();
+        let mut channels = vec![("S0.500nm", flat(1.0)), ("Z", flat(1.0)), (channel.as_str(), flat(0.5))];
+        channels.sort_by(|a, b| a.0.cmp(b.0));
+        write_raw(&file.path, channels, &[(&attribute, "3")]);
+        let notes = read_scene(&file.path, &ReadOptions::default()).unwrap().notes.join("\n");
+        assert!(notes.contains(&format!("'{channel}'")) && notes.contains(&format!("'{attribute}'")), "{notes}");
+    }
+}
+
+#[test]
+fn parts_of_bands_are_one_picture() {
+    let file = file();
+    let part = |name: &str, channels: Vec<(&str, FlatSamples)>| {
+        let list: SmallVec<[_; 4]> =
+            channels.into_iter().map(|(name, samples)| AnyChannel::new(name, samples)).collect();
+        let attributes = LayerAttributes { layer_name: Some(Text::from(name)), ..LayerAttributes::default() };
+        Layer::new((2, 2), attributes, Encoding::FAST_LOSSLESS, AnyChannels::sort(list))
+    };
+    let write = |layers: Vec<_>| {
+        let attributes = exr::prelude::ImageAttributes::with_size((2, 2));
+        Image::from_layers(attributes, SmallVec::<[_; 2]>::from_vec(layers)).write().to_file(&file.path).unwrap();
+        read_scene(&file.path, &ReadOptions::default()).unwrap()
+    };
+    // A band a part, by the name of its channel or of the part; the depth in a part of its own.
+    let scene = write(vec![
+        part("first", vec![("S0.500nm", flat(1.0))]),
+        part("S0.600nm", vec![("Y", flat(2.0))]),
+        part("depth", vec![("Z", flat(3.0))]),
+        part("left", vec![("S0.500nm", flat(9.0))]),
+    ]);
+    assert_eq!(
+        (scene.radiance.grid().centers_nm(), scene.radiance.spectrum_at(0, 0)),
+        (&[500.0, 600.0][..], vec![1.0, 2.0])
+    );
+    assert_eq!(scene.require_depth().unwrap().range_m(), (3.0, 3.0));
+    assert!(scene.notes.iter().any(|note| note.contains("its part 'left' is not used")), "{:?}", scene.notes);
+    let colors = || vec![("R", flat(1.0)), ("G", flat(1.0)), ("B", flat(1.0)), ("A", flat(1.0))];
+    let scene = write(vec![part("rgba", colors()), part("depth", vec![("Z", flat(3.0))]), part("albedo", colors())]);
+    assert_eq!(scene.require_depth().unwrap().range_m(), (3.0, 3.0));
+    assert!(scene.notes[1].contains("'albedo.A', 'albedo.B'"), "{:?}", scene.notes);
 }
 
 #[test]
@@ -274,7 +336,8 @@ fn colors_with_depth_are_a_scene() {
         assert_eq!(scene.require_depth().unwrap().range_m(), (3.0, 3.0));
         let grid = scene.radiance.grid();
         let xyz = dioptric_spectrum::Observer::Cie1931.xyz(grid, &scene.radiance.spectrum_at(0, 0));
-        let rgb = dioptric_spectrum::Xyz(xyz.0.map(|v| v / 100.0)).to_linear_srgb();
+        // White under 1000 lx.
+        let rgb = dioptric_spectrum::Xyz(xyz.0.map(|v| v / (1000.0 / std::f64::consts::PI))).to_linear_srgb();
         // Brighter than white stays so; the sRGB matrices are each other's inverse to 1e-6.
         rgb.iter().zip([2.0, 0.5, 0.5]).for_each(|(v, e)| approx::assert_abs_diff_eq!(*v, e, epsilon = 2e-5));
         assert!(scene.light.is_some());
@@ -290,7 +353,7 @@ fn unmeasured_depth_is_filled_when_asked() {
     for (fill, first_m) in [(FillDepth::Beside, 2.0), (FillDepth::Far, 4.0), (FillDepth::Metres(7.5), 7.5)] {
         let scene = at_depth(channels(), Some(fill)).unwrap();
         assert_eq!(scene.require_depth().unwrap().z_m()[(0, 0)], first_m);
-        assert!(scene.notes[0].starts_with("2 of 4 samples (50.00 %) have no depth"), "{:?}", scene.notes);
+        assert!(scene.notes[1].starts_with("2 of 4 samples (50.00 %) have no depth"), "{:?}", scene.notes);
     }
     assert!(at_depth(channels(), Some(FillDepth::Metres(-1.0))).is_err());
     let negative = vec![("S0.500nm", flat(1.0)), ("Z", FlatSamples::F32(vec![-2.0, 2.0, 2.0, 4.0]))];

@@ -17,7 +17,7 @@ use super::{
     spectral_exr::HIDDEN_LAYER,
     unusable::{open_new, unwritable},
 };
-use crate::{HiddenLayer, Scene, SceneError, View};
+use crate::{HiddenLayer, Scene, SceneError, SceneLight, View};
 
 /// Bytes of samples that are packed at a time.
 const AT_ONCE_BYTES: usize = 32 << 20;
@@ -32,6 +32,8 @@ pub struct ExrParts<'a> {
     pub depth: Option<&'a DepthMap>,
     /// Pinhole geometry, written as attributes.
     pub view: Option<View>,
+    /// The light on the scene, written as an attribute.
+    pub light: Option<&'a SceneLight>,
     /// Distance between samples on the film, µm; the image's own where it has one.
     pub pitch_um: Option<f64>,
     /// A second layer.
@@ -61,7 +63,8 @@ fn write_single_layer(path: &Path, image: &SpectralImage, parts: &ExrParts<'_>) 
         pitch_um: image.pitch_um().or(parts.pitch_um),
         depth: parts.depth,
         view: parts.view,
-        light: None,
+        light: parts.light,
+        light_words: None,
         largest: largest(image.planes()),
         samples: parts.samples,
         at_once_bytes: AT_ONCE_BYTES,
@@ -78,6 +81,7 @@ pub fn write_scene_exr(path: &Path, scene: &Scene, samples: ExrSamples) -> Resul
     let parts = ExrParts {
         depth: scene.depth.as_ref(),
         view: scene.view,
+        light: scene.light.as_ref(),
         pitch_um: None,
         hidden: scene.hidden.as_ref(),
         samples,
@@ -125,7 +129,7 @@ fn layer_of(
     }
     let mut attributes = LayerAttributes { layer_name: name.map(Text::from), ..LayerAttributes::default() };
     let pitch_um = image.pitch_um().or(parts.pitch_um);
-    exr_attributes::add_to(&mut attributes, stored.unit.text.as_deref(), pitch_um, parts.view);
+    exr_attributes::add_to(&mut attributes, stored.unit.text.as_deref(), pitch_um, parts.view, parts.light);
     Ok(layer(size, attributes, parts.samples, list))
 }
 

@@ -21,6 +21,7 @@ impl LightUnit {
     /// Returns the unit of a text, or `None` where it is no unit of spectral light. A nanometre is understood where no length
     /// of wavelength is stated.
     pub(super) fn parse(text: &str) -> Option<Self> {
+        let text = symbols(text);
         let mut sum = Sum::default();
         let mut rest = text.trim();
         let mut below = Below::No;
@@ -44,15 +45,66 @@ impl LightUnit {
         if below == Below::No { sum.unit() } else { None }
     }
 
+    /// Returns what makes watts of a number.
+    pub(super) fn factor_at(self, wavelength_nm: f64) -> f64 {
+        let joules = if self.is_photons { joules_per_photon(wavelength_nm) } else { 1.0 };
+        self.factor * joules
+    }
+
     /// Puts the samples of a band into watts.
     pub(super) fn convert(self, plane: &mut Array2<f32>, wavelength_nm: f64) {
-        let joules = if self.is_photons { joules_per_photon(wavelength_nm) } else { 1.0 };
-        let factor = self.factor * joules;
+        let factor = self.factor_at(wavelength_nm);
         // A factor of 1 keeps samples to the bit.
         if factor != 1.0 {
             plane.mapv_inplace(|v| (f64::from(v) * factor) as f32);
         }
     }
+}
+
+/// Returns a text with the symbols of units that are written out: `Microwatts per square centimeter …` becomes `uW / cm^2 …`.
+fn symbols(text: &str) -> String {
+    let raised = [('⁻', "-"), ('⁰', "0"), ('¹', "1"), ('²', "2"), ('³', "3")];
+    let text = raised.iter().fold(text.to_owned(), |text, (from, to)| text.replace(*from, to));
+    let mut result = String::new();
+    let mut is_square = false;
+    let mut rest = text.as_str();
+    while !rest.is_empty() {
+        let end = rest.find(|c: char| !c.is_alphabetic()).unwrap_or(rest.len());
+        if end == 0 {
+            let next = rest.find(char::is_alphabetic).unwrap_or(rest.len());
+            result.push_str(&rest[..next]);
+            rest = &rest[next..];
+            continue;
+        }
+        let (word, after) = rest.split_at(end);
+        rest = after;
+        let lower = word.to_lowercase();
+        let symbol = match lower.as_str() {
+            "per" => "/",
+            "square" | "sq" => {
+                is_square = true;
+                continue;
+            }
+            "watt" | "watts" => "W",
+            "milliwatt" | "milliwatts" => "mW",
+            "microwatt" | "microwatts" => "uW",
+            "nanowatt" | "nanowatts" => "nW",
+            "meter" | "meters" | "metre" | "metres" => "m",
+            "centimeter" | "centimeters" | "centimetre" | "centimetres" => "cm",
+            "nanometer" | "nanometers" | "nanometre" | "nanometres" => "nm",
+            "micrometer" | "micrometers" | "micrometre" | "micrometres" | "microns" => "um",
+            "steradian" | "steradians" | "ster" => "sr",
+            "second" | "seconds" => "s",
+            // Sr is written as often as sr.
+            "sr" => "sr",
+            _ => word,
+        };
+        result.push_str(symbol);
+        if std::mem::take(&mut is_square) {
+            result.push_str("^2");
+        }
+    }
+    result
 }
 
 /// Whether what is read stands below a line of a fraction.
@@ -161,6 +213,10 @@ mod tests {
             "W / (m^2 * sr * nm)",
             "W·m−2·sr−1·nm−1",
             "W m**-2 sr**-1 nm**-1",
+            "W m⁻² sr⁻¹ nm⁻¹",
+            "Watts/Square Meter/Steradian/Nanometer",
+            "watts per square metre per steradian per nanometre",
+            "W/m2/Sr/nm",
         ] {
             check(text, Quantity::Radiance, 1.0);
         }
@@ -168,6 +224,8 @@ mod tests {
         // 1 µW/cm² is 0.01 W/m²; a micrometre holds a thousand nanometres.
         check("uW/cm^2/nm/sr", Quantity::Radiance, 1e-2);
         check("µW/(cm^2 nm sr)", Quantity::Radiance, 1e-2);
+        check("Microwatts per sq cm per ster per nanometer", Quantity::Radiance, 1e-2);
+        check("µW/cm²/nm/sr", Quantity::Radiance, 1e-2);
         check("W/m^2/sr/um", Quantity::Radiance, 1e-3);
         check("mW/(m^2 sr nm)", Quantity::Radiance, 1e-3);
         check("W.m^-3.sr^-1", Quantity::Radiance, 1e-9);

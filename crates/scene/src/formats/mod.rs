@@ -1,9 +1,12 @@
 //! Files of scenes.
 
+mod axes;
 mod band_folder;
 mod band_name;
+mod belonging;
 mod camera;
-mod depth_picture;
+mod contents;
+mod depth;
 mod envi;
 mod envi_header;
 mod exr_attributes;
@@ -12,27 +15,36 @@ mod exr_stream;
 #[cfg(test)]
 mod exr_tests;
 mod exr_write;
+#[cfg(test)]
+mod input_tests;
 mod light_unit;
 mod mat;
+mod no_data;
+mod npy;
 #[cfg(test)]
 mod payload_tests;
+mod pfm;
 mod photons;
 mod picture;
 mod read_scene;
+mod reading;
 mod spectral_exr;
+mod stated;
+mod tiff_file;
+mod understood;
 mod unmeasured;
 mod unusable;
 
 pub(crate) use picture::decode as decode_picture;
 pub(crate) use unusable::{check_made, unwritable};
 
-pub use band_folder::read_band_folder;
-pub use envi::{EnviCube, read_envi};
+pub use belonging::may_be_read_with;
 pub use exr_samples::ExrSamples;
 pub use exr_stream::{SpectralHead, read_exr_light};
 pub use exr_write::{ExrParts, write_planes_exr, write_scene_exr, write_spectral_exr};
-pub use mat::{IsetScene, read_iset_mat};
+pub use photons::joules_per_photon;
 pub use picture::{PictureSamples, read_picture, read_picture_samples};
 pub use read_scene::{ReadOptions, read_hidden_layer, read_scene};
+pub use reading::{DepthKind, FileQuantity, FileReading, NoData};
 pub use spectral_exr::{SpectralFile, read_planes_exr, read_spectral_exr};
-pub use unmeasured::FillDepth;
+pub use unmeasured::{FillDepth, filled_depth};

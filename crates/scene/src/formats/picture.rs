@@ -4,10 +4,14 @@ use std::path::Path;
 
 use dioptric_pictures::{Curve, DynamicImage, ImageError, read_reduced, size_of};
 use dioptric_spectrum::{Display, Quantity, SpectralImage, WavelengthGrid, srgb_decode, srgb_encode};
+use image::{ImageDecoder, metadata::Orientation};
 use ndarray::Array2;
 use rayon::prelude::*;
 
-use super::unusable::{check_made, unreadable};
+use super::{
+    stated::{name_of, note_of},
+    unusable::{check_made, unreadable},
+};
 use crate::SceneError;
 
 /// Pixels that are lifted to spectra at a time.
@@ -31,39 +35,28 @@ pub fn read_picture(
     grid: &WavelengthGrid,
     white_cd_m2: f64,
 ) -> Result<SpectralImage, SceneError> {
-    read_picture_of(path, picture_size_of(path)?, display, grid, white_cd_m2)
+    if !(white_cd_m2.is_finite() && white_cd_m2 > 0.0) {
+        return Err(SceneError::Setting {
+            what: "the luminance of the picture's white",
+            value: format!("{white_cd_m2} cd/m²"),
+            expected: "a finite number above 0".to_owned(),
+        });
+    }
+    lifted_codes(path, oriented(path, None)?.0, &display.srgb_basis(grid, white_cd_m2), grid)
 }
 
-/// Returns the columns and rows of a picture.
-pub(super) fn picture_size_of(path: &Path) -> Result<(usize, usize), SceneError> {
-    size_of(path).map_err(|error| undecodable(path, &error))
-}
-
-/// As [`read_picture`], of means over blocks where it has more pixels than `size`, columns and rows.
-pub(super) fn read_picture_of(
+/// Returns the light of a picture of sRGB codes: sums of the spectra of red, green and blue. What would need negative light is 0.
+pub(super) fn lifted_codes(
     path: &Path,
-    size: (usize, usize),
-    display: &Display,
+    picture: DynamicImage,
+    basis: &[Vec<f64>; 3],
     grid: &WavelengthGrid,
-    white_cd_m2: f64,
 ) -> Result<SpectralImage, SceneError> {
-    check_white(white_cd_m2)?;
-    let whole = picture_size_of(path)?;
-    let lifted_bytes = (4 * grid.len() as u64 + CODES_BYTES).saturating_mul((size.0 * size.1) as u64);
-    check_made(path, lifted_bytes)?;
-    let picture = if size == whole {
-        decode(path, CODES_BYTES)?
-    } else {
-        let curve = Curve {
-            to_light: &|code| srgb_decode(f64::from(code) / 65535.0),
-            to_code: &|light| (65535.0 * srgb_encode(light)).round() as u16,
-        };
-        read_reduced(path, size, &curve).map_err(|error| undecodable(path, &error))?
-    };
+    let n = u64::from(picture.width()) * u64::from(picture.height());
+    check_made(path, (4 * grid.len() as u64 + CODES_BYTES).saturating_mul(n))?;
     let picture = picture.into_rgb16();
     let (columns, rows) = (picture.width() as usize, picture.height() as usize);
     let linear: Vec<f64> = (0..=u16::MAX).map(|code| srgb_decode(f64::from(code) / 65535.0)).collect();
-    let basis = display.srgb_basis(grid, white_cd_m2);
     let mut planes: Vec<Array2<f32>> = (0..grid.len()).map(|_| Array2::zeros((rows, columns))).collect();
     // A part of the picture in all bands before the next, while its colors are at hand.
     let mut parts: Vec<Vec<&mut [f32]>> = (0..(rows * columns).div_ceil(AT_ONCE)).map(|_| vec![]).collect();
@@ -79,8 +72,7 @@ pub(super) fn read_picture_of(
             lift(&colors, [0, 1, 2].map(|color| basis[color][band]), samples);
         }
     });
-    SpectralImage::new(Quantity::Radiance, grid.clone(), planes)
-        .map_err(|reason| SceneError::Values { file: path.to_owned(), reason })
+    Ok(SpectralImage::new(Quantity::Radiance, grid.clone(), planes)?)
 }
 
 /// Puts the radiance of colors in a band into `samples`.
@@ -90,39 +82,86 @@ fn lift([red, green, blue]: &[Vec<f64>; 3], [r, g, b]: [f64; 3], samples: &mut [
     }
 }
 
-fn check_white(white_cd_m2: f64) -> Result<(), SceneError> {
-    if white_cd_m2.is_finite() && white_cd_m2 > 0.0 {
-        return Ok(());
-    }
-    Err(SceneError::Setting {
-        what: "the luminance of the picture's white",
-        value: format!("{white_cd_m2} cd/m²"),
-        expected: "a finite number above 0".to_owned(),
-    })
-}
-
-/// Returns the radiance of a display that shows these linear sRGB colors, in which 1 is as bright as its white; brighter ones
-/// are brighter in proportion. What would need negative light is 0.
+/// Returns the light of linear sRGB colors, as [`lifted_codes`]; colors above 1 are brighter in proportion.
 pub(super) fn lifted(
     rgb: &[Array2<f32>; 3],
-    display: &Display,
+    basis: &[Vec<f64>; 3],
     grid: &WavelengthGrid,
-    white_cd_m2: f64,
 ) -> Result<SpectralImage, SceneError> {
-    check_white(white_cd_m2)?;
-    let basis = display.srgb_basis(grid, white_cd_m2);
     let planes = (0..grid.len())
         .into_par_iter()
         .map(|band| {
             let mut sum = Array2::<f64>::zeros(rgb[0].dim());
-            for (color, basis) in rgb.iter().zip(&basis) {
+            for (color, basis) in rgb.iter().zip(basis) {
                 ndarray::Zip::from(&mut sum).and(color).for_each(|sum, &v| *sum += basis[band] * f64::from(v));
             }
-            // NaN stays, to be refused by its place.
-            sum.mapv(|v| if v < 0.0 { 0.0 } else { v as f32 })
+            sum.mapv(|v| v.max(0.0) as f32)
         })
         .collect();
     Ok(SpectralImage::new(Quantity::Radiance, grid.clone(), planes)?)
+}
+
+/// Returns the columns and rows of a picture.
+pub(super) fn picture_size_of(path: &Path) -> Result<(usize, usize), SceneError> {
+    size_of(path).map_err(|error| undecodable(path, &error))
+}
+
+/// Reads a picture upright, as its orientation says, with notes of what else it states of its colors; of means over blocks where it has
+/// more pixels than `size`, columns and rows.
+///
+/// # Errors
+/// As [`decode`].
+pub(super) fn oriented(path: &Path, size: Option<(usize, usize)>) -> Result<(DynamicImage, Vec<String>), SceneError> {
+    let mut picture = match size {
+        Some(size) => {
+            let curve = Curve {
+                to_light: &|code| srgb_decode(f64::from(code) / 65535.0),
+                to_code: &|light| (65535.0 * srgb_encode(light)).round() as u16,
+            };
+            read_reduced(path, size, &curve).map_err(|error| undecodable(path, &error))?
+        }
+        None => decode(path, CODES_BYTES)?,
+    };
+    let mut notes = vec![];
+    let stated = image::ImageReader::open(path).ok().and_then(|reader| reader.with_guessed_format().ok());
+    if let Some(mut decoder) = stated.and_then(|reader| reader.into_decoder().ok()) {
+        if let Ok(orientation) = decoder.orientation()
+            && orientation != Orientation::NoTransforms
+        {
+            picture.apply_orientation(orientation);
+            notes.push(format!("{}: it is turned upright, as its orientation says", name_of(path)));
+        }
+        // The name of the usual profile stands in its text, of one byte a letter or of two.
+        let profile = decoder.icc_profile().ok().flatten();
+        let says_srgb = |profile: &Vec<u8>| {
+            [&b"sRGB"[..], b"s\0R\0G\0B"].iter().any(|name| profile.windows(name.len()).any(|at| at == *name))
+        };
+        if profile.is_some_and(|profile| !profile.is_empty() && !says_srgb(&profile)) {
+            let own = ["ICC profile".to_owned()];
+            notes.extend(note_of(path, "color space", &own).map(|note| note + ": its codes are taken as sRGB"));
+        }
+    }
+    if picture.color().has_alpha() {
+        let opaque = match &picture {
+            DynamicImage::ImageLumaA8(p) => p.pixels().all(|p| p.0[1] == u8::MAX),
+            DynamicImage::ImageRgba8(p) => p.pixels().all(|p| p.0[3] == u8::MAX),
+            DynamicImage::ImageLumaA16(p) => p.pixels().all(|p| p.0[1] == u16::MAX),
+            DynamicImage::ImageRgba16(p) => p.pixels().all(|p| p.0[3] == u16::MAX),
+            _ => false,
+        };
+        if !opaque {
+            notes.extend(note_of(path, "channel", &["opacity".to_owned()]));
+        }
+    }
+    Ok((picture, notes))
+}
+
+/// Returns what a picture's samples are, in words.
+pub(super) fn kind_of(picture: &DynamicImage) -> String {
+    let color = picture.color();
+    let bits = 8 * u16::from(color.bytes_per_pixel()) / u16::from(color.channel_count());
+    let what = if color.has_color() { "sRGB" } else { "gray" };
+    format!("{what} of {bits} bits")
 }
 
 /// The samples of a picture as they stand in its file.

@@ -1,83 +1,85 @@
-//! Any file of a scene, by its name.
+//! Any file of a scene, by its name and its first bytes.
 
-use std::path::{Path, PathBuf};
+use std::{
+    fs::File,
+    io::Read,
+    path::{Path, PathBuf},
+};
 
-use dioptric_spectrum::{DepthMap, Display, Illuminant, Quantity, SpectralImage, Spectrum, WavelengthGrid};
+use dioptric_spectrum::{
+    DepthMap, Display, Illuminant, Quantity, SpectralImage, Spectrum, SpectrumError, WavelengthGrid,
+};
 use ndarray::Array2;
 
 use super::{
-    camera::view_beside,
-    depth_picture::depth_beside,
-    mat::read_iset_mat,
-    picture::{lifted, picture_size_of, read_picture_of},
-    read_band_folder, read_envi,
-    spectral_exr::{RawFile, RawImage, axial, read_raw_exr},
+    band_folder::band_folder,
+    camera::CameraData,
+    contents::{Contents, Cube, Heeds, Image, straightened, straightened_depth},
+    depth::{DepthWords, RawDepth, depth_beside, files_beside, likely_beside, read_depth},
+    envi::{contents_of_envi, header_of},
+    mat::{MatScene, read_mat},
+    no_data::mend,
+    npy::read_npy,
+    pfm::read_pfm,
+    picture::{lifted, lifted_codes, oriented, picture_size_of},
+    reading::{DepthKind, FileQuantity, FileReading, Frame, light_unit},
+    spectral_exr::{RawFile, RawImage, read_raw_exr},
+    stated::{name_of, note_of},
+    tiff_file::{TiffFile, read_tiff},
+    understood::{self, Sources, bands},
     unmeasured::{self, FillDepth},
     unusable::unreadable,
 };
-use crate::{HiddenLayer, Scene, SceneError, SceneLight, View, reflectance_under, resampled};
+use crate::{HiddenLayer, Scene, SceneError, SceneLight, View, resampled};
+
+/// The illuminance on reflectances, and on a white of ordinary pictures, lx.
+const USUAL_LUX: f64 = 1000.0;
 
 /// What a file may leave open.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct ReadOptions {
     /// The bands wanted; those of the file where `None`, and 400–700 nm every 10 nm for ordinary pictures.
     pub grid: Option<WavelengthGrid>,
-    /// The light on a file of reflectances.
-    pub light: Illuminant,
-    /// Its illuminance, lx.
-    pub illuminance_lux: f64,
-    /// The luminance of the white of an ordinary picture, cd/m².
-    pub picture_white_cd_m2: f64,
-    /// The wavelengths of a folder's numbered pictures, where the folder does not list them.
-    pub band_wavelengths: Option<WavelengthGrid>,
-    /// The number that a perfect white has in an ENVI file that does not tell.
+    /// The light on a file of reflectances, D65 where `None`; an ordinary picture is put under it.
+    pub light: Option<Illuminant>,
+    /// Its illuminance, and that of the white of an ordinary picture, lx; 1000 where `None`, or what the file says of its white.
+    pub illuminance_lux: Option<f64>,
+    /// The number that a perfect white has in a cube that does not tell.
     pub white_level: Option<f64>,
     /// One depth for all samples of a scene that has none, m.
     pub depth_m: Option<f64>,
     /// The horizontal field of view, in place of the file's own camera data.
     pub horizontal_fov_deg: Option<f64>,
-    /// How far apart the samples of a picture of one depth may be, as the tangent of the angle between neighbours on the axis: a picture that is finer
-    /// is read as means of its pixels.
+    /// How far apart the samples of a picture of one depth may be, as the tangent of the angle between neighbours on the axis: a
+    /// picture that is finer is read as means of its pixels.
     pub finest_tangent: Option<f64>,
     /// The depth of places where none was measured; where `None`, those of a depth picture get the farther of the depths beside
     /// them, and a file that has such places is refused.
     pub fill_depth: Option<FillDepth>,
+    /// What else the file does not say itself.
+    pub reading: FileReading,
 }
 
-impl Default for ReadOptions {
-    /// D65 at 1000 lx on reflectances, a picture's white of 100 cd/m², and all else as the file has it.
-    fn default() -> Self {
-        Self {
-            grid: None,
-            light: Illuminant::D65,
-            illuminance_lux: 1000.0,
-            picture_white_cd_m2: 100.0,
-            band_wavelengths: None,
-            white_level: None,
-            depth_m: None,
-            horizontal_fov_deg: None,
-            finest_tangent: None,
-            fill_depth: None,
-        }
-    }
-}
-
-/// Reads a scene from a spectral or ordinary EXR (`.exr`), an ENVI header (`.hdr`), a scene of `ISETCam` (`.mat`), a folder with a
-/// picture a band, or an ordinary picture (`.png`, `.jpg`, `.tif`).
+/// Reads a scene from a spectral or ordinary EXR (`.exr`), an ENVI header (`.hdr`) or its file of numbers, a MATLAB file (`.mat`), an
+/// array of NumPy (`.npy`), a TIFF of any kind, a folder with a picture a band, or an ordinary picture (`.png`, `.jpg`, `.webp`, `.bmp`,
+/// `.ppm`, `.pfm`, Radiance `.hdr`).
 ///
-/// Camera data comes from the options, else from the file, else from a `NAME.camera.json` beside it; depth from the file, else
-/// from a gray 16-bit `NAME.depth.png` beside it (millimetres, or what `depth_unit_m` of the camera file says; 0 where it was
-/// not measured), else from the options. Depth and view may still be absent afterwards: [`Scene::require_depth_and_view`] reports
-/// so. What was filled or resampled is in [`Scene::notes`].
+/// Camera data comes from the options, else from the file, else from a `NAME.camera.json` beside it; depth from the options, else
+/// from the file, else from a `NAME.depth.png` and its like beside it, else one for all from the options. Depth and view may still be
+/// absent afterwards: [`Scene::require_depth_and_view`] reports so. The first of [`Scene::notes`] says what was understood, the others
+/// what was filled, resampled or not used: nothing that the file states is dropped without being named.
 ///
 /// # Errors
-/// One sentence with the file's name when anything in it is wrong, or its bands do not cover those wanted.
+/// One sentence with the file's name when anything in it is wrong, its bands do not cover those wanted, or an option does not apply.
 pub fn read_scene(path: &Path, options: &ReadOptions) -> Result<Scene, SceneError> {
-    let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
     if let Some(fill) = options.fill_depth {
         fill.check()?;
     }
-    finish(path, name, contents_of(path, options)?, options)
+    options.reading.check()?;
+    let name = name_of(path);
+    let contents = contents_of(path, options)?;
+    contents.check_heeds(path, options)?;
+    finish(path, name, contents, options)
 }
 
 /// Reads what lies behind the first surface of a scene from a file of its own, of any kind that [`read_scene`] reads: radiance and
@@ -88,18 +90,20 @@ pub fn read_scene(path: &Path, options: &ReadOptions) -> Result<Scene, SceneErro
 /// # Errors
 /// As [`read_scene`], and when the file has no depth, another size, or a depth before the first surface.
 pub fn read_hidden_layer(path: &Path, options: &ReadOptions, first: &Scene) -> Result<HiddenLayer, SceneError> {
-    let mut contents = contents_of(path, options)?;
-    let (rows, columns) = (contents.image.rows(), contents.image.columns());
-    if contents.depth.is_none() {
-        contents.depth = depth_beside(path, rows, columns)?.map(|(_, values_m)| RawDepth { values_m, is_axial: true });
-    }
-    let z_m = match (contents.depth, first.view) {
-        (Some(RawDepth { values_m, is_axial: true }), _) => values_m,
-        (Some(RawDepth { values_m, is_axial: false }), Some(view)) => axial(&values_m, view),
-        _ => return Err(unreadable(path, "a hidden layer needs a depth, expected a channel 'Z' or a NAME.depth.png")),
+    let options = &ReadOptions {
+        grid: Some(first.radiance.grid().clone()),
+        reading: FileReading { depth: None, view: None, ..options.reading.clone() },
+        ..options.clone()
     };
-    let grid = Some(first.radiance.grid().clone());
-    let radiance = lit(contents.image, &ReadOptions { grid, ..options.clone() })?;
+    let mut contents = contents_of(path, options)?;
+    let (rows, columns) = contents.size();
+    if contents.depth.is_none() {
+        contents.depth = depth_beside(path, words(path, options)?)?;
+    }
+    let lacks = || unreadable(path, "a hidden layer needs a depth, expected a channel 'Z' or a NAME.depth.png");
+    let depth = contents.depth.take().ok_or_else(lacks)?.resized(rows, columns)?;
+    let z_m = depth.axial_m(first.view)?.ok_or_else(lacks)?;
+    let (radiance, _) = lit(path, contents, options, &mut vec![])?;
     let hidden = HiddenLayer { radiance, depth: behind(path, z_m, first.depth.as_ref())? };
     Scene { hidden: Some(hidden.clone()), ..first.clone() }.validate()?;
     Ok(hidden)
@@ -119,88 +123,200 @@ fn behind(file: &Path, mut z_m: Array2<f32>, first: Option<&DepthMap>) -> Result
 
 fn contents_of(path: &Path, options: &ReadOptions) -> Result<Contents, SceneError> {
     if path.is_dir() {
-        return Ok(Contents::of(read_band_folder(path, options.band_wavelengths.as_ref())?));
+        return band_folder(path, options.reading.wavelengths_nm.as_deref())?.into_contents(path, options);
+    }
+    if !path.exists() {
+        return Err(unreadable(path, "there is no such file"));
     }
     let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
     match extension.as_str() {
         "exr" => of_exr(path, options),
-        "hdr" => Ok(Contents::of(read_envi(path)?.into_image(options.white_level)?)),
-        "mat" => of_mat(path),
+        "hdr" if !starts_with(path, b"#?")? => contents_of_envi(path, options),
+        "mat" => of_mat(path, options),
+        "npy" => of_npy(path, options),
+        "pfm" => of_pfm(path),
+        "tif" | "tiff" => of_tiff(path, options),
         "jpg" | "jpeg" if cfg!(not(feature = "jpeg")) => {
             Err(SceneError::LacksFeature { file: path.to_owned(), feature: "jpeg" })
         }
-        "png" | "jpg" | "jpeg" | "tif" | "tiff" => {
-            let display = Display::apple_studio();
-            let (size, notes) = picture_size(path, options)?;
-            let image = read_picture_of(path, size, &display, &picture_bands(options)?, options.picture_white_cd_m2)?;
-            let light = Some(white_of(&display, options.picture_white_cd_m2)?);
-            Ok(Contents { light, notes, ..Contents::of(image) })
-        }
-        _ if !path.exists() => Err(unreadable(path, "there is no such file")),
-        _ => Err(SceneError::UnknownKind { file: path.to_owned() }),
+        "png" | "jpg" | "jpeg" | "webp" | "bmp" | "ppm" | "pgm" | "pnm" | "hdr" => of_picture(path, options, vec![]),
+        _ => match header_of(path) {
+            Some(header) => contents_of_envi(&header, options),
+            None => Err(SceneError::UnknownKind { file: path.to_owned() }),
+        },
     }
 }
 
-/// Returns the columns and rows as which a picture is read, and what is to be said of them: its own, or fewer where the options allow that and nothing
-/// lies beside it that counts its pixels.
-fn picture_size(path: &Path, options: &ReadOptions) -> Result<((usize, usize), Vec<String>), SceneError> {
-    let (columns, rows) = picture_size_of(path)?;
-    let (Some(finest), Some(fov_deg)) = (options.finest_tangent, options.horizontal_fov_deg) else {
-        return Ok(((columns, rows), vec![]));
+fn starts_with(path: &Path, start: &[u8]) -> Result<bool, SceneError> {
+    let mut bytes = vec![];
+    let file = File::open(path).map_err(|error| unreadable(path, error))?;
+    file.take(start.len() as u64).read_to_end(&mut bytes).map_err(|error| unreadable(path, error))?;
+    Ok(bytes == start)
+}
+
+/// An ordinary picture: what a display shows, or linear colors where it has floats.
+fn of_picture(path: &Path, options: &ReadOptions, mut notes: Vec<String>) -> Result<Contents, SceneError> {
+    let size = reduced_size(path, options)?;
+    let (picture, more) = oriented(path, size)?;
+    notes.extend(more);
+    if let Some((columns, rows)) = size {
+        let (own_columns, own_rows) = picture_size_of(path)?;
+        notes.push(format!(
+            "its {own_columns} × {own_rows} pixels are read as {columns} × {rows} means, finer than those of the film by far"
+        ));
+    }
+    let what = format!("a picture as a display shows it ({})", super::picture::kind_of(&picture));
+    let image = match picture {
+        dioptric_pictures::DynamicImage::ImageRgb32F(_) | dioptric_pictures::DynamicImage::ImageRgba32F(_) => {
+            let (columns, rows) = (picture.width() as usize, picture.height() as usize);
+            let samples = picture.into_rgb32f().into_raw();
+            let plane = |k: usize| {
+                let values = samples.iter().skip(k).step_by(3).copied().collect();
+                Array2::from_shape_vec((rows, columns), values).expect("three samples a pixel")
+            };
+            return Ok(linear([plane(0), plane(1), plane(2)], None, notes));
+        }
+        picture => Image::Codes(picture),
     };
+    Ok(Contents { notes, heeds: Heeds::Nothing, ..Contents::of(image, what) })
+}
+
+/// Returns the columns and rows as which a picture is read, where they are fewer than its own: where the options allow that and nothing lies
+/// beside it that counts its pixels.
+fn reduced_size(path: &Path, options: &ReadOptions) -> Result<Option<(usize, usize)>, SceneError> {
+    let (Some(finest), Some(fov_deg)) = (options.finest_tangent, options.horizontal_fov_deg) else { return Ok(None) };
+    let (columns, rows) = picture_size_of(path)?;
     let own = 2.0 * (0.5 * fov_deg.to_radians()).tan() / columns as f64;
     // Whole numbers of pixels, of which the last block of a row may have one more.
     let block = ((finest / own) as usize).min(columns).min(rows);
-    if block < 2 || depth_beside(path, rows, columns)?.is_some() {
-        return Ok(((columns, rows), vec![]));
+    let is_counted = options.reading.depth.is_some() || !files_beside(path).is_empty();
+    Ok((block >= 2 && !is_counted).then(|| (columns / block, rows / block)))
+}
+
+fn linear(planes: [Array2<f32>; 3], white_cd_m2: Option<f64>, notes: Vec<String>) -> Contents {
+    let what = "linear colors as a display shows them";
+    Contents { notes, heeds: Heeds::Scale, ..Contents::of(Image::Linear { planes, white_cd_m2 }, what) }
+}
+
+fn of_pfm(path: &Path) -> Result<Contents, SceneError> {
+    let mut planes = read_pfm(path)?.into_iter();
+    Ok(match (planes.next(), planes.next(), planes.next()) {
+        (Some(r), Some(g), Some(b)) => linear([r, g, b], None, vec![]),
+        (Some(gray), ..) => linear([gray.clone(), gray.clone(), gray], None, vec![]),
+        _ => return Err(unreadable(path, "it has no samples")),
+    })
+}
+
+fn of_tiff(path: &Path, options: &ReadOptions) -> Result<Contents, SceneError> {
+    match read_tiff(path)? {
+        TiffFile::Picture { notes } => of_picture(path, options, notes),
+        TiffFile::Linear(planes, notes) => Ok(linear(planes, None, notes)),
+        TiffFile::Stack(mut stack) => {
+            if let Some(none) = stack.no_data.map(|v| v as f32) {
+                let ignore = |v: &mut f32| *v = if *v == none { f32::NAN } else { *v };
+                stack.planes.iter_mut().for_each(|plane| plane.iter_mut().for_each(ignore));
+            }
+            let cube = Cube {
+                planes: stack.planes,
+                top: stack.top,
+                wavelengths_nm: stack.wavelengths_nm,
+                quantity: None,
+                notes: stack.notes,
+            };
+            cube.into_contents(path, options)
+        }
     }
-    let size = (columns / block, rows / block);
-    let note = format!(
-        "its {columns} × {rows} pixels are read as {} × {} means, finer than those of the film by far",
-        size.0, size.1
-    );
-    Ok((size, vec![note]))
+}
+
+fn of_npy(path: &Path, options: &ReadOptions) -> Result<Contents, SceneError> {
+    let array = read_npy(path)?;
+    let told = options.reading.wavelengths_nm.as_ref().map(Vec::len);
+    let n_bands = told.or_else(|| options.grid.as_ref().map(WavelengthGrid::len));
+    let at = |index: usize| array.values[index];
+    let planes = super::axes::planes(&array.sides, options.reading.axes.as_deref(), n_bands, true, at)
+        .map_err(|reason| unreadable(path, reason))?;
+    Cube { planes, top: array.top, wavelengths_nm: None, quantity: None, notes: vec![] }.into_contents(path, options)
 }
 
 fn of_exr(path: &Path, options: &ReadOptions) -> Result<Contents, SceneError> {
-    let RawFile { image, z_m, distance_m, view, hidden } = read_raw_exr(path)?;
-    let (image, light) = match image {
-        RawImage::Spectral(image) => (image, None),
-        RawImage::Rgb(rgb) => {
-            let display = Display::apple_studio();
-            let image = lifted(&rgb, &display, &picture_bands(options)?, options.picture_white_cd_m2)?;
-            (image, Some(white_of(&display, options.picture_white_cd_m2)?))
+    let RawFile { image, depth, view, frame, light, hidden, mut notes } = read_raw_exr(path)?;
+    let reading = &options.reading;
+    let choice = reading.no_data.unwrap_or_default();
+    let view = view.map(|view| CameraData::of_view(path, view));
+    let (image, what, heeds) = match image {
+        RawImage::Spectral { image, is_unit_stated } => {
+            let is_light = image.quantity() != Quantity::Reflectance;
+            let says_other = match reading.quantity {
+                Some(FileQuantity::Reflectance) => is_light,
+                Some(_) => !is_light,
+                None => false,
+            };
+            let is_unit_open = is_light && !is_unit_stated;
+            if says_other || (reading.unit.is_some() && !is_unit_open) {
+                let what = if is_light { "light, whose unit it states" } else { "reflectances" };
+                let reason = format!("it holds {what}, and --quantity or --unit says something else");
+                return Err(SceneError::Units { file: path.to_owned(), reason });
+            }
+            let told = reading.unit.as_deref().map(light_unit).transpose()?;
+            let unit = told.or_else(|| reading.quantity.and_then(FileQuantity::light_unit)).filter(|_| is_unit_open);
+            let scale = reading.scale.unwrap_or(1.0);
+            let (quantity, grid) = (image.quantity(), image.grid().clone());
+            let mut planes = image.into_planes();
+            for (plane, &nm) in planes.iter_mut().zip(grid.centers_nm()) {
+                let factor = scale * unit.map_or(1.0, |unit| unit.factor_at(nm));
+                if factor != 1.0 {
+                    plane.mapv_inplace(|v| (f64::from(v) * factor) as f32);
+                }
+            }
+            notes.extend(mend(path, &grid, &mut planes, choice)?.note(path, choice));
+            let values = |reason: SpectrumError| SceneError::Values { file: path.to_owned(), reason };
+            let image = SpectralImage::new(quantity, grid, planes).map_err(values)?;
+            let what = match (is_light, is_unit_stated) {
+                (false, _) => "reflectance".to_owned(),
+                (true, true) => "radiance".to_owned(),
+                (true, false) => {
+                    format!("radiance, taken for {}", reading.unit.as_deref().unwrap_or("W/m^2/sr/nm"))
+                }
+            };
+            (Image::Spectral(image), what, if is_unit_open { Heeds::Unit } else { Heeds::Scale })
+        }
+        RawImage::Rgb { planes, white_cd_m2 } => {
+            let what = "linear colors as a display shows them".to_owned();
+            (Image::Linear { planes, white_cd_m2 }, what, Heeds::Scale)
         }
     };
-    let depth = match (z_m, distance_m) {
-        (Some(values_m), _) => Some(RawDepth { values_m, is_axial: true }),
-        (None, Some(values_m)) => Some(RawDepth { values_m, is_axial: false }),
-        (None, None) => None,
-    };
-    Ok(Contents { depth, view, hidden, light, ..Contents::of(image) })
+    Ok(Contents { depth, view, frame: Some(frame), light, hidden, notes, heeds, ..Contents::of(image, what) })
 }
 
 /// Depths that differ are taken as distances from the camera, as renderers leave them; depths that are all alike are those of a
 /// plane that faces it.
-fn of_mat(path: &Path) -> Result<Contents, SceneError> {
-    let scene = read_iset_mat(path)?;
+fn of_mat(path: &Path, options: &ReadOptions) -> Result<Contents, SceneError> {
+    let scene = match read_mat(path, &options.reading)? {
+        MatScene::Cube(cube) => return cube.into_contents(path, options),
+        MatScene::Iset(scene) => scene,
+    };
     let (rows, columns) = (scene.image.rows(), scene.image.columns());
     let view = scene.horizontal_fov_deg.map(|fov_deg| View::from_horizontal_fov_deg(fov_deg, columns, rows));
     let is_flat = |map: &Array2<f32>| map.iter().all(|z| *z == map[(0, 0)]);
     let depth = match (scene.depth_m, scene.distance_m) {
-        (Some(values_m), _) => Some(RawDepth { is_axial: is_flat(&values_m), values_m }),
+        (Some(values), _) => {
+            let kind = if is_flat(&values) { DepthKind::Axial } else { DepthKind::Radial };
+            Some(RawDepth::in_file(path, "its depth map".to_owned(), values, kind))
+        }
         (None, Some(z_m)) => {
-            Some(RawDepth { values_m: Array2::from_elem((rows, columns), z_m as f32), is_axial: true })
+            let values = Array2::from_elem((rows, columns), z_m as f32);
+            Some(RawDepth::in_file(path, "its distance".to_owned(), values, DepthKind::Axial))
         }
         (None, None) => None,
     };
-    let mut notes = vec![];
+    let mut notes = scene.notes;
     if scene.n_clipped > 0 {
         let n_samples = rows * columns * scene.image.grid().len();
         notes.push(format!("{} of {n_samples} samples of all bands were below 0 and are 0", scene.n_clipped));
     }
-    let view = view.transpose().map_err(|error| unreadable(path, error))?;
-    Ok(Contents { depth, view, light: scene.light, notes, ..Contents::of(scene.image) })
+    let view = view.transpose().map_err(|error| unreadable(path, error))?.map(|view| CameraData::of_view(path, view));
+    let contents = Contents::of(Image::Spectral(scene.image), "radiance of its photons");
+    Ok(Contents { depth, view, light: scene.light, notes, heeds: Heeds::Nothing, ..contents })
 }
 
 /// Returns the bands of a picture without a spectrum.
@@ -211,85 +327,212 @@ fn picture_bands(options: &ReadOptions) -> Result<WavelengthGrid, SceneError> {
     })
 }
 
-/// What a reader found.
-struct Contents {
-    image: SpectralImage,
-    depth: Option<RawDepth>,
-    view: Option<View>,
-    hidden: Option<(SpectralImage, Array2<f32>)>,
-    light: Option<SceneLight>,
-    notes: Vec<String>,
+/// Returns what is said of a depth, and by the camera file beside the picture.
+fn words<'a>(path: &Path, options: &'a ReadOptions) -> Result<DepthWords<'a>, SceneError> {
+    let reading = &options.reading;
+    let camera = match &reading.view {
+        Some(file) => Some(CameraData::read(file)?),
+        None => CameraData::beside(path)?,
+    };
+    let unit_m = camera.and_then(|camera| camera.depth_unit_m);
+    Ok(DepthWords { kind: reading.depth_kind, unit: reading.depth_unit.as_deref(), unit_m })
 }
 
-/// Depths as they stand in a file, m; 0 or NaN where none was measured.
-struct RawDepth {
-    values_m: Array2<f32>,
-    /// Along the axis, or else from the projection center.
-    is_axial: bool,
+/// Returns the camera data of the image's own samples, and notes what else there was.
+fn camera_of(
+    path: &Path,
+    contents: &mut Contents,
+    frame: Frame,
+    options: &ReadOptions,
+) -> Result<Option<(CameraData, Option<String>)>, SceneError> {
+    let beside = CameraData::beside(path)?;
+    let own = contents.view.take();
+    let (name, mut unused) = (name_of(path), vec![]);
+    let mut leave = |own: Option<&CameraData>, beside: Option<&CameraData>| {
+        unused.extend(own.map(|_| format!("camera data of {name}")));
+        unused.extend(beside.map(|beside| name_of(&beside.file)));
+    };
+    let of_frame = |data: &CameraData| -> Result<CameraData, SceneError> {
+        Ok(data.of_size(path, frame.rows, frame.columns)?.shifted(frame.x0, frame.y0))
+    };
+    let found = match (options.horizontal_fov_deg, &options.reading.view) {
+        (Some(_), Some(_)) => {
+            return Err(SceneError::Setting {
+                what: "the view of the scene",
+                value: "a field of view and a file of camera data".to_owned(),
+                expected: "one of them".to_owned(),
+            });
+        }
+        (Some(fov_deg), None) => {
+            leave(own.as_ref(), beside.as_ref());
+            let view = View::from_horizontal_fov_deg(fov_deg, frame.columns, frame.rows)?;
+            let data = CameraData::of_view(path, view).with_aspect(frame.aspect);
+            Some((data.shifted(frame.x0, frame.y0), None))
+        }
+        (None, Some(file)) => {
+            leave(own.as_ref(), beside.as_ref().filter(|beside| beside.file != *file));
+            let data = of_frame(&CameraData::read(file)?)?;
+            let from = name_of(&data.file);
+            Some((data, Some(from)))
+        }
+        (None, None) => match (own, beside) {
+            (Some(own), beside) => {
+                leave(None, beside.as_ref());
+                Some((own, Some(name.clone())))
+            }
+            (None, Some(beside)) => {
+                let data = of_frame(&beside)?;
+                let from = name_of(&data.file);
+                Some((data, Some(from)))
+            }
+            (None, None) => None,
+        },
+    };
+    contents.notes.extend(found.iter().filter_map(|(data, _)| data.note.clone()));
+    // What the camera file says of the depth is used all the same.
+    contents.notes.extend(note_of(path, "view", &unused));
+    Ok(found)
 }
 
-impl Contents {
-    fn of(image: SpectralImage) -> Self {
-        Self { image, depth: None, view: None, hidden: None, light: None, notes: vec![] }
+/// Returns the depth as it stands in its file, on the image's samples, and notes what else there was.
+fn raw_depth(
+    path: &Path,
+    contents: &mut Contents,
+    frame: Frame,
+    options: &ReadOptions,
+) -> Result<Option<RawDepth>, SceneError> {
+    let words = words(path, options)?;
+    let (rows, columns) = contents.size();
+    let own = contents.depth.take();
+    let beside = || files_beside(path).iter().map(|file| name_of(file)).collect::<Vec<_>>();
+    let mut unused = vec![];
+    let depth = match (&options.reading.depth, own) {
+        (Some(file), own) => {
+            unused.extend(own.map(|own| own.from));
+            unused.extend(beside().into_iter().filter(|name| *name != name_of(file)));
+            Some(read_depth(file, words)?)
+        }
+        (None, Some(own)) => {
+            unused = beside();
+            Some(own.told(words)?)
+        }
+        (None, None) => depth_beside(path, words)?,
+    };
+    let is_told = words.kind.is_some() || words.unit.is_some();
+    let Some(mut depth) = depth else {
+        let likely = likely_beside(path);
+        if is_told {
+            let hint = likely.first().map_or_else(String::new, |name| format!(", as {name}"));
+            let reason = format!("it has no depth that a unit or a kind could be said of: expected --depth FILE{hint}");
+            return Err(unreadable(path, reason));
+        }
+        contents.notes.extend(note_of(path, "file that may be a depth (--depth)", &likely));
+        return Ok(None);
+    };
+    if options.depth_m.is_some() {
+        unused.push(format!("one depth (--depth-m), as it has {}", depth.from));
     }
+    contents.notes.extend(note_of(path, "depth", &unused));
+    if !frame.is_whole(rows, columns) && depth.values.dim() == (frame.rows, frame.columns) {
+        let at = |row: usize, column: usize| {
+            let (row, column) = (row as i64 + frame.y0, column as i64 + frame.x0);
+            let is_within = (0..frame.rows as i64).contains(&row) && (0..frame.columns as i64).contains(&column);
+            if is_within { depth.values[(row as usize, column as usize)] } else { f32::NAN }
+        };
+        depth.values = Array2::from_shape_fn((rows, columns), |(row, column)| at(row, column));
+    }
+    let mut depth = depth.resized(rows, columns)?;
+    contents.notes.append(&mut depth.notes);
+    Ok(Some(depth))
 }
 
 /// Lights a reflectance, moves it to the bands wanted and adds what the options give.
-fn finish(path: &Path, name: String, contents: Contents, options: &ReadOptions) -> Result<Scene, SceneError> {
-    let (rows, columns) = (contents.image.rows(), contents.image.columns());
-    let view = match (view_wanted(options, &contents.image)?, contents.view) {
-        (Some(view), _) | (None, Some(view)) => Some(view),
-        (None, None) => view_beside(path, rows, columns)?,
+fn finish(path: &Path, name: String, mut contents: Contents, options: &ReadOptions) -> Result<Scene, SceneError> {
+    let (rows, columns) = contents.size();
+    let frame = contents.frame.unwrap_or_else(|| Frame::whole(rows, columns));
+    let camera = camera_of(path, &mut contents, frame, options)?;
+    let mut depth = raw_depth(path, &mut contents, frame, options)?;
+    let mut sources = Sources { what: contents.what.clone(), ..Sources::default() };
+    if !frame.is_whole(rows, columns) {
+        sources.what += &format!(
+            ", samples {}–{} × {}–{} of {} × {}",
+            frame.x0,
+            frame.x0 + columns as i64 - 1,
+            frame.y0,
+            frame.y0 + rows as i64 - 1,
+            frame.columns,
+            frame.rows
+        );
+    }
+    sources.view = camera.as_ref().and_then(|(_, from)| from.clone());
+    let straight = camera.as_ref().and_then(|(camera, _)| camera.straightened(rows, columns));
+    let mut view = camera.map(|(camera, _)| camera.view());
+    if let Some((how, note)) = &straight {
+        view = Some(how.view);
+        contents.notes.push(note.clone());
+        if let Some(depth) = &mut depth {
+            depth.values = straightened_depth(&depth.values, how);
+        }
+    }
+    if let Some(view) = view {
+        view.check().map_err(|error| unreadable(path, error))?;
+    }
+    let mut notes = std::mem::take(&mut contents.notes);
+    sources.depth = depth.as_ref().map(RawDepth::describe);
+    let depth = match depth {
+        Some(raw) => depth_of(raw, view, options.fill_depth, &mut notes)?,
+        None => None,
     };
-    let mut notes = contents.notes;
-    let depth = match contents.depth {
-        Some(raw) => depth_of(path, raw, view, options.fill_depth, &mut notes)?,
-        None => match depth_beside(path, rows, columns)? {
-            Some((file, values_m)) => {
-                let fill = options.fill_depth.unwrap_or(FillDepth::Beside);
-                depth_of(&file, RawDepth { values_m, is_axial: true }, view, Some(fill), &mut notes)?
-            }
-            None => None,
-        },
+    let own_grid = match (&contents.own_grid, &contents.image) {
+        (Some(own), _) => Some(own.clone()),
+        (None, Image::Spectral(image)) => Some(image.grid().clone()),
+        (None, _) => None,
     };
-    notes.extend(resampling_note(contents.image.grid(), options.grid.as_ref()));
-    let hidden = match contents.hidden {
+    notes.extend(own_grid.as_ref().and_then(|own| resampling_note(own, options.grid.as_ref())));
+    sources.bands = own_grid;
+    let hidden = match contents.hidden.take() {
         Some((image, z_m)) => {
-            Some(HiddenLayer { radiance: lit(image, options)?, depth: behind(path, z_m, depth.as_ref())? })
+            let image = Contents::of(Image::Spectral(image), "");
+            let (radiance, _) = lit(path, image, options, &mut vec![])?;
+            Some(HiddenLayer { radiance, depth: behind(path, z_m, depth.as_ref())? })
         }
         None => None,
     };
-    let light = match contents.image.quantity() {
-        Quantity::Reflectance => Some(SceneLight::new(options.light.clone(), options.illuminance_lux)),
-        _ => contents.light,
-    };
-    let radiance = lit(contents.image, options)?;
+    let (mut radiance, light) = lit(path, contents, options, &mut notes)?;
+    if let Some((how, _)) = &straight {
+        if hidden.is_some() {
+            return Err(unreadable(path, "its samples are not square or straight, which a hidden layer must be"));
+        }
+        let (quantity, grid) = (radiance.quantity(), radiance.grid().clone());
+        let planes = radiance.planes().iter().map(|plane| straightened(plane, how)).collect();
+        radiance = SpectralImage::new(quantity, grid, planes)?;
+    }
     let scene = Scene { name, radiance, depth, view, hidden, light, notes };
-    let scene = match options.depth_m {
+    let mut scene = match options.depth_m {
         Some(depth_m) => scene.or_flat_depth_m(depth_m)?,
         None => scene,
     };
     scene.validate()?;
+    understood::tell(&mut scene, &sources);
     Ok(scene)
 }
 
 /// Fills depths that were not measured and takes distances from the projection center for depths along the axis; `None` for
 /// distances of samples whose directions are not known.
 fn depth_of(
-    file: &Path,
     raw: RawDepth,
     view: Option<View>,
     fill: Option<FillDepth>,
     notes: &mut Vec<String>,
 ) -> Result<Option<DepthMap>, SceneError> {
-    let values = |reason| SceneError::Values { file: file.to_owned(), reason };
-    let values_m = match (raw.is_axial, view) {
-        (true, _) => raw.values_m,
-        (false, Some(view)) => axial(&raw.values_m, view),
-        (false, None) => return Ok(None),
+    let file = &raw.file;
+    let values = |reason| SceneError::Values { file: file.clone(), reason };
+    let Some(values_m) = raw.axial_m(view)? else {
+        notes.push(format!("{}: its depth {} needs the field of view and is not used", name_of(file), raw.describe()));
+        return Ok(None);
     };
     let n_samples = values_m.len();
-    let Some(fill) = fill else {
+    let Some(fill) = fill.or(raw.is_picture.then_some(FillDepth::Beside)) else {
         check_measured(file, &values_m)?;
         return Ok(Some(DepthMap::new(values_m).map_err(values)?));
     };
@@ -313,53 +556,144 @@ fn check_measured(file: &Path, z_m: &Array2<f32>) -> Result<(), SceneError> {
 /// Returns in a sentence how the bands of a file become those wanted, where they are others.
 fn resampling_note(own: &WavelengthGrid, wanted: Option<&WavelengthGrid>) -> Option<String> {
     let wanted = wanted.filter(|wanted| *wanted != own)?;
-    let of = |grid: &WavelengthGrid| {
-        let (first, last) = grid.range_nm();
-        let widths = grid.centers_nm().windows(2).map(|pair| pair[1] - pair[0]);
-        let (least, most) =
-            widths.fold((f64::INFINITY, 0.0), |(least, most), w| (f64::min(least, w), f64::max(most, w)));
-        match grid.len() {
-            1 => format!("1 band at {first} nm"),
-            n if most - least < 1e-6 => format!("{n} bands of {first}–{last} nm, {} nm apart", short(least)),
-            n => format!("{n} bands of {first}–{last} nm, {} to {} nm apart", short(least), short(most)),
-        }
-    };
     Some(format!(
         "{} become {}: spectra run in straight lines between the centers of bands, and a band wider than those of the file takes \
          the mean over its width",
-        of(own),
-        of(wanted)
+        bands(own),
+        bands(wanted)
     ))
 }
 
-/// Returns a length with the digits that tell.
-fn short(nm: f64) -> f64 {
-    (100.0 * nm).round() / 100.0
-}
-
-/// Returns the light whose perfect white is that of a picture on a display.
-fn white_of(display: &Display, white_cd_m2: f64) -> Result<SceneLight, SceneError> {
-    let grid = WavelengthGrid::uniform(380.0, 780.0, 1.0)?;
-    let [r, g, b] = display.srgb_basis(&grid, 1.0);
-    let white = (0..grid.len()).map(|band| (r[band] + g[band] + b[band]).max(0.0)).collect();
-    let spectrum = Spectrum::new(grid.centers_nm().to_vec(), white)?;
-    Ok(SceneLight::new(Illuminant::Spectrum(spectrum), std::f64::consts::PI * white_cd_m2))
-}
-
-fn view_wanted(options: &ReadOptions, image: &SpectralImage) -> Result<Option<View>, SceneError> {
-    let view = |fov_deg| View::from_horizontal_fov_deg(fov_deg, image.columns(), image.rows());
-    options.horizontal_fov_deg.map(view).transpose()
-}
-
-fn lit(image: SpectralImage, options: &ReadOptions) -> Result<SpectralImage, SceneError> {
+/// Returns the radiance on the bands wanted, and the light that is on it, where that is known.
+///
+/// A picture on a display is light of its own: its white is that of the display on these very bands, or, where another light is asked
+/// for, of that light.
+fn lit(
+    path: &Path,
+    contents: Contents,
+    options: &ReadOptions,
+    notes: &mut Vec<String>,
+) -> Result<(SpectralImage, Option<SceneLight>), SceneError> {
+    let lux = |own: Option<f64>| options.illuminance_lux.or(own).unwrap_or(USUAL_LUX);
+    let choice = options.reading.no_data.unwrap_or_default();
+    let image = match contents.image {
+        Image::Spectral(image) => image,
+        colors => {
+            let grid = picture_bands(options)?;
+            let own_lux = match &colors {
+                Image::Linear { white_cd_m2: Some(white), .. } => Some(std::f64::consts::PI * white),
+                _ => None,
+            };
+            let lux = lux(own_lux);
+            let (basis, light) = white_basis(&grid, options.light.as_ref(), lux)?;
+            let n_dark = (0..grid.len()).filter(|&band| basis.iter().all(|color| color[band] <= 0.0)).count();
+            if n_dark > 0 {
+                let name = name_of(path);
+                notes.push(format!(
+                    "{name}: in {n_dark} of {} bands a display sends no light, nor does the picture",
+                    grid.len()
+                ));
+            }
+            let image = match colors {
+                Image::Codes(picture) => lifted_codes(path, picture, &basis, &grid)?,
+                Image::Linear { mut planes, .. } => {
+                    let scale = options.reading.scale.unwrap_or(1.0) as f32;
+                    let bands = WavelengthGrid::new(vec![450.0, 550.0, 650.0])?;
+                    let mended = mend_colors(path, &bands, &mut planes, choice)?;
+                    notes.extend(mended.note(path, choice));
+                    if scale != 1.0 {
+                        planes.iter_mut().for_each(|plane| plane.mapv_inplace(|v| v * scale));
+                    }
+                    lifted(&planes, &basis, &grid)?
+                }
+                Image::Spectral(image) => image,
+            };
+            return Ok((image, Some(light)));
+        }
+    };
     let image = match &options.grid {
         Some(grid) => resampled(&image, grid)?,
         None => image,
     };
-    if image.quantity() == Quantity::Reflectance {
-        return reflectance_under(&image, &options.light.white_radiance(image.grid(), options.illuminance_lux));
+    if image.quantity() != Quantity::Reflectance {
+        return Ok((image, contents.light));
     }
-    Ok(image)
+    let light = SceneLight::new(options.light.clone().unwrap_or(Illuminant::D65), lux(None));
+    notes.extend(beyond_table(&light.illuminant, image.grid()));
+    let white = light.illuminant.white_radiance(image.grid(), lux(None));
+    let grid = image.grid().clone();
+    let mut planes = image.into_planes();
+    for (plane, white) in planes.iter_mut().zip(white) {
+        plane.mapv_inplace(|v| (f64::from(v) * white) as f32);
+    }
+    Ok((SpectralImage::new(Quantity::Radiance, grid, planes)?, Some(light)))
+}
+
+/// Mends colors, of which negative ones are beyond the gamut and stay.
+fn mend_colors(
+    path: &Path,
+    bands: &WavelengthGrid,
+    planes: &mut [Array2<f32>; 3],
+    choice: super::reading::NoData,
+) -> Result<super::no_data::Mended, SceneError> {
+    let kept: Vec<Array2<bool>> = planes.iter().map(|plane| plane.mapv(|v| v.is_finite() && v < 0.0)).collect();
+    let colors = planes.clone();
+    let finite = planes.iter_mut().zip(&kept);
+    finite.for_each(|(plane, kept)| {
+        ndarray::Zip::from(plane).and(kept).for_each(|v, kept| *v = if *kept { 0.0 } else { *v })
+    });
+    let mended = mend(path, bands, planes, choice)?;
+    for ((plane, kept), own) in planes.iter_mut().zip(&kept).zip(&colors) {
+        ndarray::Zip::from(plane).and(kept).and(own).for_each(|v, kept, own| *v = if *kept { *own } else { *v });
+    }
+    Ok(mended)
+}
+
+/// Returns the spectra of red, green and blue on a grid, and the light of which their sum is the white.
+fn white_basis(
+    grid: &WavelengthGrid,
+    wanted: Option<&Illuminant>,
+    lux: f64,
+) -> Result<([Vec<f64>; 3], SceneLight), SceneError> {
+    if !(lux.is_finite() && lux > 0.0) {
+        return Err(SceneError::Setting {
+            what: "the illuminance on the picture's white",
+            value: format!("{lux} lx"),
+            expected: "a finite number above 0".to_owned(),
+        });
+    }
+    let display = Display::apple_studio();
+    let mut basis = display.srgb_basis(grid, lux / std::f64::consts::PI);
+    let white: Vec<f64> =
+        (0..grid.len()).map(|band| (basis[0][band] + basis[1][band] + basis[2][band]).max(0.0)).collect();
+    let Some(wanted) = wanted else {
+        // On the picture's own bands: a white from other samples of the display's spectrum would tint it.
+        let is_known = grid.len() > 1 && white.iter().any(|v| *v > 0.0);
+        let spectrum = if is_known {
+            Spectrum::new(grid.centers_nm().to_vec(), white)?
+        } else {
+            let fine = WavelengthGrid::uniform(380.0, 780.0, 1.0)?;
+            let [r, g, b] = display.srgb_basis(&fine, 1.0);
+            Spectrum::new(fine.centers_nm().to_vec(), (0..fine.len()).map(|i| (r[i] + g[i] + b[i]).max(0.0)).collect())?
+        };
+        return Ok((basis, SceneLight::new(Illuminant::Spectrum(spectrum), lux)));
+    };
+    wanted.check()?;
+    let target = wanted.white_radiance(grid, lux);
+    for color in &mut basis {
+        for ((v, white), target) in color.iter_mut().zip(&white).zip(&target) {
+            *v = if *white > 0.0 { *v * target / white } else { 0.0 };
+        }
+    }
+    Ok((basis, SceneLight::new(wanted.clone(), lux)))
+}
+
+/// Returns what is said of bands beyond a light's table.
+fn beyond_table(light: &Illuminant, grid: &WavelengthGrid) -> Option<String> {
+    let Illuminant::Spectrum(spectrum) = light else { return None };
+    let ((first, last), (from, to)) = (grid.range_nm(), spectrum.range_nm());
+    let is_beyond = first < from || last > to;
+    is_beyond.then(|| format!("the light is known from {from} to {to} nm; beyond, its end values are held"))
 }
 
 #[cfg(test)]
@@ -399,10 +733,10 @@ mod tests {
         let image = SpectralImage::new(Quantity::Radiance, own, planes).unwrap();
         write_spectral_exr(&path, &image, &crate::ExrParts::default()).unwrap();
         let with = |grid| ReadOptions { grid, ..ReadOptions::default() };
-        assert!(read_scene(&path, &with(None)).unwrap().notes.is_empty());
+        assert_eq!(read_scene(&path, &with(None)).unwrap().notes.len(), 1);
         let even = WavelengthGrid::uniform(420.0, 680.0, 20.0).unwrap();
         let scene = read_scene(&path, &with(Some(even.clone()))).unwrap();
-        let note = &scene.notes[0];
+        let note = &scene.notes[1];
         assert!(
             note.starts_with("7 bands of 400–700 nm, 20 to 80 nm apart become 14 bands of 420–680 nm, 20 nm"),
             "{note}"
@@ -424,9 +758,11 @@ mod tests {
         dioptric_pictures::save(&depth.into(), &folder.path().join("room.depth.png")).unwrap();
         let read = |fill_depth| read_scene(&path, &ReadOptions { fill_depth, ..ReadOptions::default() }).unwrap();
         let usual = read(None);
-        assert_eq!(usual.notes.len(), 1);
+        assert_eq!(usual.notes.len(), 3, "{:?}", usual.notes);
+        // Black is asked about.
+        assert!(usual.notes[2].contains("luminance"));
         assert!(
-            usual.notes[0].starts_with("3 of 8 samples (37.50 %) have no depth; they get the farther"),
+            usual.notes[1].starts_with("3 of 8 samples (37.50 %) have no depth; they get the farther"),
             "{:?}",
             usual.notes
         );

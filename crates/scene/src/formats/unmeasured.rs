@@ -2,6 +2,7 @@
 
 use std::str::FromStr;
 
+use dioptric_spectrum::DepthMap;
 use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 
@@ -54,6 +55,24 @@ impl FromStr for FillDepth {
         fill.check()?;
         Ok(fill)
     }
+}
+
+/// Returns a map of depths, with those that are 0 or NaN filled where that is asked for, and what was done in a sentence.
+///
+/// # Errors
+/// When a depth is not above 0, or none was measured at all.
+pub fn filled_depth(
+    name: &str,
+    z_m: Array2<f32>,
+    fill: Option<FillDepth>,
+) -> Result<(DepthMap, Option<String>), SceneError> {
+    let n_samples = z_m.len();
+    let Some(fill) = fill else { return Ok((DepthMap::new(z_m)?, None)) };
+    let Some((z_m, n_unmeasured)) = filled(z_m, fill) else {
+        return Err(SceneError::MissingDepth { name: name.to_owned() });
+    };
+    let note = (n_unmeasured > 0).then(|| note(n_unmeasured, n_samples, fill));
+    Ok((DepthMap::new(z_m)?, note))
 }
 
 /// Returns the depths with those that are 0 or NaN filled, and how many there were; `None` where no depth was measured at all.

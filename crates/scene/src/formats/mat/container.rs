@@ -29,6 +29,17 @@ pub(super) struct MatFile {
     is_big_endian: bool,
     /// Each variable with the content of its element.
     variables: Vec<(String, Vec<u8>)>,
+    /// All variables of the file.
+    pub(super) listed: Vec<Listed>,
+}
+
+/// What is known of a variable without its content.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Listed {
+    pub(super) name: String,
+    pub(super) sides: Vec<usize>,
+    /// Whether it is an array of real numbers.
+    pub(super) is_numeric: bool,
 }
 
 /// An array: its sides, and what it holds.
@@ -62,8 +73,8 @@ pub(super) struct Numbers<'a> {
 }
 
 impl MatFile {
-    /// Reads those variables of a file whose names are wanted.
-    pub(super) fn read(path: &Path, wanted: &[&str]) -> Result<Self, SceneError> {
+    /// Reads those variables of a file that are wanted.
+    pub(super) fn read(path: &Path, wanted: &dyn Fn(&Listed) -> bool) -> Result<Self, SceneError> {
         let mut file = File::open(path).map_err(|error| unreadable(path, error))?;
         let length = file.metadata().map_err(|error| unreadable(path, error))?.len();
         check_memory(path, length, length)?;
@@ -75,7 +86,7 @@ impl MatFile {
         Self::parse(&bytes, wanted).map_err(|reason| unreadable(path, reason))
     }
 
-    fn parse(bytes: &[u8], wanted: &[&str]) -> Result<Self, String> {
+    fn parse(bytes: &[u8], wanted: &dyn Fn(&Listed) -> bool) -> Result<Self, String> {
         if bytes.starts_with(b"MATLAB 7.3") || bytes.starts_with(b"\x89HDF") {
             return Err(
                 "it is a MATLAB file of version 7.3 (HDF5), expected version 5 to 7: save it with '-v7' in MATLAB, or \
@@ -89,19 +100,22 @@ impl MatFile {
             _ => return Err("it is no MATLAB file of version 5 to 7".to_owned()),
         };
         let mut rest = Elements { bytes: &bytes[128..], is_big_endian };
-        let mut variables: Vec<(String, Vec<u8>)> = Vec::new();
+        let (mut variables, mut listed): (Vec<(String, Vec<u8>)>, _) = (Vec::new(), Vec::new());
         while let Some((kind, content)) = rest.next()? {
             let variable = match kind {
                 MATRIX => {
-                    let name = header_of(content, is_big_endian)?.name;
-                    wanted.contains(&name.as_str()).then(|| (name, content.to_vec()))
+                    let own = header_of(content, is_big_endian)?.listed();
+                    let content = wanted(&own).then(|| content.to_vec());
+                    Some((own, content))
                 }
                 COMPRESSED => inflate(content, is_big_endian, wanted)?,
                 _ => None,
             };
-            variables.extend(variable.filter(|(name, _)| !name.is_empty()));
+            let Some((own, content)) = variable.filter(|(own, _)| !own.name.is_empty()) else { continue };
+            variables.extend(content.map(|content| (own.name.clone(), content)));
+            listed.push(own);
         }
-        Ok(Self { is_big_endian, variables })
+        Ok(Self { is_big_endian, variables, listed })
     }
 
     /// Returns a variable, or `None` where the file has none of this name.
@@ -180,13 +194,14 @@ impl Numbers<'_> {
 }
 
 /// Returns what the variables of a file whose names are wanted are inflated to, bytes.
-fn wanted_bytes(bytes: &[u8], wanted: &[&str]) -> Result<u64, String> {
+fn wanted_bytes(bytes: &[u8], wanted: &dyn Fn(&Listed) -> bool) -> Result<u64, String> {
     let is_big_endian = bytes.get(126..128) == Some(b"MI");
     let mut rest = Elements { bytes: bytes.get(128..).unwrap_or_default(), is_big_endian };
     let mut sum = 0_u64;
     while let Some((kind, content)) = rest.next()? {
         if kind == COMPRESSED {
-            let peeked = peek(content, is_big_endian, wanted)?;
+            let limit = (content.len() as u64).saturating_mul(LIMIT_RATIO);
+            let peeked = peek(content, is_big_endian)?.filter(|peeked| wanted(&peeked.own) && peeked.n_bytes <= limit);
             sum = sum.saturating_add(peeked.map_or(0, |peeked| peeked.n_bytes));
         }
     }
@@ -246,9 +261,9 @@ impl<'a> Elements<'a> {
     }
 }
 
-/// The beginning of a compressed variable whose name is wanted.
+/// The beginning of a compressed variable.
 struct Peeked<'a> {
-    name: String,
+    own: Listed,
     /// The bytes that it says it is inflated to.
     n_bytes: u64,
     /// Its first bytes, those of its tag before them.
@@ -259,8 +274,8 @@ struct Peeked<'a> {
 
 const BROKEN: &str = "a compressed variable is broken";
 
-/// Inflates the beginning of an element if it is a variable whose name is wanted.
-fn peek<'a>(bytes: &'a [u8], is_big_endian: bool, wanted: &[&str]) -> Result<Option<Peeked<'a>>, String> {
+/// Inflates the beginning of an element if it is a variable.
+fn peek(bytes: &[u8], is_big_endian: bool) -> Result<Option<Peeked<'_>>, String> {
     let mut stream = ZlibDecoder::new(bytes);
     let mut start = Vec::with_capacity(PEEK_BYTES);
     stream.by_ref().take(PEEK_BYTES as u64).read_to_end(&mut start).map_err(|_| BROKEN.to_owned())?;
@@ -269,22 +284,24 @@ fn peek<'a>(bytes: &'a [u8], is_big_endian: bool, wanted: &[&str]) -> Result<Opt
     if kind != MATRIX {
         return Ok(None);
     }
-    let name = header_of(&start[8..], is_big_endian)?.name;
-    if !wanted.contains(&name.as_str()) {
-        return Ok(None);
-    }
-    let (n_bytes, limit) = (u64::from(n_bytes), (bytes.len() as u64).saturating_mul(LIMIT_RATIO));
-    if n_bytes > limit {
-        return Err(format!("its variable '{name}' claims {n_bytes} bytes in {} compressed ones", bytes.len()));
-    }
-    Ok(Some(Peeked { name, n_bytes, start, stream }))
+    let own = header_of(&start[8..], is_big_endian)?.listed();
+    Ok(Some(Peeked { own, n_bytes: n_bytes.into(), start, stream }))
 }
 
-/// Inflates an element if it is a variable whose name is wanted.
-fn inflate(bytes: &[u8], is_big_endian: bool, wanted: &[&str]) -> Result<Option<(String, Vec<u8>)>, String> {
-    let Some(Peeked { name, n_bytes, mut start, stream }) = peek(bytes, is_big_endian, wanted)? else {
-        return Ok(None);
-    };
+/// Looks into a compressed element; if it is a variable that is wanted it is inflated.
+fn inflate(
+    bytes: &[u8],
+    is_big_endian: bool,
+    wanted: &dyn Fn(&Listed) -> bool,
+) -> Result<Option<(Listed, Option<Vec<u8>>)>, String> {
+    let Some(Peeked { own, n_bytes, mut start, stream }) = peek(bytes, is_big_endian)? else { return Ok(None) };
+    if !wanted(&own) {
+        return Ok(Some((own, None)));
+    }
+    if n_bytes > (bytes.len() as u64).saturating_mul(LIMIT_RATIO) {
+        let name = &own.name;
+        return Err(format!("its variable '{name}' claims {n_bytes} bytes in {} compressed ones", bytes.len()));
+    }
     let mut content = start.split_off(8);
     content.truncate(n_bytes as usize);
     let missing = n_bytes - content.len() as u64;
@@ -292,7 +309,7 @@ fn inflate(bytes: &[u8], is_big_endian: bool, wanted: &[&str]) -> Result<Option<
     if (content.len() as u64) < n_bytes {
         return Err(TRUNCATED.to_owned());
     }
-    Ok(Some((name, content)))
+    Ok(Some((own, Some(content))))
 }
 
 /// The head of an array.
@@ -303,6 +320,12 @@ struct Header<'a> {
     name: String,
     /// What follows.
     rest: Elements<'a>,
+}
+
+impl Header<'_> {
+    fn listed(self) -> Listed {
+        Listed { name: self.name, sides: self.sides, is_numeric: (6..=15).contains(&self.class) && !self.is_complex }
+    }
 }
 
 /// Reads the head of an array; of opaque ones, which have no sides, class and name alone.

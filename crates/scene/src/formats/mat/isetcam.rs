@@ -9,62 +9,189 @@ use dioptric_spectrum::{Illuminant, Observer, Quantity, SpectralImage, Spectrum,
 use ndarray::Array2;
 
 use super::{
-    super::{photons::joules_per_photon, unusable::unreadable},
-    container::{MatArray, MatFile},
+    super::{
+        axes,
+        contents::Cube as NumberCube,
+        photons::joules_per_photon,
+        reading::{FileQuantity, FileReading},
+        stated::note_of,
+        unusable::unreadable,
+    },
+    container::{Content, Listed, MatArray, MatFile},
 };
 use crate::{SceneError, SceneLight};
 
-/// The variables that are read.
-const WANTED: [&str; 12] = [
-    "scene",
-    "mcCOEF",
-    "basis",
-    "imgMean",
-    "photons",
+/// The variables of a scene that are read.
+const WANTED: [&str; 10] =
+    ["scene", "mcCOEF", "basis", "imgMean", "photons", "wave", "wavelength", "illuminant", "fov", "depthMap"];
+/// Names of the list of wavelengths beside a cube, nm.
+const WAVES: [&str; 9] =
+    ["wave", "wavelength", "wavelengths", "wavelengths_nm", "waves", "lambda", "bands", "wl", "wlens"];
+/// The most that reflectances are, and the least that photons of any lit scene are.
+const MOST_REFLECTANCE: f64 = 10.0;
+const LEAST_PHOTONS: f64 = 1e9;
+/// Fields of a scene that change nothing of what it is.
+const HARMLESS: [&str; 17] = [
+    "name",
+    "type",
+    "filename",
+    "metadata",
+    "metaData",
+    "consistency",
+    "chartP",
+    "chartparameters",
+    "cornerpoints",
+    "rect",
+    "magnification",
+    "color",
+    "spectrum",
     "data",
-    "wave",
-    "wavelength",
-    "illuminant",
-    "fov",
-    "dist",
-    "depthMap",
+    "wAngular",
+    "vAngular",
+    "lightFieldType",
 ];
+/// The published cubes that do not list their wavelengths, by variable and bands: first and last, nm.
+const KNOWN: [(&str, usize, [f64; 2]); 4] = [
+    // Chakrabarti & Zickler 2011 (Harvard).
+    ("ref", 31, [420.0, 720.0]),
+    // Foster et al. 2004 and 2006 (Manchester).
+    ("reflectances", 33, [400.0, 720.0]),
+    ("reflectances", 31, [410.0, 710.0]),
+    // Choi et al. 2017 (KAIST) and Arad & Ben-Shahar 2016 (ICVL) on its usual 31 bands.
+    ("rad", 31, [400.0, 700.0]),
+];
+
+/// What a MATLAB file holds.
+pub(in super::super) enum MatScene {
+    /// A scene of `ISETCam`.
+    Iset(IsetScene),
+    /// A cube of plain numbers.
+    Cube(NumberCube),
+}
 
 /// Bands that a linear model may have: what it takes of memory is at most a thousand times its coefficients.
 const LIMIT_BANDS: usize = 1000;
 
 /// A scene from a MATLAB file.
 #[derive(Clone, Debug, PartialEq)]
-pub struct IsetScene {
+pub(in super::super) struct IsetScene {
     /// Spectral radiance, W m⁻² sr⁻¹ nm⁻¹.
-    pub image: SpectralImage,
+    pub(in super::super) image: SpectralImage,
     /// How far each sample is, m: along the axis where all are as far, or else from the camera; 0 or NaN where nothing was
     /// measured.
-    pub depth_m: Option<Array2<f32>>,
+    pub(in super::super) depth_m: Option<Array2<f32>>,
     /// One distance for the whole scene, m, where the file states it and no depth of samples.
-    pub distance_m: Option<f64>,
+    pub(in super::super) distance_m: Option<f64>,
     /// The horizontal field of view.
-    pub horizontal_fov_deg: Option<f64>,
+    pub(in super::super) horizontal_fov_deg: Option<f64>,
     /// The light on it, where it is the same everywhere.
-    pub light: Option<SceneLight>,
+    pub(in super::super) light: Option<SceneLight>,
     /// Samples that were negative and are 0, as a linear model may leave them.
-    pub n_clipped: usize,
+    pub(in super::super) n_clipped: usize,
+    /// What of the file is not used.
+    pub(in super::super) notes: Vec<String>,
 }
 
-/// Reads a MATLAB file of version 5 to 7 that holds an `ISETCam` scene.
+/// Reads a MATLAB file of version 5 to 7: an `ISETCam` scene, or a cube of numbers.
 ///
-/// Either a structure `scene` (`data.photons`, `spectrum.wave`, and as far as they are there `wAngular`, `depthMap`, `distance`,
+/// A scene is a structure `scene` (`data.photons`, `spectrum.wave`, and as far as they are there `wAngular`, `depthMap`, `distance`,
 /// `illuminant`), or variables: `mcCOEF` and `basis` (the product of coefficients and basis functions, to which `imgMean` is
-/// added where it is there), or `photons` or `data`, with `wave` or `wavelength`; besides `illuminant`, `fov` and `dist`. Photons
-/// coded as whole numbers between `dmin` and `dmax` are decoded.
+/// added where it is there), or `photons`, with `wave` or `wavelength`; besides `illuminant`, `fov` and `dist`. Photons
+/// coded as whole numbers between `dmin` and `dmax` are decoded. Any other array of three axes is a cube whose quantity is not known:
+/// that of the name told, `data`, or the only one.
 ///
 /// # Errors
 /// One sentence with the file's name when it is truncated, of another version, or lacks what makes a scene.
-pub fn read_iset_mat(path: &Path) -> Result<IsetScene, SceneError> {
-    let file = MatFile::read(path, &WANTED)?;
+pub(in super::super) fn read_mat(path: &Path, reading: &FileReading) -> Result<MatScene, SceneError> {
+    let told = reading.variable.as_deref();
+    let is_cube = |own: &Listed| own.is_numeric && own.sides.len() == 3;
+    let is_list = |own: &Listed| WAVES.contains(&own.name.as_str()) && own.is_numeric;
+    let wanted = |own: &Listed| {
+        let name = own.name.as_str();
+        WANTED.contains(&name) || name == "dist" || told == Some(name) || is_cube(own) || is_list(own)
+    };
+    let file = MatFile::read(path, &wanted)?;
+    let wrong = |reason: String| unreadable(path, reason);
+    let names: Vec<&str> = file.listed.iter().map(|own| own.name.as_str()).collect();
+    let has = |name: &str| names.contains(&name);
+    if told.is_none() && (has("scene") || has("mcCOEF") || has("photons")) {
+        return of_iset(path, &file).map(MatScene::Iset);
+    }
+    // What is called data is photons where it is as much as only photons are.
+    let is_open = told.is_none() && reading.quantity.is_none() && reading.unit.is_none();
+    if is_open && let Some(data) = file.array("data").map_err(wrong)? {
+        let most = data.list().unwrap_or_default().into_iter().fold(0.0, f64::max);
+        if most > LEAST_PHOTONS {
+            let mut scene = of_iset(path, &file)?;
+            let note = format!("its 'data' are taken for photons, since they are up to {most:.1e} (--quantity)");
+            scene.notes.push(note);
+            return Ok(MatScene::Iset(scene));
+        }
+    }
+    let cubes: Vec<&str> = file.listed.iter().filter(|own| is_cube(own)).map(|own| own.name.as_str()).collect();
+    let name = match told {
+        Some(told) if has(told) => told,
+        Some(told) => {
+            return Err(wrong(format!("it has no variable '{told}', expected one of {}", names.join(", "))));
+        }
+        None if has("data") => "data",
+        None => match cubes[..] {
+            [one] => one,
+            [] => {
+                let expected = "expected a variable 'scene', 'mcCOEF' or 'photons', or an array of three axes";
+                return Err(wrong(format!("it holds no scene: {expected}")));
+            }
+            _ => return Err(wrong(format!("it has several cubes, {}: expected --variable", cubes.join(", ")))),
+        },
+    };
+    cube_of(path, &file, name, reading).map_err(wrong).map(MatScene::Cube)
+}
+
+/// Returns a variable as a cube of plain numbers.
+fn cube_of(path: &Path, file: &MatFile, name: &str, reading: &FileReading) -> Result<NumberCube, String> {
+    let array = file.array(name)?.ok_or_else(|| format!("it has no variable '{name}'"))?;
+    let numbers = array.numbers().map_err(|what| format!("its '{name}' is {what}, expected numbers"))?;
+    let mut waves = None;
+    for list in WAVES.iter().filter(|list| **list != name) {
+        if let Some(numbers) = file.array(list)?.and_then(|array| array.list()).filter(|list| !list.is_empty()) {
+            waves = Some(((*list).to_owned(), numbers));
+            break;
+        }
+    }
+    // A list that counts bands, or of another length, is none of wavelengths.
+    let is_bands = |list: &[f64]| array.sides.contains(&list.len()) && list.iter().all(|nm| *nm >= 100.0);
+    let waves = waves.filter(|(_, list)| is_bands(list));
+    let known =
+        KNOWN.iter().find(|(own, n, _)| *own == name && array.sides.last() == Some(n)).map(|(_, n, [first, last])| {
+            (0..*n).map(|i| first + (last - first) * i as f64 / (*n as f64 - 1.0)).collect::<Vec<f64>>()
+        });
+    let own = waves.as_ref().map(|(_, list)| list.clone()).or(known);
+    let n_bands = reading.wavelengths_nm.as_ref().or(own.as_ref()).map(Vec::len);
+    let planes = axes::planes(&array.sides, reading.axes.as_deref(), n_bands, false, |index| numbers.at(index) as f32)?;
+    let used = |own: &str| own == name || waves.as_ref().is_some_and(|(list, _)| list == own);
+    let unused: Vec<String> = file.listed.iter().map(|own| own.name.clone()).filter(|own| !used(own)).collect();
+    let mut notes: Vec<String> = note_of(path, "variable", &unused).into_iter().collect();
+    let mut quantity = None;
+    let told = reading.quantity.is_some() || reading.unit.is_some();
+    if !told && !numbers.is_integer {
+        let most = planes.iter().flatten().copied().filter(|v| v.is_finite()).fold(0.0, f32::max);
+        let most = f64::from(most);
+        if most > LEAST_PHOTONS {
+            quantity = Some(FileQuantity::Photons);
+            notes.push(format!("its '{name}' are taken for photons, since they are up to {most:.1e} (--quantity)"));
+        } else if most <= MOST_REFLECTANCE && (name == "reflectances" || name == "reflectance") {
+            quantity = Some(FileQuantity::Reflectance);
+        }
+    }
+    let top = numbers.is_integer.then(|| numbers.top());
+    Ok(NumberCube { planes, top, wavelengths_nm: own, quantity, notes })
+}
+
+/// Reads a scene of `ISETCam`.
+fn of_iset(path: &Path, file: &MatFile) -> Result<IsetScene, SceneError> {
     let wrong = |reason: String| unreadable(path, reason);
     let Raw { planes, wave_nm, light, depth_m, distance_m, horizontal_fov_deg, n_clipped } =
-        Raw::of(&file).map_err(wrong)?;
+        Raw::of(file).map_err(wrong)?;
     let values = |reason| SceneError::Values { file: path.to_owned(), reason };
     let order = ascending(&wave_nm);
     let grid = WavelengthGrid::new(order.iter().map(|&band| wave_nm[band]).collect()).map_err(values)?;
@@ -73,7 +200,26 @@ pub fn read_iset_mat(path: &Path) -> Result<IsetScene, SceneError> {
     let image = SpectralImage::new(Quantity::Radiance, grid, planes).map_err(values)?;
     image.check_samples().map_err(values)?;
     let light = light.map(|spectrum| light_of(&spectrum)).transpose().map_err(wrong)?;
-    Ok(IsetScene { image, depth_m, distance_m, horizontal_fov_deg, light, n_clipped })
+    let notes = unused_of(path, file).map_err(wrong)?;
+    Ok(IsetScene { image, depth_m, distance_m, horizontal_fov_deg, light, n_clipped, notes })
+}
+
+/// Returns notes of the variables and the fields of a scene that are not used.
+fn unused_of(path: &Path, file: &MatFile) -> Result<Vec<String>, String> {
+    let names = file.listed.iter().map(|own| own.name.clone());
+    let ours = |name: &str| WANTED.contains(&name) || ["dist", "data", "comment", "name"].contains(&name);
+    let scene = file.array("scene")?;
+    let is_only = |name: &str| scene.is_none() || name == "scene";
+    let variables: Vec<String> = names.filter(|name| !(ours(name) && is_only(name))).collect();
+    let mut notes: Vec<String> = note_of(path, "variable", &variables).into_iter().collect();
+    if let Some(MatArray { content: Content::Fields(fields), .. }) = &scene {
+        let ours = ["depthMap", "distance", "illuminant", "wave"];
+        let left = fields.iter().filter(|(name, array)| {
+            array.len() > 0 && !ours.contains(&name.as_str()) && !HARMLESS.contains(&name.as_str())
+        });
+        notes.extend(note_of(path, "field", &left.map(|(name, _)| format!("scene.{name}")).collect::<Vec<_>>()));
+    }
+    Ok(notes)
 }
 
 /// Returns the places of numbers in ascending order.
@@ -130,8 +276,7 @@ impl Raw {
                 Some(photons) => Some(photons),
                 None => file.array("data")?,
             };
-            let photons =
-                photons.ok_or("it holds no scene: expected a variable 'scene', 'mcCOEF', 'photons' or 'data'")?;
+            let photons = photons.ok_or("it has no variable 'photons'")?;
             let wave_nm = list_of(["wave", "wavelength"])?.ok_or("it has no list 'wave' of its bands, nm")?;
             (Cube::of(&photons, "photons", None, wave_nm.len())?, wave_nm)
         };

@@ -1,8 +1,10 @@
-//! MATLAB files of the scenes that `ISETCam` and its relatives save.
+//! MATLAB files of the scenes that `ISETCam` and its relatives save, and of other cubes.
 
 mod container;
 mod isetcam;
 #[cfg(test)]
 mod tests;
 
-pub use isetcam::{IsetScene, read_iset_mat};
+#[cfg(test)]
+use isetcam::IsetScene;
+pub(super) use isetcam::{MatScene, read_mat};

@@ -1,18 +1,28 @@
 //! MATLAB files that scipy wrote, by `scripts/mat_fixtures.py`, and files that must be refused.
 
-use std::{fs, path::PathBuf};
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
 
 use approx::assert_relative_eq;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::{super::photons::joules_per_photon, *};
-use crate::{ReadOptions, SceneError, read_scene};
+use crate::{FileReading, ReadOptions, SceneError, read_scene};
 
 const WAVE_NM: [f64; 5] = [420.0, 480.0, 550.0, 630.0, 700.0];
 
 fn fixture(name: &str) -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../fixtures/scenes").join(name)
+}
+
+fn read_iset_mat(path: &Path) -> Result<IsetScene, SceneError> {
+    match read_mat(path, &FileReading::default())? {
+        MatScene::Iset(scene) => Ok(scene),
+        MatScene::Cube(_) => panic!("no scene of ISETCam"),
+    }
 }
 
 fn read(name: &str) -> IsetScene {

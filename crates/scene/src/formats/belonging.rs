@@ -1,0 +1,40 @@
+//! The files that belong to one of a scene.
+
+use std::path::Path;
+
+/// Whether reading a scene may read another file in its folder: the numbers of a header, a depth, camera data, references of a
+/// line scanner.
+pub fn may_be_read_with(scene: &Path, other: &Path) -> bool {
+    let name = |path: &Path| path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    let stem = scene.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
+    let other = name(other);
+    // `a_1.exr` has its camera in `a_1.camera.json` or `a_camera.json`, `a.radiance.exr` in `a.camera.json`.
+    let bare = stem.split('.').next().unwrap_or(&stem);
+    let shared = bare.rsplit_once('_').map(|(first, _)| first);
+    let goes_on = |start: &str| other.strip_prefix(start).is_some_and(|rest| rest.starts_with(['.', '_']));
+    let is_part =
+        |start: &str| other.starts_with(&format!("{start}_camera")) || other.starts_with(&format!("{start}_depth"));
+    let is_reference = ["white_reference", "dark_reference"].iter().any(|start| other.starts_with(start));
+    let is_list = ["wavelengths.txt", "wavelengths.csv"].contains(&other.as_str());
+    other != name(scene) && (goes_on(bare) || shared.is_some_and(is_part) || is_reference || is_list)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn files_that_belong_to_a_scene_are_known() {
+        let is_read = |scene: &str, other: &str| may_be_read_with(Path::new(scene), Path::new(other));
+        for other in
+            ["x/room.depth.png", "x/room_depth.pfm", "x/room.camera.json", "x/room.raw", "x/white_reference_1.hdr"]
+        {
+            assert!(is_read("x/room.hdr", other), "{other}");
+        }
+        assert!(
+            is_read("x/a_1.radiance_depth.exr", "x/a_camera.json")
+                && is_read("x/a_1.radiance_depth.exr", "x/a_1.camera.json")
+        );
+        assert!(!is_read("x/room.hdr", "x/room.hdr") && !is_read("x/room.hdr", "x/room2.depth.png"));
+    }
+}

@@ -1,0 +1,237 @@
+//! What a reader found in a file, before it is a scene.
+
+use std::path::Path;
+
+use dioptric_pictures::DynamicImage;
+use dioptric_spectrum::{Quantity, SpectralImage, SpectrumError, WavelengthGrid};
+use ndarray::Array2;
+use rayon::prelude::*;
+
+use super::{
+    camera::{CameraData, Straightened},
+    depth::RawDepth,
+    light_unit::LightUnit,
+    no_data::mend,
+    read_scene::ReadOptions,
+    reading::{FileQuantity, Frame, light_unit},
+    unusable::unreadable,
+};
+use crate::{SceneError, SceneLight};
+
+/// What a reader found.
+pub(super) struct Contents {
+    pub(super) image: Image,
+    /// What the image is, for the line of what was understood.
+    pub(super) what: String,
+    /// The bands of the file, where the image is on those wanted already.
+    pub(super) own_grid: Option<WavelengthGrid>,
+    pub(super) depth: Option<RawDepth>,
+    /// Camera data of the image's own samples.
+    pub(super) view: Option<CameraData>,
+    /// The picture that other camera data speaks of; all of the image where `None`.
+    pub(super) frame: Option<Frame>,
+    pub(super) hidden: Option<(SpectralImage, Array2<f32>)>,
+    pub(super) light: Option<SceneLight>,
+    pub(super) notes: Vec<String>,
+    /// What may be said of such a file.
+    pub(super) heeds: Heeds,
+}
+
+/// The samples of a file.
+pub(super) enum Image {
+    Spectral(SpectralImage),
+    /// Linear red, green and blue of sRGB's primaries.
+    Linear {
+        planes: [Array2<f32>; 3],
+        /// The luminance of white, cd/m², where the file states it.
+        white_cd_m2: Option<f64>,
+    },
+    /// Codes of sRGB.
+    Codes(DynamicImage),
+}
+
+/// Which of the options that say what a file does not may be said of it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Heeds {
+    /// Nothing: the file says all itself, or is a picture.
+    Nothing,
+    /// A factor on its numbers.
+    Scale,
+    /// A quantity, a unit and a factor: light of which no unit is stated.
+    Unit,
+    /// All of them: a cube of plain numbers.
+    Cube,
+}
+
+impl Contents {
+    pub(super) fn of(image: Image, what: impl Into<String>) -> Self {
+        Self {
+            image,
+            what: what.into(),
+            own_grid: None,
+            depth: None,
+            view: None,
+            frame: None,
+            hidden: None,
+            light: None,
+            notes: vec![],
+            heeds: Heeds::Cube,
+        }
+    }
+
+    /// Refuses what was said of the file and does not apply to it.
+    pub(super) fn check_heeds(&self, path: &Path, options: &ReadOptions) -> Result<(), SceneError> {
+        let reading = &options.reading;
+        let given = [
+            ("a factor on its numbers (--scale)", reading.scale.is_some(), self.heeds == Heeds::Nothing),
+            ("a unit (--unit)", reading.unit.is_some(), !matches!(self.heeds, Heeds::Unit | Heeds::Cube)),
+            ("a quantity (--quantity)", reading.quantity.is_some(), !matches!(self.heeds, Heeds::Unit | Heeds::Cube)),
+            ("a white level (--white-level)", options.white_level.is_some(), self.heeds != Heeds::Cube),
+            ("wavelengths (--wavelengths-nm)", reading.wavelengths_nm.is_some(), self.heeds != Heeds::Cube),
+            ("a variable (--variable)", reading.variable.is_some(), !is_of(path, &["mat"])),
+            ("an order of axes (--axes)", reading.axes.is_some(), !is_of(path, &["npy", "mat"])),
+        ];
+        match given.into_iter().find(|(_, is_given, is_wrong)| *is_given && *is_wrong) {
+            Some((what, ..)) => Err(SceneError::DoesNotApply { file: path.to_owned(), what, kind: self.what.clone() }),
+            None => Ok(()),
+        }
+    }
+
+    /// The rows and columns of the samples.
+    pub(super) fn size(&self) -> (usize, usize) {
+        match &self.image {
+            Image::Spectral(image) => (image.rows(), image.columns()),
+            Image::Linear { planes, .. } => planes[0].dim(),
+            Image::Codes(picture) => (picture.height() as usize, picture.width() as usize),
+        }
+    }
+}
+
+/// Whether the name of a file has one of these endings.
+pub(super) fn is_of(path: &Path, endings: &[&str]) -> bool {
+    path.extension().is_some_and(|own| endings.iter().any(|ending| own.eq_ignore_ascii_case(ending)))
+}
+
+/// A cube of plain numbers, and what its file says of them.
+pub(super) struct Cube {
+    /// The planes of the bands, in the order of the file.
+    pub(super) planes: Vec<Array2<f32>>,
+    /// The largest number that its whole numbers have.
+    pub(super) top: Option<f64>,
+    /// The wavelengths that the file states.
+    pub(super) wavelengths_nm: Option<Vec<f64>>,
+    /// What the file's names say that the numbers are.
+    pub(super) quantity: Option<FileQuantity>,
+    pub(super) notes: Vec<String>,
+}
+
+impl Cube {
+    /// Makes an image of the numbers, as far as the file or the options say what they are.
+    ///
+    /// Whole numbers of which nothing is said are reflectances, the largest that there can be being a perfect white; of floats it must
+    /// be said.
+    ///
+    /// # Errors
+    /// When wavelengths or the quantity are missing, or there is another number of wavelengths.
+    pub(super) fn into_contents(self, path: &Path, options: &ReadOptions) -> Result<Contents, SceneError> {
+        let Self { planes, top, wavelengths_nm, quantity, mut notes } = self;
+        let reading = &options.reading;
+        let wavelengths_nm = match (&reading.wavelengths_nm, wavelengths_nm) {
+            (Some(told), _) => told.clone(),
+            (None, Some(own)) => own,
+            // Bands that are asked for are the file's own where there are as many.
+            (None, None) => match options.grid.as_ref().filter(|grid| grid.len() == planes.len()) {
+                Some(grid) => grid.centers_nm().to_vec(),
+                None => {
+                    let n = planes.len();
+                    let reason = format!(
+                        "it does not tell the wavelengths of its {n} bands: expected --wavelengths-nm, {n} numbers"
+                    );
+                    return Err(unreadable(path, reason));
+                }
+            },
+        };
+        if wavelengths_nm.len() != planes.len() {
+            let reason = format!("{} bands, but {} wavelengths", planes.len(), wavelengths_nm.len());
+            return Err(unreadable(path, reason));
+        }
+        let told_unit = reading.unit.as_deref().map(light_unit).transpose()?;
+        let unit_of_quantity = |quantity: FileQuantity| quantity.light_unit();
+        let quantity = reading.quantity.or(quantity);
+        let unit: Option<LightUnit> = match (quantity, told_unit) {
+            (Some(FileQuantity::Reflectance), Some(_)) => {
+                let reason =
+                    "a reflectance has no unit: expected --unit or --quantity reflectance, not both".to_owned();
+                return Err(SceneError::Units { file: path.to_owned(), reason });
+            }
+            (_, Some(unit)) => Some(unit),
+            (Some(quantity), None) => unit_of_quantity(quantity),
+            (None, None) => None,
+        };
+        let is_reflectance = unit.is_none();
+        let scale = reading.scale.unwrap_or(1.0);
+        let (level, what) = match (is_reflectance, options.white_level, top) {
+            (false, ..) => (
+                1.0,
+                format!(
+                    "radiance in {}",
+                    reading.unit.as_deref().unwrap_or(match quantity {
+                        Some(FileQuantity::Photons) => "photons/s/m^2/sr/nm",
+                        _ => "W/m^2/sr/nm",
+                    })
+                ),
+            ),
+            (true, Some(level), _) => (level, format!("reflectance, {level} being a perfect white")),
+            (true, None, Some(top)) if reading.scale.is_none() => {
+                (top, format!("reflectance, {top}, its largest code, being a perfect white"))
+            }
+            (true, None, _) if quantity.is_some() => (1.0, "reflectance, 1 being a perfect white".to_owned()),
+            (true, None, _) => {
+                let reason =
+                    "it does not tell what its numbers are: expected --quantity radiance, reflectance or photons";
+                return Err(SceneError::Units { file: path.to_owned(), reason: reason.to_owned() });
+            }
+        };
+        let mut order: Vec<usize> = (0..planes.len()).collect();
+        order.sort_by(|&a, &b| wavelengths_nm[a].total_cmp(&wavelengths_nm[b]));
+        let values = |reason: SpectrumError| SceneError::Values { file: path.to_owned(), reason };
+        let grid = WavelengthGrid::new(order.iter().map(|&band| wavelengths_nm[band]).collect()).map_err(values)?;
+        let mut planes: Vec<Option<Array2<f32>>> = planes.into_iter().map(Some).collect();
+        let mut planes: Vec<Array2<f32>> = order.iter().filter_map(|&band| planes[band].take()).collect();
+        planes.par_iter_mut().zip(grid.centers_nm()).for_each(|(plane, &nm)| {
+            let factor = scale / level * unit.map_or(1.0, |unit| unit.factor_at(nm));
+            if factor != 1.0 {
+                plane.mapv_inplace(|v| (f64::from(v) * factor) as f32);
+            }
+        });
+        let choice = reading.no_data.unwrap_or_default();
+        notes.extend(mend(path, &grid, &mut planes, choice)?.note(path, choice));
+        let quantity = if is_reflectance { Quantity::Reflectance } else { Quantity::Radiance };
+        let image = SpectralImage::new(quantity, grid, planes).map_err(values)?;
+        Ok(Contents { notes, ..Contents::of(Image::Spectral(image), what) })
+    }
+}
+
+/// Returns a plane on straight and square samples: in straight lines between the old ones, held beyond them.
+pub(super) fn straightened(plane: &Array2<f32>, how: &Straightened) -> Array2<f32> {
+    let (rows, columns) = plane.dim();
+    Array2::from_shape_fn((how.rows, how.columns), |(row, column)| {
+        let (y, x) = how.source_of(row, column);
+        let (y, x) = (y.clamp(0.0, rows as f64 - 1.0), x.clamp(0.0, columns as f64 - 1.0));
+        let (top, left) = ((y as usize).min(rows.saturating_sub(2)), (x as usize).min(columns.saturating_sub(2)));
+        let (down, across) = ((y - top as f64) as f32, (x - left as f64) as f32);
+        let (bottom, right) = ((top + 1).min(rows - 1), (left + 1).min(columns - 1));
+        let along = |row: usize| (1.0 - across) * plane[(row, left)] + across * plane[(row, right)];
+        (1.0 - down) * along(top) + down * along(bottom)
+    })
+}
+
+/// Returns a plane of depths on straight and square samples: that of the nearest.
+pub(super) fn straightened_depth(plane: &Array2<f32>, how: &Straightened) -> Array2<f32> {
+    let (rows, columns) = plane.dim();
+    Array2::from_shape_fn((how.rows, how.columns), |(row, column)| {
+        let (y, x) = how.source_of(row, column);
+        let nearest = |v: f64, n: usize| v.round().clamp(0.0, n as f64 - 1.0) as usize;
+        plane[(nearest(y, rows), nearest(x, columns))]
+    })
+}

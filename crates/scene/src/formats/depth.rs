@@ -1,0 +1,479 @@
+//! Depth of a scene's samples: in its file, in a file beside it, or in one that is named.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use dioptric_pictures::DynamicImage;
+use ndarray::Array2;
+
+use super::{
+    camera::beside,
+    npy::read_npy,
+    pfm::read_pfm,
+    picture::decode,
+    reading::{DepthKind, DepthUnit},
+    spectral_exr::{depth_channel, read_planes_exr},
+    stated::name_of,
+    tiff_file::{TiffFile, read_tiff},
+    unusable::unreadable,
+};
+use crate::{SceneError, View};
+
+/// Endings of the depth of a picture beside it.
+const ENDINGS: [&str; 12] = [
+    ".depth.png",
+    "_depth.png",
+    ".depth.tif",
+    "_depth.tif",
+    ".depth.tiff",
+    "_depth.tiff",
+    ".depth.exr",
+    "_depth.exr",
+    ".depth.pfm",
+    "_depth.pfm",
+    ".depth.npy",
+    "_depth.npy",
+];
+/// The depth that one code of 16 bits stands for where nothing states it, m: depth cameras write millimetres.
+const UNIT_M: f64 = 1e-3;
+/// Depths from here on are those of the sky: Blender writes 1e10.
+const SKY_M: f64 = 1e9;
+/// Codes of depth cameras end below; a map that goes on to the last code is stretched to all of them.
+const STRETCHED_FROM: f32 = 60_000.0;
+
+/// Depths as they stand in a file.
+pub(super) struct RawDepth {
+    pub(super) values: Array2<f32>,
+    pub(super) kind: DepthKind,
+    pub(super) unit: DepthUnit,
+    /// The largest code of whole numbers, which stands for none.
+    top: Option<u16>,
+    /// Columns of the file, which a disparity is counted in.
+    columns: usize,
+    pub(super) file: PathBuf,
+    /// Where it is in the file, for the line of what was understood.
+    pub(super) from: String,
+    /// Whether places without depth are filled without being asked: those of a picture.
+    pub(super) is_picture: bool,
+    pub(super) notes: Vec<String>,
+}
+
+/// What is said of a depth by who asks for it.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct DepthWords<'a> {
+    pub(super) kind: Option<DepthKind>,
+    pub(super) unit: Option<&'a str>,
+    /// What the camera file says.
+    pub(super) unit_m: Option<f64>,
+}
+
+impl RawDepth {
+    /// Depths in metres of a scene's own file.
+    pub(super) fn in_file(file: &Path, from: String, values: Array2<f32>, kind: DepthKind) -> Self {
+        let columns = values.ncols();
+        let (unit, file) = (DepthUnit::Metres(1.0), file.to_owned());
+        Self { values, kind, unit, top: None, columns, file, from, is_picture: false, notes: vec![] }
+    }
+
+    /// Takes what is said of the depth in place of what is usual.
+    pub(super) fn told(mut self, words: DepthWords<'_>) -> Result<Self, SceneError> {
+        self.kind = words.kind.unwrap_or(self.kind);
+        if let Some(unit) = words.unit {
+            self.unit = DepthUnit::parse(unit)?;
+        }
+        let is_disparity = matches!(self.kind, DepthKind::Disparity { .. });
+        if is_disparity && words.unit.is_none() {
+            self.unit = DepthUnit::Samples(1.0);
+        }
+        let is_inverse = matches!(self.kind, DepthKind::Inverse);
+        let is_length = |unit: &str| ["mm", "cm"].iter().any(|length| unit.ends_with(length));
+        let fits = match self.unit {
+            DepthUnit::Samples(_) => is_disparity,
+            // An inverse distance is so many a metre.
+            DepthUnit::Metres(_) => !is_disparity && !(is_inverse && words.unit.is_some_and(is_length)),
+        };
+        if fits {
+            return Ok(self);
+        }
+        Err(SceneError::Setting {
+            what: "the unit of the depth",
+            value: format!("'{}'", words.unit.unwrap_or_default()),
+            expected: "px or 256/px for a disparity, m or 1000/m for an inverse distance, a length for all else"
+                .to_owned(),
+        })
+    }
+
+    /// Returns the depths on so many samples, those of the nearest of the file's: no depth is mixed of two.
+    pub(super) fn resized(mut self, rows: usize, columns: usize) -> Result<Self, SceneError> {
+        let (own_rows, own_columns) = self.values.dim();
+        if (own_rows, own_columns) == (rows, columns) {
+            return Ok(self);
+        }
+        let (across, down) = (own_columns as f64 / columns as f64, own_rows as f64 / rows as f64);
+        // Half a sample of either may be cut off.
+        if (across / down - 1.0).abs() > 1.0 / rows.min(own_rows).min(columns).min(own_columns) as f64 {
+            let reason = format!(
+                "it has {own_columns} × {own_rows} samples, but the scene {columns} × {rows}: expected as many, or a picture of \
+                 the same shape"
+            );
+            return Err(unreadable(&self.file, reason));
+        }
+        let at = |index: usize, ratio: f64, most: usize| (((index as f64 + 0.5) * ratio) as usize).min(most - 1);
+        self.notes.push(format!(
+            "{}: its {own_columns} × {own_rows} depths become {columns} × {rows}, each that of the nearest sample",
+            name_of(&self.file)
+        ));
+        self.values = Array2::from_shape_fn((rows, columns), |(row, column)| {
+            self.values[(at(row, down, own_rows), at(column, across, own_columns))]
+        });
+        Ok(self)
+    }
+
+    /// Returns the depths in metres along the axis; 0 where none was measured, infinity for the sky. `None` for what needs the
+    /// view of the samples and has none.
+    ///
+    /// # Errors
+    /// When two anchors are given and all numbers are alike.
+    pub(super) fn axial_m(&self, view: Option<View>) -> Result<Option<Array2<f32>>, SceneError> {
+        let is_code = |value: f32| self.top.is_some_and(|top| value == f32::from(top));
+        let factor = match self.unit {
+            DepthUnit::Metres(factor) | DepthUnit::Samples(factor) => factor,
+        };
+        let along = |z_m: f64| if z_m >= SKY_M { f32::INFINITY } else { z_m as f32 };
+        Ok(Some(match self.kind {
+            DepthKind::Axial => self.values.mapv(|v| if is_code(v) { 0.0 } else { along(factor * f64::from(v)) }),
+            DepthKind::Radial => {
+                let Some(view) = view else { return Ok(None) };
+                Array2::from_shape_fn(self.values.dim(), |(row, column)| {
+                    let v = self.values[(row, column)];
+                    let z_m = factor * f64::from(v) / view.distance_per_depth(row as f64, column as f64);
+                    if is_code(v) { 0.0 } else { along(z_m) }
+                })
+            }
+            // The inverse of nothing is the sky; what is no number was not measured.
+            DepthKind::Inverse => self.values.mapv(|v| {
+                let inverse = f64::from(v) * factor;
+                if v.is_finite() { along(1.0 / inverse) } else { 0.0 }
+            }),
+            DepthKind::InverseBetween { near_m, far_m } => {
+                let finite = self.values.iter().copied().filter(|v| v.is_finite());
+                let (low, high) = finite.fold((f32::INFINITY, f32::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)));
+                if !(high > low) {
+                    return Err(unreadable(&self.file, "its numbers are all alike, expected some between two anchors"));
+                }
+                let (near, far) = (1.0 / near_m, 1.0 / far_m);
+                self.values.mapv(|v| {
+                    let share = f64::from(v - low) / f64::from(high - low);
+                    if v.is_finite() { along(1.0 / (far + share * (near - far))) } else { 0.0 }
+                })
+            }
+            DepthKind::Disparity { baseline_m, offset_px } => {
+                let Some(view) = view else { return Ok(None) };
+                // A disparity counts the file's own samples.
+                let focal_px = view.focal_px * self.columns as f64 / self.values.ncols() as f64;
+                self.values.mapv(|v| {
+                    let shift_px = factor * f64::from(v) + offset_px;
+                    let is_measured = v.is_finite() && v > 0.0 && shift_px > 0.0;
+                    if is_measured { along(focal_px * baseline_m / shift_px) } else { 0.0 }
+                })
+            }
+        }))
+    }
+
+    /// Returns the words for where the depth comes from.
+    pub(super) fn describe(&self) -> String {
+        let kind = match self.kind {
+            DepthKind::Axial => "along the axis",
+            DepthKind::Radial => "from distances from the camera",
+            DepthKind::Inverse | DepthKind::InverseBetween { .. } => "from inverse distances",
+            DepthKind::Disparity { .. } => "from disparities",
+        };
+        format!("{kind}, of {}", self.from)
+    }
+}
+
+/// Reads the depth of a picture from a file beside it, or returns `None` where there is none.
+///
+/// For `room.png` the names looked for are `room.depth.png`, `room_depth.png` and the same with `.tif`, `.tiff`, `.exr`, `.pfm` and
+/// `.npy`; the first is taken.
+pub(super) fn depth_beside(picture: &Path, words: DepthWords<'_>) -> Result<Option<RawDepth>, SceneError> {
+    let mut found = files_beside(picture).into_iter();
+    let Some(path) = found.next() else { return Ok(None) };
+    let mut depth = read_depth(&path, words)?;
+    depth.notes.extend(super::stated::note_of(
+        picture,
+        "depth file",
+        &found.map(|path| name_of(&path)).collect::<Vec<_>>(),
+    ));
+    Ok(Some(depth))
+}
+
+/// Returns the files of depth beside a picture, in their order.
+pub(super) fn files_beside(picture: &Path) -> Vec<PathBuf> {
+    beside(picture, &ENDINGS).into_iter().filter(|path| path != picture && path.is_file()).collect()
+}
+
+/// Returns files beside a picture that look like its depth but have other names than are looked for.
+pub(super) fn likely_beside(picture: &Path) -> Vec<String> {
+    let stem = picture.file_stem().unwrap_or_default().to_string_lossy().to_lowercase();
+    let folder = picture.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let Ok(entries) = fs::read_dir(folder) else { return vec![] };
+    let known = files_beside(picture);
+    let is_likely = |path: &PathBuf| {
+        let name = name_of(path).to_lowercase();
+        let ending = name.rsplit('.').next().unwrap_or_default();
+        let is_map = ["png", "tif", "tiff", "exr", "pfm", "npy", "dpt"].contains(&ending);
+        let rest =
+            name.strip_prefix(&stem).or_else(|| name.strip_suffix(ending)?.trim_end_matches('.').strip_suffix(&stem));
+        let says = |rest: &str| ["depth", "disp"].iter().any(|word| rest.contains(word));
+        is_map && rest.is_some_and(says) && path != picture && !known.contains(path)
+    };
+    let paths = entries.take(10_000).filter_map(|entry| Some(entry.ok()?.path()));
+    let mut names: Vec<String> = paths.filter(is_likely).map(|path| name_of(&path)).collect();
+    names.sort();
+    names
+}
+
+/// Reads a file of depth: a gray picture of 8 or 16 bits, a TIFF of floats, PFM, EXR or an array of NumPy.
+///
+/// Codes of 16 bits are millimetres, floats metres, unless something says otherwise; codes of 8 bits and the floats of a PFM, which
+/// may be disparities, need their unit or kind.
+///
+/// # Errors
+/// When the file is none of these, or its unit is not known.
+pub(super) fn read_depth(path: &Path, words: DepthWords<'_>) -> Result<RawDepth, SceneError> {
+    let wrong = |reason: String| unreadable(path, reason);
+    let ending = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
+    let (mut from, mut notes) = (name_of(path), vec![]);
+    // Beyond the last code lies what is too far, or was not measured.
+    let (values, top) = match ending.as_str() {
+        "pfm" => (read_pfm(path)?.swap_remove(0), None),
+        "npy" => {
+            let array = read_npy(path)?;
+            let sides: Vec<usize> = array.sides.iter().copied().filter(|side| *side != 1).collect();
+            let &[rows, columns] = &sides[..] else {
+                return Err(wrong(format!("its sides are {:?}, expected rows and columns", array.sides)));
+            };
+            let top = array.top.filter(|top| *top == 65535.0).map(|_| u16::MAX);
+            let is_codes = array.top.is_some_and(|top| top <= 255.0);
+            let values =
+                Array2::from_shape_vec((rows, columns), array.values).map_err(|error| wrong(error.to_string()))?;
+            (values, if is_codes { Some(u16::from(u8::MAX)) } else { top.or_else(|| array.top.map(|_| 0)) })
+        }
+        "exr" => {
+            let (name, plane, others) = depth_channel(read_planes_exr(path)?).ok_or_else(|| {
+                wrong("it has no channel of depth, expected 'Z', 'Depth.Z', 'distance', or a single channel".to_owned())
+            })?;
+            from = format!("channel '{name}' of {from}");
+            notes.extend(super::stated::note_of(path, "channel", &others));
+            (plane, None)
+        }
+        _ => {
+            let stack = match ending.as_str() {
+                "tif" | "tiff" => match read_tiff(path)? {
+                    TiffFile::Linear([plane, ..], more) => Some((plane, None, more)),
+                    TiffFile::Stack(mut stack) if stack.planes.len() == 1 => {
+                        let codes = stack.top.map(|_| 0);
+                        Some((stack.planes.swap_remove(0), codes, stack.notes))
+                    }
+                    TiffFile::Stack(stack) => {
+                        return Err(wrong(format!("it has {} planes, expected one of depth", stack.planes.len())));
+                    }
+                    TiffFile::Picture { notes: more } => {
+                        notes.extend(more);
+                        None
+                    }
+                },
+                _ => None,
+            };
+            match stack {
+                Some((plane, top, more)) => {
+                    notes.extend(more);
+                    (plane, top)
+                }
+                None => codes_of(path)?,
+            }
+        }
+    };
+    // Distances that are counted from the camera say so by the name of their channel.
+    let kind = if from.contains("'distance'") { DepthKind::Radial } else { DepthKind::Axial };
+    let is_told =
+        words.unit.is_some() || words.kind.is_some_and(|kind| kind != DepthKind::Axial && kind != DepthKind::Radial);
+    let is_codes = top.is_some();
+    let unit_m = match top {
+        _ if is_told => 1.0,
+        _ if words.unit_m.is_some() => words.unit_m.unwrap_or(1.0),
+        Some(255) => {
+            let reason = "what one of its codes of 8 bits stands for is not known: expected --depth-unit, as 255/m, or --depth-kind";
+            return Err(wrong(reason.to_owned()));
+        }
+        Some(u16::MAX) => {
+            // Neither end counts: each may stand for what was not measured.
+            let inner = values.iter().copied().filter(|v| *v > 0.0 && *v < 65535.0).fold(0.0, f32::max);
+            let ends = [0.0, 65535.0].map(|end| values.iter().any(|v| *v == end));
+            if inner > STRETCHED_FROM && ends[1] {
+                let reason = "its codes are stretched to all of 16 bits, as maps of inverse depth are: expected --depth-unit, as \
+                              65535/m, or --depth-kind, as inverse:0.5,inf";
+                return Err(wrong(reason.to_owned()));
+            }
+            UNIT_M
+        }
+        Some(_) => UNIT_M,
+        None if ending == "pfm" => {
+            let reason = "whether it holds depths or disparities is not known: expected --depth-unit m, or --depth-kind, as \
+                          disparity:BASELINE_M";
+            return Err(wrong(reason.to_owned()));
+        }
+        None => 1.0,
+    };
+    let is_inverse = matches!(words.kind, Some(DepthKind::Inverse | DepthKind::InverseBetween { .. }));
+    let columns = values.ncols();
+    let depth = RawDepth {
+        values,
+        kind,
+        unit: DepthUnit::Metres(unit_m),
+        top: top.filter(|top| *top == u16::MAX && !is_inverse),
+        columns,
+        file: path.to_owned(),
+        from,
+        is_picture: is_codes,
+        notes,
+    };
+    depth.told(words)
+}
+
+/// Returns the codes of a gray picture and the largest that there can be.
+fn codes_of(path: &Path) -> Result<(Array2<f32>, Option<u16>), SceneError> {
+    let of = |columns: u32, rows: u32, codes: Vec<f32>| {
+        Array2::from_shape_vec((rows as usize, columns as usize), codes).expect("a code a pixel")
+    };
+    Ok(match decode(path, 4)? {
+        DynamicImage::ImageLuma16(p) => {
+            let (columns, rows) = p.dimensions();
+            (of(columns, rows, p.into_raw().into_iter().map(f32::from).collect()), Some(u16::MAX))
+        }
+        DynamicImage::ImageLuma8(p) => {
+            let (columns, rows) = p.dimensions();
+            (of(columns, rows, p.into_raw().into_iter().map(f32::from).collect()), Some(u16::from(u8::MAX)))
+        }
+        other => {
+            let reason = format!("its samples are {:?}, expected gray ones of 8 or 16 bits", other.color());
+            return Err(unreadable(path, reason));
+        }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use dioptric_pictures::save;
+    use image::{ImageBuffer, Luma};
+
+    fn words<'a>(unit: Option<&'a str>, kind: Option<&str>) -> DepthWords<'a> {
+        DepthWords { unit, kind: kind.map(|kind| kind.parse().unwrap()), unit_m: None }
+    }
+
+    /// Writes codes of 16 bits and returns the depths that they are read as.
+    fn read(codes: &[[u16; 4]], words: DepthWords<'_>) -> Result<Array2<f32>, SceneError> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("room.depth.png");
+        let picture = ImageBuffer::from_fn(4, codes.len() as u32, |x, y| Luma([codes[y as usize][x as usize]]));
+        save(&picture.into(), &path).unwrap();
+        let view = View { focal_px: 100.0, center_x_px: 1.5, center_y_px: 0.5 };
+        Ok(read_depth(&path, words)?.axial_m(Some(view))?.unwrap())
+    }
+
+    #[test]
+    fn codes_are_millimetres_unless_something_says_otherwise() {
+        let none = DepthWords::default();
+        let depth = read(&[[500, 1000, 0, 65535], [700; 4]], none).unwrap();
+        // The last code, as the first, stands for nothing measured.
+        assert_eq!(depth, ndarray::arr2(&[[0.5, 1.0, 0.0, 0.0], [0.7; 4]]));
+        assert_eq!(read(&[[5000, 10_000, 1, 0]], words(Some("5000/m"), None)).unwrap()[(0, 1)], 2.0);
+        assert_eq!(read(&[[50, 100, 1, 0]], DepthWords { unit_m: Some(0.01), ..none }).unwrap()[(0, 1)], 1.0);
+        let stretched = [[0, 65535, 61_000, 7]];
+        assert!(read(&stretched, none).unwrap_err().to_string().contains("inverse:0.5,inf"));
+        assert!(read(&stretched, words(Some("mm"), None)).is_ok());
+    }
+
+    #[test]
+    fn every_kind_becomes_depth_along_the_axis() {
+        let flat = |kind: &str, unit: &str, code: u16| {
+            read(&[[code; 4], [code; 4]], words(Some(unit), Some(kind))).unwrap()[(0, 0)]
+        };
+        // 1/z = .4 a metre; focal length 100 px, baseline .2 m, 8 px: 2.5 m.
+        assert_eq!(flat("inverse", "1000/m", 400), 2.5);
+        assert_eq!(flat("disparity:0.2", "256/px", 8 * 256), 2.5);
+        assert_eq!(flat("disparity:0.2,3", "px", 5), 2.5);
+        let radial = flat("radial", "mm", 2500);
+        assert!(
+            (f64::from(radial) - 2.5 / (1.0 + (1.5 / 100.0_f64).powi(2) + (0.5 / 100.0_f64).powi(2)).sqrt()).abs()
+                < 1e-6
+        );
+        let relative = read(&[[0, 65535, 32768, 16384]], words(None, Some("inverse:0.5,inf"))).unwrap();
+        assert_eq!((relative[(0, 0)], relative[(0, 1)]), (f32::INFINITY, 0.5));
+        assert!((relative[(0, 2)] - 1.0).abs() < 1e-4);
+        assert!(read(&[[1; 4]], words(Some("px"), None)).unwrap_err().to_string().contains("disparity"));
+        assert!(read(&[[1; 4]], words(Some("mm"), Some("disparity:1"))).is_err());
+        assert!(read(&[[1; 4]], words(Some("mm"), Some("inverse"))).is_err());
+        assert!(read(&[[3; 4]], words(None, Some("inverse:0.5,2"))).unwrap_err().to_string().contains("alike"));
+    }
+
+    #[test]
+    fn files_of_every_format_are_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        let values = ndarray::arr2(&[[0.5, 1.0, 1.5, 2.0], [1e10, f32::NAN, 0.0, 0.7]]);
+        let bytes: Vec<u8> = values.iter().flat_map(|v: &f32| v.to_le_bytes()).collect();
+        fs::write(at("a.npy"), super::super::npy::tests::npy("<f4", false, "(2, 4)", &bytes)).unwrap();
+        let upside_down: Vec<u8> = [&bytes[16..], &bytes[..16]].concat();
+        fs::write(at("a.pfm"), [&b"Pf\n4 2\n-1.0\n"[..], &upside_down].concat()).unwrap();
+        crate::write_planes_exr(&at("a.exr"), &[("A", &values), ("View.Depth.Z", &values)], crate::ExrSamples::Single)
+            .unwrap();
+        let mut file = fs::File::create(at("a.tif")).unwrap();
+        let mut encoder = tiff::encoder::TiffEncoder::new(&mut file).unwrap();
+        encoder.write_image::<tiff::encoder::colortype::Gray32Float>(4, 2, values.as_slice().unwrap()).unwrap();
+        for name in ["a.npy", "a.pfm", "a.exr", "a.tif"] {
+            let told = if name == "a.pfm" { words(Some("m"), None) } else { DepthWords::default() };
+            let depth = read_depth(&at(name), told).unwrap();
+            let z_m = depth.axial_m(None).unwrap().unwrap();
+            assert_eq!(z_m.row(0).to_vec(), [0.5, 1.0, 1.5, 2.0], "{name}");
+            // Blender's sky, and places that were not measured.
+            assert!(z_m[(1, 0)] == f32::INFINITY && z_m[(1, 1)].is_nan() && z_m[(1, 2)] == 0.0, "{name}: {z_m}");
+        }
+        assert!(read_depth(&at("a.pfm"), DepthWords::default()).is_err_and(|e| e.to_string().contains("disparity")));
+        let gray = image::GrayImage::from_pixel(4, 2, Luma([51]));
+        save(&gray.into(), &at("b.png")).unwrap();
+        assert!(read_depth(&at("b.png"), DepthWords::default()).is_err_and(|e| e.to_string().contains("8 bits")));
+        let told = read_depth(&at("b.png"), words(Some("25.5/m"), None)).unwrap();
+        assert_eq!(told.axial_m(None).unwrap().unwrap()[(0, 0)], 2.0);
+    }
+
+    #[test]
+    fn other_resolutions_keep_outlines() {
+        let values = ndarray::arr2(&[[1.0, 4.0], [1.0, 4.0]]);
+        let depth = RawDepth::in_file(Path::new("a.exr"), "Z".to_owned(), values, DepthKind::Axial);
+        let finer = depth.resized(4, 4).unwrap();
+        assert_eq!(finer.values, ndarray::arr2(&[[1.0, 1.0, 4.0, 4.0]; 4]));
+        assert_eq!(finer.notes.len(), 1);
+        assert_eq!(finer.resized(2, 2).unwrap().values[(0, 1)], 4.0);
+        let depth = RawDepth::in_file(Path::new("a.exr"), "Z".to_owned(), Array2::ones((20, 20)), DepthKind::Axial);
+        assert!(depth.resized(20, 40).is_err_and(|error| error.to_string().contains("20 × 20")));
+    }
+
+    #[test]
+    fn the_first_file_beside_is_taken_and_the_others_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        for (name, code) in [("room_depth.png", 700_u16), ("room.depth.png", 500), ("room_disp.png", 9)] {
+            save(&ImageBuffer::from_pixel(4, 2, Luma([code])).into(), &at(name)).unwrap();
+        }
+        let depth = depth_beside(&at("room.png"), DepthWords::default()).unwrap().unwrap();
+        assert_eq!(depth.axial_m(None).unwrap().unwrap()[(0, 0)], 0.5);
+        assert_eq!(depth.notes, ["room.png: its depth file 'room_depth.png' is not used"]);
+        assert_eq!(likely_beside(&at("room.png")), ["room_disp.png"]);
+        assert!(depth_beside(&at("other.png"), DepthWords::default()).unwrap().is_none());
+    }
+}

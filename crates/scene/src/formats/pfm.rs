@@ -1,0 +1,90 @@
+//! Portable float maps (`.pfm`): three lines of text and rows of floats from the bottom up.
+
+use std::path::Path;
+
+use ndarray::Array2;
+
+use super::unusable::{check_memory, unreadable};
+use crate::SceneError;
+
+/// The planes of a portable float map: one of gray, or red, green and blue.
+pub(super) fn read_pfm(path: &Path) -> Result<Vec<Array2<f32>>, SceneError> {
+    let length = std::fs::metadata(path).map_err(|error| unreadable(path, error))?.len();
+    check_memory(path, length.saturating_mul(2), length)?;
+    let bytes = std::fs::read(path).map_err(|error| unreadable(path, error))?;
+    parse(&bytes).map_err(|reason| unreadable(path, reason))
+}
+
+fn parse(bytes: &[u8]) -> Result<Vec<Array2<f32>>, String> {
+    let mut at = 0;
+    let mut word = || {
+        let from = at + bytes[at..].iter().take_while(|b| b.is_ascii_whitespace()).count();
+        let end = from + bytes[from..].iter().take(40).take_while(|b| !b.is_ascii_whitespace()).count();
+        // One white space ends the header.
+        at = (end + 1).min(bytes.len());
+        String::from_utf8_lossy(&bytes[from..end]).into_owned()
+    };
+    let n_channels = match word().as_str() {
+        "Pf" => 1,
+        "PF" => 3,
+        _ => return Err("it is no portable float map, expected 'Pf' or 'PF' at its start".to_owned()),
+    };
+    let mut number = |what: &str| -> Result<f64, String> {
+        let text = word();
+        text.parse().map_err(|_| format!("its {what} is '{text}', expected a number"))
+    };
+    let (columns, rows, scale) = (number("width")?, number("height")?, number("scale")?);
+    let is_side = |n: f64| n >= 1.0 && n.fract() == 0.0 && n <= f64::from(1 << 20);
+    if !(is_side(columns) && is_side(rows) && scale.is_finite() && scale != 0.0) {
+        return Err(format!("it has {columns} × {rows} samples of scale {scale}"));
+    }
+    let (columns, rows) = (columns as usize, rows as usize);
+    let data = &bytes[at..];
+    if data.len() / 4 / n_channels / columns < rows {
+        return Err("the file ends too early (truncated)".to_owned());
+    }
+    let (is_little, factor) = (scale < 0.0, scale.abs() as f32);
+    let plane = |channel: usize| {
+        Array2::from_shape_fn((rows, columns), |(row, column)| {
+            let index = 4 * (((rows - 1 - row) * columns + column) * n_channels + channel);
+            let four = [data[index], data[index + 1], data[index + 2], data[index + 3]];
+            let value = if is_little { f32::from_le_bytes(four) } else { f32::from_be_bytes(four) };
+            if factor == 1.0 { value } else { factor * value }
+        })
+    };
+    Ok((0..n_channels).map(plane).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn maps_of_either_order_are_read_upright() {
+        let of = |head: &str, floats: &[[u8; 4]]| [head.as_bytes(), &floats.concat()].concat();
+        let values: Vec<f32> = (0..6).map(|v| v as f32).collect();
+        let little: Vec<[u8; 4]> = values.iter().map(|v| v.to_le_bytes()).collect();
+        let big: Vec<[u8; 4]> = values.iter().map(|v| v.to_be_bytes()).collect();
+        let gray = ndarray::arr2(&[[3.0, 4.0, 5.0], [0.0, 1.0, 2.0]]);
+        assert_eq!(parse(&of("Pf\n3 2\n-1.0\n", &little)).unwrap(), [gray.clone()]);
+        assert_eq!(parse(&of("Pf\n3 2\n1\n", &big)).unwrap(), [gray.clone()]);
+        assert_eq!(parse(&of("Pf 3 2 -2\n", &little)).unwrap(), [2.0 * gray]);
+        let color = parse(&of("PF\n1 2\n-1\n", &little)).unwrap();
+        assert_eq!(color[1], ndarray::arr2(&[[4.0], [1.0]]));
+    }
+
+    #[test]
+    fn what_is_no_map_is_refused() {
+        for (bytes, word) in [
+            (&b""[..], "no portable float map"),
+            (b"Pf\n3 2\n", "scale"),
+            (b"Pf\n3 2\n0\n", "scale 0"),
+            (b"Pf\n0 2\n1\n", "0 × 2"),
+            (b"Pf\n3 2\n-1\n1234", "truncated"),
+            (b"Pf\n1e6 1e6\n-1\n1234", "truncated"),
+        ] {
+            let message = parse(bytes).unwrap_err();
+            assert!(message.contains(word), "{message}");
+        }
+    }
+}

@@ -1,0 +1,199 @@
+//! One line of what was understood of a file, and questions about scenes that cannot be.
+
+use dioptric_spectrum::{DepthMap, Observer, SpectralImage, WavelengthGrid};
+use ndarray::Array2;
+use rayon::prelude::*;
+
+use crate::{Scene, View};
+
+/// Luminances of scenes, cd/m²: starlight on a dark wall to the disc of the sun.
+const LUMINANCES_CD_M2: [f64; 2] = [1e-4, 1e9];
+/// Depths of scenes, m.
+const DEPTHS_M: [f64; 2] = [1e-3, 1e5];
+
+/// Where the parts of a scene come from.
+#[derive(Default)]
+pub(super) struct Sources {
+    /// What the numbers of the file are.
+    pub(super) what: String,
+    /// The bands of the file.
+    pub(super) bands: Option<WavelengthGrid>,
+    pub(super) depth: Option<String>,
+    pub(super) view: Option<String>,
+}
+
+/// Puts what was understood of a scene's file, in a line, before its notes, and behind them questions about what cannot well be.
+pub(super) fn tell(scene: &mut Scene, sources: &Sources) {
+    let luminances = luminances(&scene.radiance);
+    let line = line(scene, sources, luminances);
+    scene.notes.insert(0, line);
+    let doubts = doubts(scene, luminances);
+    scene.notes.extend(doubts);
+}
+
+/// Returns what was understood of a scene's file, in a line.
+fn line(scene: &Scene, sources: &Sources, luminances: Option<[f64; 2]>) -> String {
+    let own = sources.bands.as_ref().unwrap_or(scene.radiance.grid());
+    let mut parts = vec![format!("{}, {}", sources.what, bands(own))];
+    parts.push(format!("{} × {} samples", scene.columns(), scene.rows()));
+    if let Some([mean, most]) = luminances {
+        parts.push(format!("{} cd/m², up to {}", digits(mean), digits(most)));
+    }
+    parts.push(match (&scene.depth, &sources.depth) {
+        (Some(depth), from) => {
+            let from = from.as_ref().map_or_else(String::new, |from| format!(" {from}"));
+            format!("depth {}{from}", range(depth))
+        }
+        (None, _) => "no depth".to_owned(),
+    });
+    parts.push(match (scene.view, &sources.view) {
+        (Some(view), from) => {
+            let off = axis(view, scene.rows(), scene.columns());
+            let from = from.as_ref().map_or_else(String::new, |from| format!(" by {from}"));
+            format!("{:.1}° wide{from}{off}", view.horizontal_fov_deg(scene.columns()))
+        }
+        (None, _) => "no field of view".to_owned(),
+    });
+    format!("{}: {}", scene.name, parts.join("; "))
+}
+
+/// Returns questions about what a scene's numbers cannot well be.
+fn doubts(scene: &Scene, luminances: Option<[f64; 2]>) -> Vec<String> {
+    let mut doubts = vec![];
+    if let Some([mean, _]) = luminances
+        && !(LUMINANCES_CD_M2[0]..=LUMINANCES_CD_M2[1]).contains(&mean)
+    {
+        doubts.push(format!(
+            "{}: is its mean luminance really {} cd/m²? What its numbers are can be said: --quantity, --unit, --scale",
+            scene.name,
+            digits(mean)
+        ));
+    }
+    if let Some(depth) = &scene.depth {
+        let finite = depth.z_m().iter().copied().filter(|z| z.is_finite());
+        let (near, far) = finite.fold((f32::INFINITY, 0.0_f32), |(near, far), z| (near.min(z), far.max(z)));
+        if f64::from(near) < DEPTHS_M[0] || f64::from(far) > DEPTHS_M[1] {
+            doubts.push(format!(
+                "{}: do its depths really lie {}? What they are can be said: --depth-unit, --depth-kind",
+                scene.name,
+                range(depth)
+            ));
+        }
+    }
+    doubts
+}
+
+/// Returns bands in words.
+pub(super) fn bands(grid: &WavelengthGrid) -> String {
+    let (first, last) = grid.range_nm();
+    let widths = grid.centers_nm().windows(2).map(|pair| pair[1] - pair[0]);
+    let (least, most) = widths.fold((f64::INFINITY, 0.0), |(least, most), w| (f64::min(least, w), f64::max(most, w)));
+    let (first, last) = (short(first), short(last));
+    match grid.len() {
+        1 => format!("1 band at {first} nm"),
+        n if most - least < 1e-6 => format!("{n} bands of {first}–{last} nm, {} nm apart", short(least)),
+        n => format!("{n} bands of {first}–{last} nm, {} to {} nm apart", short(least), short(most)),
+    }
+}
+
+/// Returns a length with the digits that tell.
+fn short(nm: f64) -> f64 {
+    (100.0 * nm).round() / 100.0
+}
+
+/// Returns the mean luminance and the largest, cd/m²; `None` where the bands are not seen.
+fn luminances(image: &SpectralImage) -> Option<[f64; 2]> {
+    let [_, weights, _] = Observer::Cie1931.weights(image.grid());
+    // A thousandth of what the bands of a whole spectrum weigh.
+    if weights.iter().sum::<f64>() < 1e-3 * 683.0 * 106.9 {
+        return None;
+    }
+    let seen: Vec<(&Array2<f32>, f32)> =
+        image.planes().iter().zip(weights).filter(|(_, w)| *w > 0.0).map(|(plane, w)| (plane, w as f32)).collect();
+    let of_row = |row: usize| {
+        let mut sums = vec![0.0_f32; image.columns()];
+        for (plane, weight) in &seen {
+            sums.iter_mut().zip(plane.row(row)).for_each(|(sum, v)| *sum += weight * v);
+        }
+        let sum: f64 = sums.iter().map(|v| f64::from(*v)).sum();
+        (sum, sums.into_iter().fold(0.0, f32::max))
+    };
+    let rows: Vec<(f64, f32)> = (0..image.rows()).into_par_iter().map(of_row).collect();
+    let n = (image.rows() * image.columns()) as f64;
+    let most = rows.iter().map(|(_, most)| *most).fold(0.0, f32::max);
+    Some([rows.iter().map(|(sum, _)| sum).sum::<f64>() / n, most.into()])
+}
+
+fn range(depth: &DepthMap) -> String {
+    let (near, far) = depth.range_m();
+    let (near, far) = (digits(near), if far.is_finite() { digits(far) } else { "∞".to_owned() });
+    if near == far { format!("{near} m") } else { format!("{near}–{far} m") }
+}
+
+/// Returns where the axis is, if it is not in the middle.
+fn axis(view: View, rows: usize, columns: usize) -> String {
+    let across = view.center_x_px - 0.5 * (columns as f64 - 1.0);
+    let down = view.center_y_px - 0.5 * (rows as f64 - 1.0);
+    if across.hypot(down) < 0.05 * columns as f64 {
+        return String::new();
+    }
+    format!(", its axis {across:.0} samples right of and {down:.0} below the middle")
+}
+
+/// Returns a number with three digits.
+fn digits(value: f64) -> String {
+    if value == 0.0 {
+        return "0".to_owned();
+    }
+    let exponent = value.abs().log10().floor();
+    if !(-3.0..6.0).contains(&exponent) {
+        return format!("{value:.1e}");
+    }
+    format!("{value:.*}", (2.0 - exponent).max(0.0) as usize)
+}
+
+#[cfg(test)]
+mod tests {
+    use dioptric_spectrum::Quantity;
+
+    use super::*;
+
+    fn scene(radiance: f32) -> Scene {
+        let grid = WavelengthGrid::uniform(400.0, 700.0, 10.0).unwrap();
+        let planes = vec![Array2::from_elem((6, 8), radiance); grid.len()];
+        let scene = Scene::new("a.hdr", SpectralImage::new(Quantity::Radiance, grid, planes).unwrap());
+        scene.or_flat_depth_m(2.0).unwrap().or_horizontal_fov_deg(20.0).unwrap()
+    }
+
+    #[test]
+    fn line_says_what_the_scene_is() {
+        // 683 lm/W × 106.86 nm × .01 W m⁻² sr⁻¹ nm⁻¹.
+        let sources = Sources { what: "radiance".to_owned(), depth: Some("of a.pfm".to_owned()), ..Sources::default() };
+        assert_eq!(
+            line(&scene(0.01), &sources, luminances(&scene(0.01).radiance)),
+            "a.hdr: radiance, 31 bands of 400–700 nm, 10 nm apart; 8 × 6 samples; 730 cd/m², up to 730; depth 2.00 m of a.pfm; \
+             20.0° wide"
+        );
+    }
+
+    fn asked(scene: &Scene) -> Vec<String> {
+        doubts(scene, luminances(&scene.radiance))
+    }
+
+    #[test]
+    fn what_cannot_well_be_is_asked_about() {
+        assert!(asked(&scene(0.01)).is_empty());
+        for wrong in [0.0, 1e-12, 1e6] {
+            assert!(asked(&scene(wrong))[0].contains("--unit"), "{wrong}");
+        }
+        let far = Scene { depth: Some(DepthMap::flat(6, 8, 3e6).unwrap()), ..scene(0.01) };
+        assert!(asked(&far)[0].contains("--depth-unit"));
+        let sky = Scene { depth: Some(DepthMap::flat(6, 8, f64::INFINITY).unwrap()), ..scene(0.01) };
+        assert!(asked(&sky).is_empty());
+        // What nobody sees has no luminance.
+        let grid = WavelengthGrid::uniform(1000.0, 1700.0, 100.0).unwrap();
+        let planes = vec![Array2::from_elem((2, 2), 1.0); grid.len()];
+        let infrared = Scene::new("b", SpectralImage::new(Quantity::Radiance, grid, planes).unwrap());
+        assert!(asked(&infrared).is_empty());
+    }
+}
