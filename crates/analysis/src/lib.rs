@@ -21,10 +21,10 @@ pub use chart::{Corner, LineChart, Scale, Series};
 pub use filter_table::{FilterRow, built_in_filters};
 pub use lens::{
     AnalysisFields, AnalysisFilm, AnalysisRequest, AxialColorRow, ConfigurationData, ConvertedLens, FanRow, FieldPlace,
-    FieldRow, FocusData, GRID_LINES, GlassData, GlassRow, GridRow, ImageData, LensAnalysis, LensData, LensDefaults,
-    LensInfoRequest, LensModulation, LensPageData, LensRow, OpdMap, PlaneData, PupilRow, RayTable, SpotRow, SurfaceRow,
-    TraceError, TraceSettings, WavefrontRow, built_in_lenses, convert_lens, glass_data, glass_rows, placement_lines,
-    surface_rows,
+    FieldRow, FilmPlace, FilmUse, FocusData, GRID_LINES, GlassData, GlassRow, GridRow, ImageData, LensAnalysis,
+    LensCurves, LensData, LensDefaults, LensInfoRequest, LensModulation, LensPageData, LensRow, OpdMap, PlaneData,
+    PupilRow, RayTable, SpotRow, SurfaceRow, TraceError, TraceSettings, WavefrontRow, built_in_lenses, convert_lens,
+    ends_of, glass_data, glass_rows, placement_lines, surface_rows,
 };
 pub use methods::{Fit, MethodComparison, MethodRow};
 pub use psf::{MtfRow, PolychromaticPsf, PsfRequest, PsfRow, PsfSampling, PsfSet, ThroughFocus, psf_csv};

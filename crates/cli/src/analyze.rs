@@ -4,23 +4,20 @@ use std::{fmt::Write, fs};
 
 use anyhow::Context;
 use dioptric_analysis::{
-    AnalysisFields, AnalysisFilm, AnalysisRequest, FieldPlace, FieldRow, LensAnalysis, LensDefaults, LensModulation,
-    LensPageData,
+    AnalysisFields, AnalysisRequest, FieldPlace, FieldRow, LensAnalysis, LensDefaults, LensModulation, LensPageData,
 };
 use dioptric_pipeline::{Staged, parse_pairs};
 use dioptric_report::{AnalysisPlots, DRAWS_PNG, LensPage, chart_svg, write_drawing};
 
 use crate::{
     args::Common,
-    lens::{list_of, tell_taken},
+    lens::{USUAL_NM, list_of, pairs_in_words, tell_taken},
     lens_args::LensAnalyzeArgs,
     terminal::{Bar, fixed, print, print_json, remark, remark_on_png},
 };
 
 /// Pixels of the plots as PNG for each of the drawing's own.
 const PNG_SCALE: f64 = 1.5;
-/// Wavelengths where neither the command nor the lens's file names some, nm.
-const USUAL_NM: [f64; 3] = [450.0, 550.0, 650.0];
 
 pub(crate) fn run(arguments: &LensAnalyzeArgs, common: &Common) -> anyhow::Result<()> {
     let used = arguments.lens.open(common)?;
@@ -46,6 +43,10 @@ pub(crate) fn run(arguments: &LensAnalyzeArgs, common: &Common) -> anyhow::Resul
         ] {
             write_drawing(&svg, staged.path(), name, PNG_SCALE)?;
         }
+        for (name, chart) in &shown.curves.0 {
+            write_drawing(&chart_svg(chart, 640.0, 420.0), staged.path(), name, PNG_SCALE)?;
+            fs::write(staged.path().join(format!("{name}.csv")), chart.to_csv()).with_context(cannot)?;
+        }
         match &shown.modulation {
             Ok(LensModulation { over_frequency, over_field, through_focus }) => {
                 for (name, chart) in
@@ -63,7 +64,8 @@ pub(crate) fn run(arguments: &LensAnalyzeArgs, common: &Common) -> anyhow::Resul
         remark(
             common.quiet,
             &format!(
-                "wrote analysis.json, analysis.html, and analysis, spots, opd, distortion and mtf as {}, in {}",
+                "wrote analysis.json, analysis.html, and analysis, spots, opd, distortion, mtf and curves over field, focus and \
+                 wavelength as {} (curves as .csv too), in {}",
                 if DRAWS_PNG { ".svg and .png" } else { ".svg" },
                 path.display()
             ),
@@ -86,11 +88,7 @@ fn request(arguments: &LensAnalyzeArgs, used: &LensDefaults, common: &Common) ->
         main_wavelength_nm: used.reference_nm.filter(|_| asked_nm.is_none()),
         wavelengths_nm,
         distance_mm: arguments.distance_mm.unwrap_or(used.distance_mm),
-        film: match (arguments.film.film_mm, arguments.film.focus_mm) {
-            (Some(film_mm), _) => AnalysisFilm::FilmMm(film_mm),
-            (None, Some(distance_mm)) => AnalysisFilm::FocusMm(distance_mm),
-            (None, None) => AnalysisFilm::BestFocus,
-        },
+        film: arguments.film.of(used),
         n_rings: arguments.rings,
     };
     if arguments.distance_mm.is_none() && request.distance_mm.is_finite() {
@@ -114,16 +112,10 @@ fn request(arguments: &LensAnalyzeArgs, used: &LensDefaults, common: &Common) ->
 
 /// Returns fields as people name them.
 fn summary(fields: &AnalysisFields) -> String {
-    let list = |pairs: &[[f64; 2]]| {
-        let one = |[x, y]: &[f64; 2]| {
-            if *x == 0.0 { list_of(&[*y]) } else { format!("{}/{}", list_of(&[*x]), list_of(&[*y])) }
-        };
-        pairs.iter().map(one).collect::<Vec<_>>().join(", ")
-    };
     match fields {
         AnalysisFields::ByLight => "fields by light".to_owned(),
-        AnalysisFields::AnglesDeg(pairs) => format!("fields of {} degrees", list(pairs)),
-        AnalysisFields::HeightsMm(pairs) => format!("object points at {} mm", list(pairs)),
+        AnalysisFields::AnglesDeg(pairs) => format!("fields of {} degrees", pairs_in_words(pairs)),
+        AnalysisFields::HeightsMm(pairs) => format!("object points at {} mm", pairs_in_words(pairs)),
     }
 }
 
@@ -149,9 +141,10 @@ fn tables(analysis: &LensAnalysis) -> Result<String, std::fmt::Error> {
 
 /// Returns the part about the whole lens.
 fn head(analysis: &LensAnalysis) -> Result<String, std::fmt::Error> {
-    let LensAnalysis { lens, efl_mm, f_number, film_distance_mm, .. } = analysis;
-    let mut text =
-        format!("{lens}: f = {efl_mm:.4} mm, f/{f_number:.3}, film {film_distance_mm:.4} mm behind the last vertex\n");
+    let LensAnalysis { lens, efl_mm, f_number, film_distance_mm, film, .. } = analysis;
+    let mut text = format!(
+        "{lens}: f = {efl_mm:.4} mm, f/{f_number:.3}, film {film_distance_mm:.4} mm behind the last vertex: {film}\n"
+    );
     if let Some(x) = analysis.x_plane {
         writeln!(text, "along x: f = {:.4} mm, f/{:.3}", x.efl_mm, x.f_number)?;
     }
@@ -215,7 +208,7 @@ fn spot_table(analysis: &LensAnalysis) -> String {
             cell(spot.sigma_y_um, 3),
             format!("{:.4}", spot.transmission),
             cell(wavefront.map(|w| w.rms_waves), 4),
-            cell(wavefront.map(|w| w.strehl), 4),
+            cell(wavefront.and_then(|w| w.strehl), 4),
         ]);
     }
     text

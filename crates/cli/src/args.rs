@@ -11,7 +11,7 @@ use crate::{
     camera::{CameraCommand, SensorCommand},
     examples::with_examples,
     filter::FilterCommand,
-    lens_args::{BandArgs, FilmArgs, GlassCommand, LensArgs, LensCommand, LensStateArgs},
+    lens_args::{BandArgs, FilmArgs, GlassCommand, LensArgs, LensCommand, LensFilmArgs, LensStateArgs},
     measure_args::MeasureCommand,
     picture_args::PictureArgs,
     ranges,
@@ -420,7 +420,7 @@ pub(crate) struct PsfArgs {
     #[command(flatten)]
     pub(crate) bands: BandArgs,
     #[command(flatten)]
-    pub(crate) film: FilmArgs,
+    pub(crate) film: LensFilmArgs,
     /// Diffraction at the stop
     #[arg(long, value_name = "KIND", value_enum, default_value_t = DiffractionKind::None, help_heading = heading::SIMULATION)]
     pub(crate) diffraction: DiffractionKind,

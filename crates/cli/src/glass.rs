@@ -17,8 +17,8 @@ const USUAL_NM: [f64; 7] = [400.0, 450.0, 500.0, 550.0, 600.0, 650.0, 700.0];
 pub(crate) fn run(command: &GlassCommand, common: &Common) -> anyhow::Result<()> {
     match command {
         GlassCommand::List { filter } => list(filter.as_deref(), common),
-        GlassCommand::Show { name, bands, glass_range } => {
-            show(name, bands, glass_range.map(GlassRange::from).unwrap_or_default(), common)
+        GlassCommand::Show { name, catalog, bands, glass_range } => {
+            show((name, catalog), bands, glass_range.map(GlassRange::from).unwrap_or_default(), common)
         }
     }
 }
@@ -40,8 +40,13 @@ fn list(filter: Option<&str>, common: &Common) -> anyhow::Result<()> {
     print(&text)
 }
 
-fn show(name: &str, bands: &BandArgs, glass_range: GlassRange, common: &Common) -> anyhow::Result<()> {
-    let data = glass_data(name, &bands.nm()?.unwrap_or(USUAL_NM.to_vec()), glass_range)?;
+fn show(
+    (name, makers): (&str, &[String]),
+    bands: &BandArgs,
+    glass_range: GlassRange,
+    common: &Common,
+) -> anyhow::Result<()> {
+    let data = glass_data(name, makers, &bands.nm()?.unwrap_or(USUAL_NM.to_vec()), glass_range)?;
     if common.json {
         return print_json(&data);
     }

@@ -4,8 +4,8 @@ use std::{fmt::Write, fs, path::Path};
 
 use anyhow::Context;
 use dioptric_analysis::{
-    ConfigurationData, LensData, LensInfoRequest, SurfaceRow, built_in_lenses, convert_lens, placement_lines,
-    surface_rows,
+    ConfigurationData, FilmPlace, FilmUse, LensData, LensInfoRequest, SurfaceRow, built_in_lenses, convert_lens,
+    ends_of, placement_lines, surface_rows,
 };
 use dioptric_files::{Staged, write};
 use dioptric_pipeline::{
@@ -19,13 +19,18 @@ use crate::{
     terminal::{print, print_json, remark},
 };
 
+/// Wavelengths that are in focus together where neither the command nor the lens's file names some, nm.
+pub(crate) const USUAL_NM: [f64; 3] = [450.0, 550.0, 650.0];
+
 pub(crate) fn run(command: &LensCommand, common: &Common) -> anyhow::Result<()> {
     match command {
         LensCommand::List => list(common),
         LensCommand::Info(arguments) => info(arguments, common),
         LensCommand::Analyze(arguments) => crate::analyze::run(arguments, common),
         LensCommand::Draw(arguments) => draw(arguments, common),
-        LensCommand::Convert { input, output, reading } => convert(input, output, &reading.reading(), common),
+        LensCommand::Convert { input, output, strict, reading } => {
+            convert((input, output), *strict, &reading.reading(), common)
+        }
     }
 }
 
@@ -36,6 +41,15 @@ pub(crate) fn list_of(numbers: &[f64]) -> String {
         [a, b, c, .., last] if words.len() > 6 => format!("{a}, {b}, {c}, … {last}"),
         _ => words.join(", "),
     }
+}
+
+/// Returns pairs along x and y as a list for people; of those above the axis, y alone.
+pub(crate) fn pairs_in_words(pairs: &[[f64; 2]]) -> String {
+    let one = |[x, y]: &[f64; 2]| match *x == 0.0 {
+        true => list_of(&[*y]),
+        false => format!("{}/{}", list_of(&[*x]), list_of(&[*y])),
+    };
+    pairs.iter().map(one).collect::<Vec<_>>().join(", ")
 }
 
 /// Reports what the file of a lens states that is done otherwise or not at all.
@@ -50,8 +64,17 @@ pub(crate) fn tell_taken(taken: &[String], common: &Common) {
     }
 }
 
-fn convert(input: &str, output: &Path, reading: &LensReadOptions, common: &Common) -> anyhow::Result<()> {
+fn convert(
+    (input, output): (&str, &Path),
+    is_strict: bool,
+    reading: &LensReadOptions,
+    common: &Common,
+) -> anyhow::Result<()> {
     let converted = convert_lens(input, output, reading)?;
+    if is_strict && !converted.losses.is_empty() {
+        let (output, losses) = (output.display(), converted.losses.join("; "));
+        anyhow::bail!("{output}: the format does not hold all of {input}, which --strict asks for: {losses}");
+    }
     if let Some(glasses) = converted.glasses {
         let beside = output.with_extension("agf");
         // A catalogue that is not this lens's own is left alone.
@@ -66,6 +89,7 @@ fn convert(input: &str, output: &Path, reading: &LensReadOptions, common: &Commo
     }
     write(output, converted.text.as_bytes())?;
     tell(&converted.notes, common);
+    tell(&converted.losses, common);
     remark(common.quiet, &format!("wrote {}", output.display()));
     Ok(())
 }
@@ -88,7 +112,9 @@ fn list(common: &Common) -> anyhow::Result<()> {
 
 fn info(arguments: &LensInfoArgs, common: &Common) -> anyhow::Result<()> {
     let used = arguments.lens.open(common)?;
-    let wavelengths_nm = match arguments.bands.nm()? {
+    let asked_nm = arguments.bands.nm()?;
+    let is_asked = asked_nm.is_some();
+    let wavelengths_nm = match asked_nm {
         Some(list) => list,
         None if used.reference_nm.is_some() => {
             let wavelength_nm = used.wavelength_or_usual();
@@ -108,17 +134,20 @@ fn info(arguments: &LensInfoArgs, common: &Common) -> anyhow::Result<()> {
     tell(&used.lens.notes_on_glass_range(&wavelengths_nm), common);
     let lens = &used.lens;
     tell(&Vec::from_iter(LensData::note_on_third_order(lens)), common);
-    let ends = |ends: (f64, f64), nm: &f64| (ends.0.min(*nm), ends.1.max(*nm));
-    let (first_nm, last_nm) = wavelengths_nm.iter().fold((f64::INFINITY, 0.0), ends);
-    let instead_of_f_and_c_nm = (first_nm < last_nm).then_some([first_nm, last_nm]);
+    // Color counts between the wavelengths that were asked for, or those of the file.
+    let colors_nm = ends_of(if is_asked { &wavelengths_nm } else { &used.wavelengths_nm });
     let data: Vec<LensData> = wavelengths_nm
         .iter()
         .map(|&wavelength_nm| {
             let LensInfoArgs { distance_mm, field_deg, .. } = *arguments;
             let distance_mm = distance_mm.or(Some(used.distance_mm).filter(|mm| mm.is_finite()));
-            let request = LensInfoRequest { wavelength_nm, distance_mm, field_deg, instead_of_f_and_c_nm };
+            let request = LensInfoRequest { wavelength_nm, distance_mm, field_deg, colors_nm };
             let configurations = used.configurations(wavelength_nm)?;
-            Ok::<_, PipelineError>(LensData { configurations, ..LensData::new(lens, &request)? })
+            Ok::<_, PipelineError>(LensData {
+                configurations,
+                film_distance_mm: used.film_distance_mm,
+                ..LensData::new(lens, &request)?
+            })
         })
         .collect::<Result<_, _>>()?;
     if common.json {
@@ -194,7 +223,10 @@ fn data_table(data: &[LensData]) -> anyhow::Result<String> {
             }
             continue;
         }
-        write!(text, "{key:<28}")?;
+        // Beside an object at a finite distance, the f-number is that of another.
+        let is_near = data.iter().any(|d| d.image.is_some_and(|image| image.distance_mm.is_finite()));
+        let label = if is_near && key == "f_number" { "f_number of a far object" } else { key };
+        write!(text, "{label:<28}")?;
         for record in &records {
             write!(text, " {:>14}", number(key, &record[key]))?;
         }
@@ -215,7 +247,8 @@ fn number(key: &str, value: &serde_json::Value) -> String {
         None if key.ends_with("_deg")
             || key.ends_with("colors_nm")
             || key.starts_with('C')
-            || key == "real_f_number" =>
+            || key.ends_with("f_number")
+            || key.ends_with("_na") =>
         {
             "–".to_owned()
         }
@@ -231,7 +264,8 @@ fn draw(arguments: &LensDrawArgs, common: &Common) -> anyhow::Result<()> {
     let staged = Staged::file(&arguments.output)?;
     let used = arguments.lens.open(common)?;
     let mut taken = Vec::new();
-    let wavelengths_nm = match arguments.bands.nm()? {
+    let asked_nm = arguments.bands.nm()?;
+    let wavelengths_nm = match asked_nm.clone() {
         Some(list) => list,
         None => {
             let wavelength_nm = used.wavelength_or_usual();
@@ -258,14 +292,17 @@ fn draw(arguments: &LensDrawArgs, common: &Common) -> anyhow::Result<()> {
     let wavelength_nm = wavelengths_nm.first().copied().unwrap_or(REFERENCE_WAVELENGTH_NM);
     let used = arguments.lens.state.apply(used, wavelength_nm, common)?;
     tell(&used.lens.notes_on_glass_range(&wavelengths_nm), common);
-    let film_distance_mm = match (arguments.film.focus_mm, arguments.film.film_mm) {
-        (Some(focus_mm), _) => {
-            let mono = used.lens.at(wavelength_nm)?;
-            Some(mono.film_distance_mm_for(focus_mm).map_err(PipelineError::from)?)
-        }
-        (None, film_mm) => film_mm,
+    let focus_nm = if asked_nm.is_none() { used.wavelengths_or(&USUAL_NM) } else { wavelengths_nm.clone() };
+    let of = FilmUse { wavelengths_nm: &focus_nm, reference_nm: wavelength_nm, distance_mm };
+    let FilmPlace { distance_mm: film_distance_mm, origin } = arguments.film.of(&used).place(&used.lens, of)?;
+    remark(common.quiet, &format!("film {film_distance_mm:.4} mm behind the last vertex: {origin}"));
+    let drawing = LensDrawing {
+        fields_deg,
+        distance_mm,
+        wavelengths_nm,
+        film_distance_mm,
+        film_label: format!("film: {origin}"),
     };
-    let drawing = LensDrawing { fields_deg, distance_mm, wavelengths_nm, film_distance_mm };
     let path = &arguments.output;
     let bytes = drawing_file(&drawing.to_svg(&used.lens)?, path)?;
     fs::write(staged.path(), bytes).with_context(|| format!("cannot write {}", path.display()))?;

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand, ValueEnum};
-use dioptric_analysis::LensDefaults;
+use dioptric_analysis::{AnalysisFilm, LensDefaults};
 use dioptric_pipeline::{FocusSpec, GlassRange, LensReadOptions, MissingGlass, SeqNumbers, StopSpec, parse_numbers};
 
 use crate::{common::Common, movement_args::MovementArgs, terminal::remark};
@@ -25,6 +25,9 @@ pub(crate) enum LensCommand {
         input: String,
         /// File to write; a .zmx file of a lens with glasses of its own gets a catalogue (.agf) beside it
         output: PathBuf,
+        /// Refuses to leave out anything that the format has no place for
+        #[arg(long)]
+        strict: bool,
         #[command(flatten)]
         reading: LensReadingArgs,
     },
@@ -109,6 +112,35 @@ impl LensStateArgs {
     }
 }
 
+/// Where the film of a lens that is looked at is: at its file's own image plane unless one of these says otherwise.
+#[derive(Clone, Copy, Debug, Args)]
+#[command(next_help_heading = "Focus")]
+#[group(multiple = false)]
+pub(crate) struct LensFilmArgs {
+    /// Focuses on this distance from the first vertex, mm, or inf
+    #[arg(long, value_name = "D")]
+    focus_mm: Option<f64>,
+    /// Places the film this far behind the last vertex, mm
+    #[arg(long, value_name = "D")]
+    film_mm: Option<f64>,
+    /// Places the film where the spot on the axis is smallest, all wavelengths together [default where the lens's file states no
+    /// image plane]
+    #[arg(long)]
+    best_focus: bool,
+}
+
+impl LensFilmArgs {
+    /// Returns where the film is of a lens that is used so.
+    pub(crate) fn of(self, used: &LensDefaults) -> AnalysisFilm {
+        match (self.film_mm, self.focus_mm) {
+            (Some(film_mm), _) => AnalysisFilm::FilmMm(film_mm),
+            (None, Some(distance_mm)) => AnalysisFilm::FocusMm(distance_mm),
+            (None, None) if self.best_focus => AnalysisFilm::BestFocus,
+            (None, None) => used.film(),
+        }
+    }
+}
+
 impl FilmArgs {
     /// The place that was asked for.
     pub(crate) fn focus(self) -> Option<FocusSpec> {
@@ -130,6 +162,9 @@ pub(crate) struct LensReadingArgs {
     /// Glass catalogue to look in before the built-in one, .agf or .yml; may be given several times
     #[arg(long, value_name = "F")]
     pub(crate) glasses: Vec<PathBuf>,
+    /// Makers whose glass a name means that several have, as SCHOTT,OHARA; before those that the file names
+    #[arg(long, value_name = "MAKERS", value_delimiter = ',')]
+    pub(crate) catalog: Vec<String>,
     /// What to do with a glass that no catalogue has [default: refuse]
     #[arg(long, value_enum)]
     pub(crate) missing_glass: Option<MissingGlassArg>,
@@ -194,8 +229,8 @@ impl LensReadingArgs {
 
     /// Changes what was asked for.
     pub(crate) fn change(&self, reading: &mut LensReadOptions) {
-        if !self.glasses.is_empty() {
-            reading.glasses.clone_from(&self.glasses);
+        if !(self.glasses.is_empty() && self.catalog.is_empty()) {
+            reading.glasses = self.glasses.iter().cloned().chain(self.catalog.iter().map(PathBuf::from)).collect();
         }
         if let Some(missing_glass) = self.missing_glass {
             reading.missing_glass = match missing_glass {
@@ -248,9 +283,8 @@ pub(crate) struct LensAnalyzeArgs {
     /// Distance of the object from the first vertex, mm, or inf [default: that of the lens's file, else inf]
     #[arg(long, value_name = "D")]
     pub(crate) distance_mm: Option<f64>,
-    /// Without either, the film is where the spot on the axis is smallest
     #[command(flatten)]
-    pub(crate) film: FilmArgs,
+    pub(crate) film: LensFilmArgs,
     /// Rings of rays in a spot: N of them have 1 + 3N(N + 1) rays
     #[arg(long, value_name = "N", default_value_t = 12)]
     pub(crate) rings: usize,
@@ -275,7 +309,7 @@ pub(crate) struct LensDrawArgs {
     #[arg(long, value_name = "D")]
     pub(crate) distance_mm: Option<f64>,
     #[command(flatten)]
-    pub(crate) film: FilmArgs,
+    pub(crate) film: LensFilmArgs,
     #[command(flatten)]
     pub(crate) bands: BandArgs,
 }
@@ -293,6 +327,9 @@ pub(crate) enum GlassCommand {
     Show {
         /// Name of the glass, e.g. N-BK7
         name: String,
+        /// Makers whose glass a name means that several have, as SCHOTT,OHARA
+        #[arg(long, value_name = "MAKERS", value_delimiter = ',')]
+        catalog: Vec<String>,
         #[command(flatten)]
         bands: BandArgs,
         /// What becomes of a wavelength outside the range in which the glass is known [default: refuse]

@@ -2,14 +2,13 @@
 
 use std::fmt::Write;
 
-use anyhow::Context;
-use dioptric_analysis::{LensDefaults, PsfRequest, PsfRow, PsfSampling, PsfSet, psf_csv};
-use dioptric_pipeline::{FocusSpec, REFERENCE_WAVELENGTH_NM, RetiredBank, Staged, parse_numbers};
+use dioptric_analysis::{AnalysisFilm, LensDefaults, PsfRequest, PsfRow, PsfSampling, PsfSet, psf_csv};
+use dioptric_pipeline::{REFERENCE_WAVELENGTH_NM, RetiredBank, Staged, parse_numbers, parse_pairs};
 use dioptric_report::{PsfFormat, chart_svg, psf_page, write_drawing, write_psfs};
 
 use crate::{
     args::{Common, PsfArgs, PsfMode},
-    lens::{list_of, tell, tell_taken},
+    lens::{USUAL_NM, list_of, pairs_in_words, tell, tell_taken},
     run::{diffraction, with_gamma},
     terminal::{Bar, fixed, print, print_json, remark, remark_on_png},
 };
@@ -22,14 +21,14 @@ const SEED: u64 = 1;
 
 pub(crate) fn run(arguments: &PsfArgs, common: &Common) -> anyhow::Result<()> {
     let used = arguments.lens.open(common)?;
-    let Points { fields_deg, distances_mm, wavelengths_nm, focus, spectral_weights } =
+    let Points { fields_deg, distances_mm, wavelengths_nm, film, focus_nm, spectral_weights } =
         points(arguments, &used, common)?;
     let request = PsfRequest {
         fields_deg,
-        field_y_deg: arguments.field_y_deg,
         distances_mm,
         wavelengths_nm,
-        focus,
+        film,
+        focus_nm,
         diffraction: with_gamma(diffraction(arguments.diffraction), arguments.gamma)?,
         pixel_um: arguments.pixel_um,
         size: arguments.size,
@@ -96,10 +95,12 @@ pub(crate) fn run(arguments: &PsfArgs, common: &Common) -> anyhow::Result<()> {
 
 /// Which points are looked at, and where the film is.
 struct Points {
-    fields_deg: Vec<f64>,
+    fields_deg: Vec<[f64; 2]>,
     distances_mm: Vec<f64>,
     wavelengths_nm: Vec<f64>,
-    focus: FocusSpec,
+    film: AnalysisFilm,
+    /// Wavelengths that are in focus together, nm.
+    focus_nm: Vec<f64>,
     spectral_weights: Vec<f64>,
 }
 
@@ -109,10 +110,10 @@ const USUAL_DISTANCE_MM: f64 = 2000.0;
 /// Returns what is asked for; where it is not said, what the lens's file says.
 fn points(arguments: &PsfArgs, used: &LensDefaults, common: &Common) -> anyhow::Result<Points> {
     let mut taken = Vec::new();
-    let of_file = arguments.film.focus().is_none().then_some(used.film_distance_mm).flatten();
-    let focus = arguments.film.focus().or(of_file.map(FocusSpec::FilmMm));
-    let focus = focus.context("where is the film? expected --focus-mm or --film-mm")?;
-    taken.extend(of_file.map(|film_mm| format!("the film at {} mm", list_of(&[film_mm]))));
+    let film = arguments.film.of(used);
+    if let AnalysisFilm::OfFile(film_mm) = film {
+        taken.push(format!("the film at {} mm", list_of(&[film_mm])));
+    }
     let asked_nm = arguments.bands.nm()?;
     let wavelengths_nm = asked_nm.clone().unwrap_or_else(|| used.wavelengths_or(&[REFERENCE_WAVELENGTH_NM]));
     if asked_nm.is_none() && wavelengths_nm != [REFERENCE_WAVELENGTH_NM] {
@@ -120,29 +121,34 @@ fn points(arguments: &PsfArgs, used: &LensDefaults, common: &Common) -> anyhow::
     }
     let fields_of_file = || used.psf_fields_deg(used.wavelength_or_usual());
     let fields_deg = match (&arguments.fields_deg, arguments.fields_deg.is_none().then(fields_of_file).flatten()) {
-        (Some(list), _) => parse_numbers("--fields-deg", list)?,
+        (Some(list), _) if list.contains('/') => parse_pairs("--fields-deg", list)?,
+        (Some(list), _) => {
+            parse_numbers("--fields-deg", list)?.into_iter().map(|deg| [deg, arguments.field_y_deg]).collect()
+        }
         (None, Some(fields_deg)) => {
-            taken.push(format!("fields of {} degrees", list_of(&fields_deg)));
+            taken.push(format!("fields of {} degrees", pairs_in_words(&fields_deg)));
             fields_deg
         }
-        (None, None) => vec![0.0],
+        (None, None) => vec![[0.0, arguments.field_y_deg]],
     };
     let distances_mm = match &arguments.distances_mm {
         Some(list) => parse_numbers("--distances-mm", list)?,
         // The film that a file states is that of its own object.
-        None if used.distance_mm.is_finite() || of_file.is_some() => {
+        None if used.distance_mm.is_finite() || matches!(film, AnalysisFilm::OfFile(_)) => {
             taken.push(format!("an object at {} mm", list_of(&[used.distance_mm])));
             vec![used.distance_mm]
         }
+        None if film == AnalysisFilm::BestFocus => vec![f64::INFINITY],
         None => vec![USUAL_DISTANCE_MM],
     };
+    let focus_nm = if asked_nm.is_none() { used.wavelengths_or(&USUAL_NM) } else { Vec::new() };
     let spectral_weights = match (&arguments.spectral_weights, asked_nm) {
         (Some(list), _) => parse_numbers("--spectral-weights", list)?,
         (None, None) => used.weights_of(&wavelengths_nm),
         (None, Some(_)) => Vec::new(),
     };
     tell_taken(&taken, common);
-    Ok(Points { fields_deg, distances_mm, wavelengths_nm, focus, spectral_weights })
+    Ok(Points { fields_deg, distances_mm, wavelengths_nm, film, focus_nm, spectral_weights })
 }
 
 /// Returns the rows with one more after those of each point: the light of all its wavelengths together.
@@ -157,16 +163,23 @@ fn with_polychromatic(set: &PsfSet, mtf_per_mm: &[f64]) -> Vec<PsfRow> {
     rows
 }
 
+/// Returns the field of a row: to the right, and upwards where it lies above the axis.
+fn field_cell(row: &PsfRow) -> String {
+    match row.field_y_deg == 0.0 {
+        true => fixed(row.field_deg, 3),
+        false => format!("{}/{}", fixed(row.field_deg, 2), fixed(row.field_y_deg, 2)),
+    }
+}
+
 fn lines(notes: &[String]) -> String {
     notes.iter().map(|note| format!("\n{note}\n")).collect()
 }
 
 fn table(set: &PsfSet, rows: &[PsfRow]) -> Result<String, std::fmt::Error> {
-    let mut text =
-        format!("film {:.4} mm behind the last vertex, pixels of {} µm\n", set.film_distance_mm, set.pixel_um);
-    if let Some(row) = rows.first().filter(|row| row.field_y_deg != 0.0) {
-        writeln!(text, "all fields {}° above the axis", row.field_y_deg)?;
-    }
+    let mut text = format!(
+        "film {:.4} mm behind the last vertex: {}; pixels of {} µm\n",
+        set.film_distance_mm, set.film, set.pixel_um
+    );
     text.push('\n');
     writeln!(
         text,
@@ -186,8 +199,8 @@ fn table(set: &PsfSet, rows: &[PsfRow]) -> Result<String, std::fmt::Error> {
     for row in rows {
         writeln!(
             text,
-            "{:>9.3} {:>12.1} {:>8} {:>12} {:>12} {:>10.3} {:>10.3} {:>10.3} {:>10.3} {:>10.3} {:>8.4}",
-            row.field_deg,
+            "{:>9} {:>12.1} {:>8} {:>12} {:>12} {:>10.3} {:>10.3} {:>10.3} {:>10.3} {:>10.3} {:>8.4}",
+            field_cell(row),
             row.distance_mm,
             if row.is_polychromatic { "all".to_owned() } else { format!("{:.1}", row.wavelength_nm) },
             fixed(row.centroid_x_mm, 5),
@@ -207,14 +220,21 @@ fn table(set: &PsfSet, rows: &[PsfRow]) -> Result<String, std::fmt::Error> {
             write!(text, "{:>31} waves {:.0} %", "model", 100.0 * share)?;
             writeln!(text, "{}", row.strehl.map_or_else(String::new, |strehl| format!(", Strehl ratio {strehl:.4}")))?;
         }
+        if row.measured_on != "picture" {
+            writeln!(text, "{:>31} LSF, EE50 and MTF by {}, free of pixels", "measured", row.measured_on)?;
+        }
         if let Some(reason) = &row.fallback {
             writeln!(text, "{:>31} HURB in place of the diffraction integral: {reason}", "model")?;
         }
         for mtf in &row.mtf {
             writeln!(
                 text,
-                "{:>31} {:>8.2}/mm  tangential {:.4}  sagittal {:.4}",
-                "MTF", mtf.cycles_per_mm, mtf.tangential, mtf.sagittal
+                "{:>31} {:>8.2}/mm  tangential {:.4}  sagittal {:.4}{}",
+                "MTF",
+                mtf.cycles_per_mm,
+                mtf.tangential,
+                mtf.sagittal,
+                mtf.limit.map_or_else(String::new, |[limit, _]| format!("  diffraction limit {limit:.4}"))
             )?;
         }
     }

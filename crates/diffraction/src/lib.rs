@@ -29,8 +29,9 @@ pub use opd::{best_wavefront_film_mm, opd_waves_at};
 pub use sampled_hurb::{HurbForm, SampledHurb};
 pub use stop_ray::{StopRay, trace_stop_rays};
 pub use wave::{
-    Peak, PhaseRange, Propagation, PupilFunctionFit, PupilGrid, PupilOutline, PupilSamples, WavePsf, WaveQuality,
-    WaveWindow, WindowCenter, polychromatic_psf, pupil_samples, wave_psf,
+    Encircled, LineSpread, Peak, PhaseRange, Propagation, PupilFunctionFit, PupilGrid, PupilOutline, PupilSamples,
+    TransferFunction, TransferMethod, TransferQuality, WavePsf, WaveQuality, WaveWindow, WindowCenter,
+    polychromatic_psf, pupil_samples, wave_psf,
 };
 pub use wavefront::{ReferenceSphere, Wavefront, WavefrontReference};
 pub use width::full_width_at_half_maximum;

@@ -4,8 +4,9 @@ use dioptric_optics::{MonoLens, ObjectPoint, analysis::PupilSampling};
 
 use crate::{DiffractionError, PupilGrid, ReferenceSphere, Wavefront, WavefrontReference};
 
-/// Returns the optical path of the rays through these places less that of the chief ray, waves, each up to the sphere
-/// about the chief ray's film point (of the film as it is curved) through the paraxial exit pupil: positive where the light comes late.
+/// Returns the optical path of the chief ray less that of the rays through these places, waves, each up to the sphere
+/// about the chief ray's film point (of the film as it is curved) through the paraxial exit pupil: positive where the wavefront is
+/// ahead of the sphere, as OpticStudio and CODE V have it, and Welford, whose third-order sums have the same sign.
 ///
 /// The chief ray is that through the middle of the pupil as the sampling has it: of the real stop, if it aims at that.
 /// A ray that does not arrive has none; `None` altogether if not even the chief ray arrives.
@@ -22,7 +23,7 @@ pub fn opd_waves_at(
     let sphere = ReferenceSphere::through_exit_pupil(lens, chief.point_mm(0));
     let chief_mm = sphere.paths_mm(lens, &chief)[0];
     let paths_mm = sphere.paths_mm(lens, &sampling.rays_on_film(lens, point, film_distance_mm));
-    let waves = |path_mm: f64| (path_mm - chief_mm) / (lens.wavelength_nm() * 1e-6);
+    let waves = |path_mm: f64| (chief_mm - path_mm) / (lens.wavelength_nm() * 1e-6);
     Some(paths_mm.into_iter().map(|path_mm| path_mm.is_finite().then(|| waves(path_mm))).collect())
 }
 
@@ -83,7 +84,8 @@ mod tests {
         let w20 = 0.1 * sine2 / 2.0 / 550e-6;
         for (found, place) in waves.iter().zip([-1.0f64, -0.5, 0.0, 0.5, 1.0]) {
             // Left out are the square of the defocus, 0.1 in 50, and the fourth power of the slope, 6e-4.
-            assert!((found.unwrap() - w20 * place * place).abs() < 3e-3 * w20, "{found:?} {w20}");
+            // Of a film before the focus the wavefront lies behind the sphere.
+            assert!((found.unwrap() + w20 * place * place).abs() < 3e-3 * w20, "{found:?} {w20}");
         }
     }
 

@@ -6,7 +6,7 @@ use glam::{DVec2, DVec3};
 use crate::{
     DiffractionError, PupilGrid,
     wave::{FilmRays, PupilCells, cis::cis},
-    zernike::fit_noll,
+    zernike::{FRINGE_TERMS, fit, fringe, noll},
 };
 
 /// A sphere about a film point, up to which paths are counted.
@@ -76,7 +76,8 @@ pub struct Wavefront {
     pub energy: Vec<f64>,
     /// Whether light takes this way: `false` behind an obscuration.
     pub is_clear: Vec<bool>,
-    /// Optical path less the reference's, waves: positive where the light comes late.
+    /// The reference's optical path less the ray's, waves: positive where the wavefront is ahead of the sphere, the sign of OpticStudio,
+    /// CODE V and Welford.
     pub opd_waves: Vec<f64>,
     /// The place on the film about which the wave converges best (of its reference), mm along its own x and y.
     pub center_mm: DVec2,
@@ -112,7 +113,7 @@ impl Wavefront {
         let chief = rays.len() - 1;
         let sphere = ReferenceSphere::through_exit_pupil(lens, rays.point_mm(chief));
         let paths_mm = sphere.paths_mm(lens, &rays);
-        let opd_waves = paths_mm[..chief].iter().map(|p| (p - paths_mm[chief]) / (wavelength_nm * 1e-6)).collect();
+        let opd_waves = paths_mm[..chief].iter().map(|p| (paths_mm[chief] - p) / (wavelength_nm * 1e-6)).collect();
         let center_mm = lens.film_point(sphere.center_mm, film_distance_mm).mm;
         let mut wavefront = Self { wavelength_nm, pupil: in_stop, energy, is_clear, opd_waves, center_mm };
         if reference == WavefrontReference::Best {
@@ -140,8 +141,8 @@ impl Wavefront {
         for (w, d) in self.opd_waves.iter_mut().zip(directions) {
             *w -= mean_w + slope.dot(*d - mean_d);
         }
-        // Counted to a point s further on, a path is longer by n s·d.
-        self.center_mm -= slope * (self.wavelength_nm * 1e-6 / index);
+        // Counted to a point s further on, a path is longer by n s·d, and the wavefront as much further behind.
+        self.center_mm += slope * (self.wavelength_nm * 1e-6 / index);
     }
 
     fn mean(&self, of: impl Fn(f64) -> f64) -> f64 {
@@ -173,9 +174,14 @@ impl Wavefront {
     }
 
     /// Returns the coefficients of the first `n_terms` of Zernike's polynomials in Noll's order
-    /// ([`zernike`](crate::zernike)), in waves rms, over the unit disc of the stop.
+    /// ([`zernike`](crate::zernike)), in waves rms, over the unit disc of the stop: OpticStudio's standard ones.
     pub fn zernike_waves(&self, n_terms: usize) -> Vec<f64> {
-        fit_noll(&self.pupil, &self.opd_waves, &self.energy, n_terms)
+        fit(noll, &self.pupil, &self.opd_waves, &self.energy, n_terms)
+    }
+
+    /// Returns the coefficients of the Fringe set's first `n_terms`, of at most 37, in waves at the edge.
+    pub fn fringe_waves(&self, n_terms: usize) -> Vec<f64> {
+        fit(fringe, &self.pupil, &self.opd_waves, &self.energy, n_terms.min(FRINGE_TERMS))
     }
 }
 
@@ -249,7 +255,7 @@ mod tests {
         let w20 = 0.1 * sine2 / 2.0 / 550e-6;
         // Terms in the fourth power of the slope are left out: sin²u/4 = 6e-4 of it.
         assert!((zernike[3].abs() / (w20 / 12f64.sqrt()) - 1.0).abs() < 3e-3, "{zernike:?}");
-        assert!(zernike[3] > 0.0, "the edge's rays are on a longer way to a film point before the focus");
+        assert!(zernike[3] < 0.0, "the edge's rays are on a longer way to a film point before the focus");
         assert!((wavefront.rms_waves() / zernike[3].abs() - 1.0).abs() < 1e-3);
         let sinc = (std::f64::consts::PI * w20).sin() / (std::f64::consts::PI * w20);
         assert!((wavefront.strehl() - sinc * sinc).abs() < 1e-3, "{} {}", wavefront.strehl(), sinc * sinc);

@@ -1,6 +1,6 @@
-//! Zernike's polynomials on the unit disc, in Noll's order and normalisation.
+//! Zernike's polynomials on the unit disc, in Noll's order and normalisation, and in those of the Fringe set.
 //!
-//! Each has mean square 1 over the disc, so that the coefficients of a wavefront are the rms of its parts. The order
+//! Each of Noll's has mean square 1 over the disc, so that the coefficients of a wavefront are the rms of its parts. The order
 //! (from 1): piston, tilt x, tilt y, defocus, astigmatism at 45°, astigmatism along the axes, coma y, coma x,
 //! trefoil y, trefoil x, spherical aberration, …
 
@@ -35,6 +35,33 @@ pub fn noll(j: usize, at: DVec2) -> f64 {
     }
 }
 
+/// How many polynomials the Fringe set has.
+pub const FRINGE_TERMS: usize = 37;
+
+/// Returns the radial degree n and the azimuthal order m of the `j`-th polynomial of the Fringe set (from 1, at most 37): m > 0 goes
+/// with cos mθ, m < 0 with sin |m|θ.
+///
+/// The set goes by n + |m|, those of each from the largest |m| down (Wyant and Creath 1992, Basic wavefront aberration theory,
+/// table III; the 37th is the spherical aberration of degree 12).
+pub fn fringe_degrees(j: usize) -> (u32, i32) {
+    let j = j.clamp(1, FRINGE_TERMS);
+    if j == FRINGE_TERMS {
+        return (12, 0);
+    }
+    let group = (j - 1).isqrt();
+    let place = j - 1 - group * group;
+    let m = (group - place / 2) as i32;
+    (2 * group as u32 - m as u32, if place % 2 == 1 { -m } else { m })
+}
+
+/// Returns the `j`-th polynomial of the Fringe set (from 1, at most 37) at a point, in units of the disc's radius: at most 1 at the edge.
+pub fn fringe(j: usize, at: DVec2) -> f64 {
+    let (n, m) = fringe_degrees(j);
+    let (rho, theta) = (at.length(), at.y.atan2(at.x));
+    let angular = f64::from(m.unsigned_abs()) * theta;
+    radial(n, m.unsigned_abs(), rho) * if m < 0 { angular.sin() } else { angular.cos() }
+}
+
 /// The radial polynomial, by its recurrence in the degree: stable, unlike the sum of factorials.
 fn radial(n: u32, m: u32, rho: f64) -> f64 {
     let (mut below, mut here) = (0.0, rho.powi(m as i32));
@@ -62,7 +89,13 @@ fn radial(n: u32, m: u32, rho: f64) -> f64 {
 /// The points need not fill the disc, but must determine the polynomials; a polynomial that they do not distinguish from
 /// those before it gets the coefficient 0. Weights are those of a quadrature: some may be negative, where a hole is
 /// taken away from a whole.
-pub fn fit_noll(points: &[DVec2], values: &[f64], weights: &[f64], n_terms: usize) -> Vec<f64> {
+pub fn fit(
+    polynomial: fn(usize, DVec2) -> f64,
+    points: &[DVec2],
+    values: &[f64],
+    weights: &[f64],
+    n_terms: usize,
+) -> Vec<f64> {
     // Gram and Schmidt, each column made orthogonal twice, which is as good as Householder.
     let dot = |a: &[f64], b: &[f64]| -> f64 { weights.iter().zip(a).zip(b).map(|((w, a), b)| w * a * b).sum() };
     let mut rest = values.to_vec();
@@ -70,7 +103,7 @@ pub fn fit_noll(points: &[DVec2], values: &[f64], weights: &[f64], n_terms: usiz
     let mut upper = vec![vec![0.0; n_terms]; n_terms];
     let mut along = vec![0.0; n_terms];
     for term in 0..n_terms {
-        let mut column: Vec<f64> = points.iter().map(|p| noll(term + 1, *p)).collect();
+        let mut column: Vec<f64> = points.iter().map(|p| polynomial(term + 1, *p)).collect();
         let length = dot(&column, &column).max(0.0).sqrt();
         for _ in 0..2 {
             for (row, q) in basis.iter().enumerate() {
@@ -165,6 +198,34 @@ mod tests {
     }
 
     #[test]
+    fn fringe_set_is_that_of_the_table() {
+        let expected =
+            [(0, 0), (1, 1), (1, -1), (2, 0), (2, 2), (2, -2), (3, 1), (3, -1), (4, 0), (3, 3), (3, -3), (4, 2)];
+        for (i, degrees) in expected.into_iter().enumerate() {
+            assert_eq!(fringe_degrees(i + 1), degrees, "Z{}", i + 1);
+        }
+        assert_eq!([16, 25, 36, 37].map(fringe_degrees), [(6, 0), (8, 0), (10, 0), (12, 0)]);
+        assert_eq!([26, 27, 35].map(fringe_degrees), [(5, 5), (5, -5), (9, -1)]);
+        let (at, r2): (DVec2, f64) = (DVec2::new(0.3, -0.5), 0.34);
+        for (j, value) in [
+            (4, 2.0 * r2 - 1.0),
+            (5, 0.09 - 0.25),
+            (8, (3.0 * r2 - 2.0) * -0.5),
+            (9, 6.0 * r2 * r2 - 6.0 * r2 + 1.0),
+            (11, 3.0 * 0.09 * -0.5 + 0.125),
+        ] {
+            assert!((fringe(j, at) - value).abs() < 1e-14, "Z{j}");
+        }
+        // Each is Noll's of its degrees, over Noll's norm.
+        for j in 1..=FRINGE_TERMS {
+            let (n, m) = fringe_degrees(j);
+            let same = (1..200).find(|&k| noll_degrees(k) == (n, m)).unwrap();
+            let norm = (f64::from(n + 1) * if m == 0 { 1.0 } else { 2.0 }).sqrt();
+            assert!((noll(same, at) / norm - fringe(j, at)).abs() < 1e-13, "Z{j}");
+        }
+    }
+
+    #[test]
     fn polynomials_are_orthonormal_over_the_disc() {
         let (points, weights) = disc();
         for a in 1..=37 {
@@ -184,7 +245,7 @@ mod tests {
             let weights: Vec<f64> =
                 points.iter().zip(&weights).map(|(p, w)| if p.x < cut { *w } else { 0.0 }).collect();
             let values: Vec<f64> = points.iter().map(value).collect();
-            let found = fit_noll(&points, &values, &weights, 21);
+            let found = fit(noll, &points, &values, &weights, 21);
             for (found, given) in found.iter().zip(&given) {
                 assert!((found - given).abs() < 1e-9, "{found} {given}");
             }

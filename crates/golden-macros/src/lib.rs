@@ -11,7 +11,6 @@ use proc_macro::TokenStream;
 ///
 /// ```text
 /// #[dioptric_golden::needs_shared]
-#[test]
 /// #[test]
 /// fn rays_agree_with_the_reference() {}
 /// ```

@@ -60,6 +60,15 @@ impl Outline {
         }
     }
 
+    /// The radius of a circle, also of one that is stated as an ellipse, mm.
+    fn radius_mm(&self) -> Option<f64> {
+        match *self {
+            Self::Circle { radius_mm } => Some(radius_mm),
+            Self::Ellipse { half_x_mm, half_y_mm } if half_x_mm == half_y_mm => Some(half_x_mm),
+            Self::Ellipse { .. } | Self::Rectangle { .. } => None,
+        }
+    }
+
     /// Returns the point of the edge in this direction from the middle, mm, at an angle from x.
     fn edge_mm(&self, angle_rad: f64) -> DVec2 {
         let (half, direction) = (self.half_widths_mm(), DVec2::from_angle(angle_rad));
@@ -73,7 +82,12 @@ impl Outline {
 impl Aperture {
     /// Whether it is a circle about the surface's axis.
     pub fn is_rotational(&self) -> bool {
-        matches!(self.outline, Outline::Circle { .. }) && self.center_mm == [0.0; 2]
+        self.center_mm == [0.0; 2] && self.outline.radius_mm().is_some()
+    }
+
+    /// The radius of an opening that is a circle about the surface's axis, mm: what bounds light as a rim does.
+    pub(crate) fn rim_mm(&self) -> Option<f64> {
+        self.outline.radius_mm().filter(|_| !self.is_obscuration && self.center_mm == [0.0; 2])
     }
 
     /// Whether a ray passes that meets the surface here.

@@ -1,6 +1,7 @@
 //! Lens files, told apart by their extension.
 
 mod agf;
+mod bench;
 mod configuration;
 mod dat;
 mod decode;

@@ -23,8 +23,10 @@ pub struct Layout {
     pub film_distance_mm: f64,
     /// Distance of the object before the first vertex, mm; infinite for a far one.
     pub object_distance_mm: f64,
-    /// Tangents of the field angles from which rays come.
-    pub field_tans: Vec<f64>,
+    /// What is at the film, in a word or two.
+    pub film_label: String,
+    /// Field angles from which rays come, degrees, positive above the axis; of a far object up to 180.
+    pub fields_deg: Vec<f64>,
     /// Wavelengths of the rays, nm. With one field, rays are colored by wavelength; else by field, and dashed by
     /// wavelength.
     pub wavelengths_nm: Vec<f64>,
@@ -42,8 +44,8 @@ const DASHES: [&str; 4] = ["none", "7 3", "2 2", "9 2 2 2"];
 impl Lens {
     /// Draws the lens with its stop, its film and rays, and returns the picture as SVG text.
     ///
-    /// Each fan of rays fills the true, vignetted pupil of its field at the first wavelength; objects lie below the
-    /// axis, so that fans climb. Of a tilted or decentered lens the section in the y–z plane is drawn.
+    /// Each fan of rays fills the true, vignetted pupil of its field at the first wavelength; a point of positive field lies above
+    /// the axis, so that its light falls. Of a tilted or decentered lens the section in the y–z plane is drawn.
     ///
     /// # Errors
     /// When there is no wavelength or a glass is not known at one of them.
@@ -85,8 +87,11 @@ struct WavelengthKey {
 }
 
 impl Layout {
+    /// The angles of fields that are drawn: beyond them lenses see nothing.
+    pub const WIDEST_FIELDS_DEG: std::ops::RangeInclusive<f64> = -120.0..=120.0;
+
     fn wavelength_keys(&self) -> impl Iterator<Item = WavelengthKey> {
-        let has_fields = self.field_tans.len() > 1;
+        let has_fields = self.fields_deg.len() > 1;
         self.wavelengths_nm.iter().enumerate().map(move |(i, &wavelength_nm)| WavelengthKey {
             wavelength_nm,
             color: (!has_fields).then(|| wavelength_color(wavelength_nm)),
@@ -126,8 +131,11 @@ fn fans(lens: &Lens, lenses: &[MonoLens], layout: &Layout) -> Vec<Fan> {
     let lead_mm = lead_mm(lens, layout);
     let dioptres = 1e3 / (layout.object_distance_mm + lenses[0].projection_center_z_mm());
     let mut fans = Vec::new();
-    for (i, &field_tan) in layout.field_tans.iter().enumerate() {
-        let point = ObjectPoint::from_field(&lenses[0], DVec2::new(0.0, -field_tan), dioptres);
+    for (i, &field_deg) in layout.fields_deg.iter().enumerate() {
+        let point = match layout.object_distance_mm.is_finite() {
+            true => ObjectPoint::from_field(&lenses[0], DVec2::new(0.0, field_deg.to_radians().tan()), dioptres),
+            false => ObjectPoint::far(field_deg.to_radians(), DVec2::Y),
+        };
         let Some(pupil) = PupilBoundary::find(&lenses[0], &point, 64) else { continue };
         let (low, high) =
             (pupil.rho_max_mm(-std::f64::consts::FRAC_PI_2), pupil.rho_max_mm(std::f64::consts::FRAC_PI_2));
@@ -306,7 +314,7 @@ fn film(lens: &Lens, layout: &Layout, fans: &[Fan], frame: &Frame, svg: &mut Str
     let top = points.last().copied().unwrap_or(DVec2::new(z_mm, half_mm));
     let line = frame.path(points);
     let _ = writeln!(svg, "<path d=\"{line}\" fill=\"none\" stroke=\"#111\" stroke-width=\"2\"/>");
-    frame.label((frame.x(top.x) + 3.0, frame.y(top.y) - 6.0), "end", "film", svg);
+    frame.label((frame.x(top.x) + 3.0, frame.y(top.y) - 6.0), "end", &layout.film_label, svg);
 }
 
 /// Returns a color that stands for a wavelength, as six hexadecimal digits behind a `#`: the hue of its light, dark enough for lines on white.
@@ -352,7 +360,8 @@ mod tests {
         let layout = Layout {
             film_distance_mm: mono.film_distance_mm_for(f64::INFINITY).unwrap_or(20.0),
             object_distance_mm: f64::INFINITY,
-            field_tans: degrees.iter().map(|deg| deg.to_radians().tan()).collect(),
+            film_label: "film".to_owned(),
+            fields_deg: degrees.to_vec(),
             wavelengths_nm: vec![550.0],
             n_rays: 5,
             width_px: 900.0,
@@ -413,7 +422,8 @@ mod tests {
         let layout = Layout {
             film_distance_mm: 36.0,
             object_distance_mm: f64::INFINITY,
-            field_tans: vec![0.0, 0.1],
+            film_label: "film".to_owned(),
+            fields_deg: vec![0.0, 5.0],
             wavelengths_nm: vec![450.0, 650.0],
             n_rays: 3,
             width_px: 900.0,
@@ -422,7 +432,7 @@ mod tests {
         let svg = lens.draw(&layout).unwrap();
         // A dash for the rays of each field, and one in the key.
         assert!(svg.matches("stroke-dasharray=\"7 3\"").count() == 3 && svg.contains("650 nm"), "{svg}");
-        let svg = lens.draw(&Layout { field_tans: vec![0.1], ..layout }).unwrap();
+        let svg = lens.draw(&Layout { fields_deg: vec![5.0], ..layout }).unwrap();
         assert!(!svg.contains("stroke-dasharray=\"7 3\"") && svg.contains("450 nm"));
     }
 }

@@ -72,7 +72,8 @@ impl Lens {
 
     /// Returns the lens made of these interfaces, in air, whose surfaces have apertures beside their round rims.
     ///
-    /// A surface with an opening must reach as far as the opening does within the rim, not as far as the whole rim.
+    /// A surface with an opening must reach as far as the opening does within the rim, not as far as the whole rim. A round
+    /// opening about the axis becomes the rim where it is the narrower of the two, and is no aperture any more.
     ///
     /// # Errors
     /// When there are no surfaces, a number makes no sense, a rim or opening does not fit on its surface, or an aperture is
@@ -80,9 +81,9 @@ impl Lens {
     pub fn new_with_apertures(
         name: impl Into<String>,
         source: impl Into<String>,
-        interfaces: Vec<Interface>,
+        mut interfaces: Vec<Interface>,
         stop: usize,
-        apertures: Vec<Aperture>,
+        mut apertures: Vec<Aperture>,
     ) -> Result<Self, OpticsError> {
         if !(1..=MOST_SURFACES).contains(&interfaces.len()) {
             return Err(OpticsError::SurfaceCount { n_surfaces: interfaces.len() });
@@ -94,6 +95,12 @@ impl Lens {
             return Err(OpticsError::ApertureCount { n_apertures: apertures.len(), most: MOST_APERTURES });
         }
         apertures.iter().try_for_each(|aperture| aperture.check(interfaces.len()))?;
+        apertures.retain(|aperture| {
+            let Some(rim_mm) = aperture.rim_mm() else { return true };
+            let semi_aperture_mm = &mut interfaces[aperture.surface].surface.semi_aperture_mm;
+            *semi_aperture_mm = semi_aperture_mm.min(rim_mm);
+            false
+        });
         for (surface, interface) in interfaces.iter().enumerate() {
             interface.surface.check(surface, &apertures)?;
             interface.medium_after.check()?;
@@ -360,9 +367,14 @@ impl Lens {
     /// Whether every surface is one of revolution about the lens's axis: whether nothing is tilted, decentered or
     /// curved differently along x and y, and all apertures are circles about it.
     pub fn is_rotational(&self) -> bool {
+        self.apertures.iter().all(Aperture::is_rotational) && self.is_centered_and_rotational()
+    }
+
+    /// Whether every surface is one of revolution about the lens's axis, whatever apertures bound the light: what first- and
+    /// third-order theory ask for.
+    pub fn is_centered_and_rotational(&self) -> bool {
         let is_round = |interface: &Interface| interface.surface.is_rotational();
-        self.apertures.iter().all(Aperture::is_rotational)
-            && self.interfaces.iter().all(is_round)
+        self.interfaces.iter().all(is_round)
             && self.diffractive.iter().all(|phase| phase.profile.is_rotational())
             && placement::motions(&self.moves, &self.vertices_z_mm()).is_none()
     }

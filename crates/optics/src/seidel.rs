@@ -114,9 +114,15 @@ impl Lens {
     /// does to the path (docs/mirrors.md), with the color of their power.
     ///
     /// # Errors
-    /// When a glass is not known at one of the wavelengths, or the lens is not rotationally symmetric.
+    /// When a glass is not known at one of the wavelengths, or a surface is not one of revolution about the
+    /// lens's axis; apertures may have any shape.
     pub fn seidel(&self, settings: &SeidelSettings) -> Result<Seidel, OpticsError> {
-        self.check_rotational("a sum of Seidel aberrations")?;
+        if !self.is_centered_and_rotational() {
+            return Err(OpticsError::NotRotational {
+                lens: self.name().to_owned(),
+                task: "a sum of Seidel aberrations",
+            });
+        }
         let mono = self.at(settings.wavelength_nm)?;
         let [short, long] = [self.at(settings.colors_nm[0])?, self.at(settings.colors_nm[1])?];
         let index_before = mono.steps()[0].index_before;

@@ -337,12 +337,9 @@ impl Lens {
         let list = list.unwrap_or_else(|| vec![self.wavelength_or_usual(None)]);
         guarded(|| {
             let (first, last) = list.iter().fold((f64::INFINITY, 0.0), |(a, b), nm| (nm.min(a), nm.max(b)));
-            let instead_of_f_and_c_nm = (first < last).then_some([first, last]);
+            let colors_nm = (first < last).then_some([first, last]);
             let data = |&wavelength_nm: &f64| {
-                LensData::new(
-                    &self.file.lens,
-                    &LensInfoRequest { wavelength_nm, distance_mm, field_deg, instead_of_f_and_c_nm },
-                )
+                LensData::new(&self.file.lens, &LensInfoRequest { wavelength_nm, distance_mm, field_deg, colors_nm })
             };
             let rows: Vec<LensData> = list.iter().map(data).collect::<Result<_, _>>().map_err(exception)?;
             match wavelengths_nm.is_none_or(is_single) {
@@ -452,7 +449,7 @@ impl Lens {
             samples.extend(picture.iter());
         }
         let request = &asked.request;
-        let lists = [&request.fields_deg, &request.distances_mm, &request.wavelengths_nm].map(Vec::len);
+        let lists = [request.fields_deg.len(), request.distances_mm.len(), request.wavelengths_nm.len()];
         let kept = lists.iter().zip(asked.is_single).filter(|(_, is_single)| !is_single).map(|(n, _)| *n);
         let shape: Vec<usize> = kept.chain([n, n]).collect();
         let array =
@@ -504,7 +501,7 @@ impl Lens {
     /// wavelengths_nm : float or list of float, optional
     ///     Of the rays; focus is that of the first.
     /// film_mm : float, optional
-    ///     The film's place behind the last vertex; else where the object is in focus.
+    ///     The film's place behind the last vertex; else that of the lens's file for its own object, else where the object is in focus.
     ///
     /// Returns
     /// -------
@@ -528,13 +525,14 @@ impl Lens {
                 let widest = dioptric_optics::analysis::field_limit_deg(&reference, 0.5);
                 widest.map_or_else(|| vec![0.0], |angle| vec![0.0, 0.7 * angle])
             });
-            if let Some(field) = fields_deg.iter().find(|field| field.is_nan() || field.abs() >= 89.9) {
-                return Err(wrong("fields_deg", field, "angles below 89.9 degrees"));
+            if let Some(field) = fields_deg.iter().find(|field| !Layout::WIDEST_FIELDS_DEG.contains(*field)) {
+                return Err(wrong("fields_deg", field, "angles of up to 120 degrees"));
             }
             let layout = Layout {
                 film_distance_mm: film_mm,
                 object_distance_mm: distance_mm,
-                field_tans: fields_deg.iter().map(|field| field.to_radians().tan()).collect(),
+                film_label: "film".to_owned(),
+                fields_deg,
                 wavelengths_nm,
                 n_rays: DRAWN_RAYS,
                 width_px: 800.0,

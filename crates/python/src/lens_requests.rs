@@ -2,7 +2,7 @@
 
 use dioptric_analysis::{AnalysisFields, AnalysisFilm, AnalysisRequest, LensDefaults, PsfRequest, PsfSampling, PsfSet};
 use dioptric_optics::Lens;
-use dioptric_pipeline::{Diffraction, FocusSpec, PipelineError, REFERENCE_WAVELENGTH_NM};
+use dioptric_pipeline::{Diffraction, PipelineError, REFERENCE_WAVELENGTH_NM};
 use pyo3::{prelude::*, types::PyDict};
 
 use crate::{
@@ -21,7 +21,7 @@ pub(crate) fn analysis_request(used: &LensDefaults, options: Option<&Bound<'_, P
         main_wavelength_nm: used.reference_nm,
         wavelengths_nm: used.wavelengths_or(&USUAL_NM),
         distance_mm: used.distance_mm,
-        film: AnalysisFilm::BestFocus,
+        film: used.film(),
         n_rings: 6,
     };
     let (mut has_fields, mut has_distance) = (false, false);
@@ -65,11 +65,11 @@ pub(crate) struct PsfOptions {
 impl PsfOptions {
     pub(crate) fn read(function: &str, options: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
         let mut request = PsfRequest {
-            fields_deg: vec![0.0],
-            field_y_deg: 0.0,
+            fields_deg: Vec::new(),
             distances_mm: vec![f64::INFINITY],
             wavelengths_nm: vec![REFERENCE_WAVELENGTH_NM],
-            focus: FocusSpec::NearObject,
+            film: AnalysisFilm::BestFocus,
+            focus_nm: Vec::new(),
             diffraction: Diffraction::Hurb { gamma: 1.0 },
             pixel_um: 1.0,
             size: Some(65),
@@ -96,14 +96,15 @@ impl PsfOptions {
             "mtf_per_mm",
         ];
         let mut is_exact_grid = false;
+        let (mut fields_deg, mut field_y_deg, mut film) = (vec![0.0], 0.0, None);
         each_option(function, options, &known, |key, value| {
             match key {
-                "field_deg" => (request.fields_deg, single[0]) = (numbers(key, value)?, is_single(value)),
-                "field_y_deg" => request.field_y_deg = number(key, value)?,
+                "field_deg" => (fields_deg, single[0]) = (numbers(key, value)?, is_single(value)),
+                "field_y_deg" => field_y_deg = number(key, value)?,
                 "distance_mm" => (request.distances_mm, single[1]) = (numbers(key, value)?, is_single(value)),
                 "wavelengths_nm" => (request.wavelengths_nm, single[2]) = (numbers(key, value)?, is_single(value)),
-                "focus_mm" => request.focus = FocusSpec::DistanceMm(number(key, value)?),
-                "film_mm" => request.focus = FocusSpec::FilmMm(number(key, value)?),
+                "focus_mm" => film = Some(AnalysisFilm::FocusMm(number(key, value)?)),
+                "film_mm" => film = Some(AnalysisFilm::FilmMm(number(key, value)?)),
                 "pixel_um" => request.pixel_um = number(key, value)?,
                 "shape" => request.size = Some(count(key, value)?),
                 "diffraction" => request.diffraction = diffraction(key, value)?,
@@ -118,9 +119,8 @@ impl PsfOptions {
         if let PsfSampling::Paper { jitter, .. } = &mut request.sampling {
             *jitter = !is_exact_grid;
         }
-        if request.focus == FocusSpec::NearObject {
-            request.focus = FocusSpec::DistanceMm(request.distances_mm[0]);
-        }
+        request.fields_deg = fields_deg.into_iter().map(|field_deg| [field_deg, field_y_deg]).collect();
+        request.film = film.unwrap_or(AnalysisFilm::FocusMm(request.distances_mm[0]));
         Ok(Self { request, is_single: single })
     }
 

@@ -70,11 +70,11 @@ fn immersed_page_names_heights_and_index() {
 #[test]
 fn mosaic_has_a_tile_for_each_picture() {
     let request = PsfRequest {
-        fields_deg: vec![0.0, 1.0, 2.0],
-        field_y_deg: 0.0,
+        fields_deg: vec![[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]],
         distances_mm: vec![4000.0, 8000.0],
         wavelengths_nm: vec![450.0, 550.0, 650.0],
-        focus: FocusSpec::FilmMm(51.8145),
+        film: AnalysisFilm::FilmMm(51.8145),
+        focus_nm: Vec::new(),
         diffraction: Diffraction::None,
         pixel_um: 2.0,
         size: None,
@@ -88,7 +88,7 @@ fn mosaic_has_a_tile_for_each_picture() {
     // Three wavelengths and the light of all of them across, six points down.
     assert!(mosaic.width() > 4 * 160 && mosaic.height() > 6 * 160);
     // A microscope sees nothing at 10°: its tile is dark, and labeled so.
-    let focus = FocusSpec::DistanceMm(2000.0);
-    let dark = PsfRequest { fields_deg: vec![0.0, 10.0], distances_mm: vec![2000.0], focus, ..request };
+    let film = AnalysisFilm::FocusMm(2000.0);
+    let dark = PsfRequest { fields_deg: vec![[0.0, 0.0], [10.0, 0.0]], distances_mm: vec![2000.0], film, ..request };
     assert!(psf_mosaic(&dark.compute(&Lens::built_in("microscope-20x").unwrap()).unwrap()).is_ok());
 }

@@ -68,12 +68,14 @@ fn crowded_chart_has_its_legend_above() {
 
 #[test]
 fn drawn_lens_is_the_golden_one() {
+    let lens = Lens::built_in("paper-2el").unwrap();
     let drawing = LensDrawing {
         fields_deg: vec![0.0, 3.0],
         distance_mm: 2000.0,
         wavelengths_nm: vec![550.0],
-        film_distance_mm: None,
+        film_distance_mm: lens.at(550.0).unwrap().film_distance_mm_for(2000.0).unwrap(),
+        film_label: "film".to_owned(),
     };
-    let svg = drawing.to_svg(&Lens::built_in("paper-2el").unwrap()).unwrap();
+    let svg = drawing.to_svg(&lens).unwrap();
     check_svg("report/lens.svg", &svg, ROUNDING_PX);
 }

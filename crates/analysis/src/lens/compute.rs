@@ -2,20 +2,23 @@
 
 use std::borrow::Cow;
 
-use dioptric_diffraction::{PupilGrid, Wavefront, WavefrontReference, best_wavefront_film_mm, opd_waves_at};
+use dioptric_diffraction::{
+    PupilGrid, PupilSamples, Wavefront, WavefrontReference, best_wavefront_film_mm, opd_waves_at, zernike::FRINGE_TERMS,
+};
 use dioptric_optics::{
     Lens, MonoLens, ObjectPoint, PupilBoundary, Shape, Surface, Vignetting,
     analysis::{
-        AstigmaticFoci, Autofocus, AxisFoci, Distortion, NumericalApertures, Projection, PupilCoordinates, PupilLight,
-        PupilRule, PupilSampling, RayFan, SpotDiagram, StraightMap, field_limit_deg, hexapolar,
-        projected_solid_angle_onto, pupil_line,
+        AstigmaticFoci, Autofocus, AxisFoci, NumericalApertures, PupilCoordinates, PupilLight, PupilRule,
+        PupilSampling, RayFan, SpotDiagram, StraightMap, field_limit_deg, hexapolar, projected_solid_angle_onto,
+        pupil_line,
     },
     glam::{DVec2, DVec3},
 };
 use rayon::prelude::*;
 
 use super::{
-    request::{AnalysisFilm, AnalysisRequest, Field},
+    film::AnalysisFilm,
+    request::{AnalysisRequest, Field},
     rows::{
         AxialColorRow, FanRow, FieldRow, FocusData, GridRow, LensAnalysis, OpdMap, PupilRow, SpotRow, WavefrontRow,
     },
@@ -140,7 +143,12 @@ impl Bench {
     }
 
     /// The point of a field, the same for all wavelengths.
-    fn point(&self, field_tan: DVec2) -> ObjectPoint {
+    fn point(&self, field: &Field) -> ObjectPoint {
+        field.point(self.reference(), self.dioptres)
+    }
+
+    /// The point of these tangents of field angles.
+    fn point_of_tan(&self, field_tan: DVec2) -> ObjectPoint {
         ObjectPoint::from_field(self.reference(), field_tan, self.dioptres)
     }
 
@@ -151,7 +159,7 @@ impl Bench {
 
     /// Returns where each wavelength of a point on the axis focuses; films are sought about `from_mm`.
     fn axial_color(&self, distance_mm: f64, from_mm: f64) -> Vec<AxialColorRow> {
-        let axis = [self.point(DVec2::ZERO)];
+        let axis = [self.point_of_tan(DVec2::ZERO)];
         let focus_mm = |lens: &MonoLens| self.best(&axis, std::slice::from_ref(lens), from_mm).map(|found| found.0);
         let reference_focus_mm = focus_mm(self.reference());
         let image_z_mm = |lens: &MonoLens| lens.conjugate(distance_mm).image_z_mm;
@@ -170,17 +178,17 @@ impl Bench {
         (fields, notes): (Vec<Field>, Vec<String>),
     ) -> Result<LensAnalysis, PipelineError> {
         let paraxial = self.reference().film_distance_mm_for(request.distance_mm);
-        let axis = self.point(DVec2::ZERO);
+        let axis = self.point_of_tan(DVec2::ZERO);
         let on_axis =
             paraxial.as_ref().ok().and_then(|&film_distance_mm| self.best(&[axis], &self.lenses, film_distance_mm));
         self.film_distance_mm = match (request.film, on_axis) {
-            (AnalysisFilm::FilmMm(film_distance_mm), _) => film_distance_mm,
+            (AnalysisFilm::FilmMm(film_mm) | AnalysisFilm::OfFile(film_mm), _) => film_mm,
             (AnalysisFilm::FocusMm(distance_mm), _) => self.reference().film_distance_mm_for(distance_mm)?,
             (AnalysisFilm::BestFocus, Some((film_distance_mm, _))) => film_distance_mm,
             (AnalysisFilm::BestFocus, None) => paraxial.clone()?,
         };
         let from_mm = paraxial.as_ref().map_or(self.film_distance_mm, |film_distance_mm| *film_distance_mm);
-        let points: Vec<ObjectPoint> = fields.iter().map(|field| self.point(field.tan)).collect();
+        let points: Vec<ObjectPoint> = fields.iter().map(|field| self.point(field)).collect();
         let over_fields = self.best(&points, &self.lenses, from_mm);
         let wavefront = on_axis.and_then(|(film_distance_mm, _)| {
             best_wavefront_film_mm(self.reference(), &axis, film_distance_mm, PupilGrid::STANDARD).ok()
@@ -214,6 +222,7 @@ impl Bench {
             f_number: first.f_number,
             working_f_number: self.reference().working_f_number(request.distance_mm),
             film_distance_mm: self.film_distance_mm,
+            film: request.film.origin(),
             half_illumination_deg: field_limit_deg(self.reference(), 0.5),
             focus: FocusData {
                 paraxial_film_mm: paraxial.ok(),
@@ -236,7 +245,7 @@ impl Bench {
     }
 
     fn spot_row(&self, field: &Field, lens: &MonoLens) -> SpotRow {
-        let point = self.point(field.tan);
+        let point = self.point(field);
         let spot = SpotDiagram::trace(lens, &point, self.film_distance_mm, &self.sampling);
         let light = PupilLight::to_film(lens, &point, self.film_distance_mm, self.rule);
         let moments = light.map(|light| light.moments(lens, self.film_distance_mm));
@@ -271,8 +280,10 @@ impl Bench {
             wavefront: wavefront.map(|wavefront| WavefrontRow {
                 rms_waves: wavefront.rms_waves(),
                 peak_to_valley_waves: wavefront.peak_to_valley_waves(),
-                strehl: wavefront.strehl(),
+                strehl: PupilSamples::peak_of(lens, &point, self.film_distance_mm).ok().map(|peak| peak.strehl),
+                strehl_of_rms: (-(std::f64::consts::TAU * wavefront.rms_waves()).powi(2)).exp(),
                 zernike_waves: wavefront.zernike_waves(ZERNIKE_TERMS),
+                fringe_waves: wavefront.fringe_waves(FRINGE_TERMS),
             }),
             pupil,
             points_um: center_mm.map_or(Vec::new(), |center_mm| {
@@ -283,7 +294,7 @@ impl Bench {
     }
 
     fn fan_row(&self, field: &Field, lens: &MonoLens) -> FanRow {
-        let point = self.point(field.tan);
+        let point = self.point(field);
         let along = |direction: DVec2| {
             let sampling = PupilSampling { places: pupil_line(direction, FAN_PLACES), ..self.sampling.clone() };
             let none = || vec![None; FAN_PLACES];
@@ -306,7 +317,7 @@ impl Bench {
     }
 
     fn field_row(&self, field: &Field, (straight, axial_cone): (Option<&StraightMap>, f64)) -> FieldRow {
-        let (point, lens) = (self.point(field.tan), self.reference());
+        let (point, lens) = (self.point(field), self.reference());
         let place_mm = |lens: &MonoLens| lens.chief_film_point_mm(&point, self.film_distance_mm);
         let height_mm = |lens: &MonoLens| place_mm(lens).map(|place_mm| 0.0 - place_mm.dot(field.direction));
         let reference_mm = height_mm(lens);
@@ -335,16 +346,17 @@ impl Bench {
     /// Returns the relative distortion against the tangent of the field and against its angle: that of the paraxial scale
     /// or, for a lens without an axis of symmetry, of the straight map of small fields.
     fn distortions(&self, field: &Field, straight: Option<&StraightMap>, chief_mm: Option<DVec2>) -> [Option<f64>; 2] {
-        let field_tan = field.tan.length();
+        let (tan, angle) = (field.tan(), Some(field.angle_rad));
         if self.reference().is_rotational() {
-            let field = (field_tan, self.dioptres);
-            return [Projection::Tangent, Projection::Angle].map(|projection| {
-                Some(Distortion::of(self.reference(), field, self.film_distance_mm, projection)?.relative())
+            let scale_mm = self.reference().film_scale_mm(self.film_distance_mm);
+            let height_mm = chief_mm.map(|chief_mm| -chief_mm.dot(field.direction));
+            return [tan, angle].map(|ideal| {
+                let ideal_mm = scale_mm * ideal?;
+                Some(if ideal_mm == 0.0 { 0.0 } else { height_mm? / ideal_mm - 1.0 })
             });
         }
-        let against = |tan: DVec2| Some(straight?.relative(tan, chief_mm?));
-        let angle_over_tan = if field_tan == 0.0 { 1.0 } else { field_tan.atan() / field_tan };
-        [against(field.tan), against(field.tan * angle_over_tan)]
+        [tan, angle.filter(|_| tan.is_some())]
+            .map(|ideal| Some(straight?.relative(ideal? * field.direction, chief_mm?)))
     }
 
     /// Returns where the chief ray meets the film, in the film's own frame, mm.
@@ -369,7 +381,7 @@ impl Bench {
         let is_inside = |cell: &DVec2| cell.length_squared() < 1.0;
         let places = cells.iter().copied().filter(is_inside).collect();
         let sampling = PupilSampling { places, ..self.sampling.clone() };
-        let found = opd_waves_at(lens, &self.point(field.tan), self.film_distance_mm, &sampling).unwrap_or_default();
+        let found = opd_waves_at(lens, &self.point(field), self.film_distance_mm, &sampling).unwrap_or_default();
         let mut found = found.into_iter();
         let waves = cells.iter().map(|cell| if is_inside(cell) { found.next().flatten() } else { None }).collect();
         OpdMap { place: field.place, wavelength_nm: lens.wavelength_nm(), n_across: MAP_CELLS, waves }
@@ -377,20 +389,23 @@ impl Bench {
 
     /// Returns a grid of chief rays that reaches as far as the fields do.
     fn grid(&self, fields: &[Field], straight: &StraightMap) -> Vec<GridRow> {
-        let widest = |of: &dyn Fn(DVec2) -> f64| fields.iter().map(|field| of(field.tan)).fold(0.0, f64::max);
+        let tan = |field: &Field| field.direction * field.angle_rad.min(WIDEST_GRID_DEG.to_radians()).tan();
+        let widest = |of: &dyn Fn(DVec2) -> f64| fields.iter().map(|field| of(tan(field))).fold(0.0, f64::max);
         let [x, y] = [widest(&|tan| tan.x.abs()), widest(&|tan| tan.y.abs())];
         // A row of fields is the half diagonal of a square.
         let half = match x == 0.0 || y == 0.0 {
             true => DVec2::splat(x.max(y) * std::f64::consts::FRAC_1_SQRT_2),
             false => DVec2::new(x, y),
         };
-        let half = half.min(DVec2::splat(WIDEST_GRID_DEG.to_radians().tan()));
         let at = |i: usize| 2.0 * i as f64 / (GRID_LINES - 1) as f64 - 1.0;
         let places = (0..GRID_LINES).flat_map(|row| (0..GRID_LINES).map(move |column| DVec2::new(at(column), at(row))));
         let places: Vec<DVec2> = places.map(|place| place * half).collect();
         let row = |&tan: &DVec2| GridRow {
             field_xy_deg: tan.to_array().map(|tan| tan.atan().to_degrees()),
-            image_mm: self.reference().chief_film_point_mm(&self.point(tan), self.film_distance_mm).map(in_picture),
+            image_mm: self
+                .reference()
+                .chief_film_point_mm(&self.point_of_tan(tan), self.film_distance_mm)
+                .map(in_picture),
             straight_mm: in_picture(straight.at_mm(tan)),
         };
         places.par_iter().map(row).collect()

@@ -13,8 +13,10 @@ pub struct ConvertedLens {
     pub text: String,
     /// The text of a glass catalogue (`.agf`) that belongs beside it with the same name, if it needs one.
     pub glasses: Option<String>,
-    /// What the file read says and this program, or the format written, does otherwise or not at all, a sentence each.
+    /// What the file read says and this program does otherwise or not at all, a sentence each.
     pub notes: Vec<String>,
+    /// What the format written has no place for, a sentence each.
+    pub losses: Vec<String>,
 }
 
 /// Returns the lens that `input` means (a file or a built-in name) in the format that `target`'s extension tells.
@@ -37,7 +39,7 @@ pub fn convert_lens(input: &str, target: &Path, reading: &LensReadOptions) -> Re
         }
         file = file.of_one_configuration();
     }
-    notes.extend(file.left_out(&extension));
+    let losses = file.left_out(&extension);
     // These two alone hold indices instead of glasses.
     let written_nm = match extension.as_str() {
         "dat" => vec![file.reference_wavelength_nm.unwrap_or(D_LINE_NM)],
@@ -60,5 +62,5 @@ pub fn convert_lens(input: &str, target: &Path, reading: &LensReadOptions) -> Re
             return Err(PipelineError::Write { path: target.to_owned(), reason });
         }
     };
-    Ok(ConvertedLens { text, glasses, notes })
+    Ok(ConvertedLens { text, glasses, notes, losses })
 }

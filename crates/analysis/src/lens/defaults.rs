@@ -2,7 +2,7 @@
 
 use dioptric_optics::{Field, Lens, LensFile, glam::DVec2};
 
-use crate::{AnalysisFields, ConfigurationData};
+use crate::{AnalysisFields, AnalysisFilm, ConfigurationData};
 use dioptric_pipeline::{
     LensReadOptions, LensSpec, Movements, PipelineError, REFERENCE_WAVELENGTH_NM, StopSpec, nearest_to_reference_nm,
 };
@@ -114,14 +114,29 @@ impl LensDefaults {
         }
     }
 
-    /// Returns the field angles to the right of the axis that stand for those of the file of a lens with an axis of symmetry,
-    /// degrees; `None` of other lenses, or where the file names none.
-    pub fn psf_fields_deg(&self, wavelength_nm: f64) -> Option<Vec<f64>> {
-        let mut fields_deg = self.drawing_fields_deg(wavelength_nm).filter(|_| self.lens.is_rotational())?;
-        fields_deg.iter_mut().for_each(|field_deg| *field_deg = field_deg.abs());
-        fields_deg.sort_by(f64::total_cmp);
-        fields_deg.dedup();
-        Some(fields_deg)
+    /// Returns where the film is that nobody asked for: at the image plane that the file states, else where the spot on the axis is
+    /// smallest.
+    pub fn film(&self) -> AnalysisFilm {
+        self.film_distance_mm.map_or(AnalysisFilm::BestFocus, AnalysisFilm::OfFile)
+    }
+
+    /// Returns the field angles along x and y that stand for those of the file, degrees: of a lens with an axis of symmetry all
+    /// to the right of the axis, each once; `None` where the file names none.
+    pub fn psf_fields_deg(&self, wavelength_nm: f64) -> Option<Vec<[f64; 2]>> {
+        if self.lens.is_rotational() {
+            let mut fields_deg = self.drawing_fields_deg(wavelength_nm)?;
+            fields_deg.iter_mut().for_each(|field_deg| *field_deg = field_deg.abs());
+            fields_deg.sort_by(f64::total_cmp);
+            fields_deg.dedup();
+            return Some(fields_deg.into_iter().map(|field_deg| [field_deg, 0.0]).collect());
+        }
+        let way_mm = self.distance_mm + self.lens.at(wavelength_nm).ok()?.projection_center_z_mm();
+        let of_height = |height_mm: &[f64; 2]| height_mm.map(|mm| (mm / way_mm).atan().to_degrees());
+        match self.analysis_fields(wavelength_nm)? {
+            AnalysisFields::AnglesDeg(angles_deg) => Some(angles_deg),
+            AnalysisFields::HeightsMm(heights_mm) => Some(heights_mm.iter().map(of_height).collect()),
+            AnalysisFields::ByLight => None,
+        }
     }
 
     /// Returns the one wavelength that stands where none is asked for, nm: the file's main one, else as

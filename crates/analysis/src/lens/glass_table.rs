@@ -45,12 +45,18 @@ pub fn glass_rows(part: &str) -> Vec<GlassRow> {
     catalogue.glasses().iter().filter(|g| g.full_name().to_lowercase().contains(&part)).map(row).collect()
 }
 
-/// Returns a glass of the catalogue with its index at these wavelengths, nm, which may be outside the range in which it is known.
+/// Returns a glass of the catalogue with its index at these wavelengths, nm, which may be outside the range in which it is known; of a name
+/// that several makers have, the glass of the first of `makers` that has it.
 ///
 /// # Errors
 /// When the name means no glass or several, or the glass is not known at a wavelength and not to be continued, or cannot be.
-pub fn glass_data(name: &str, wavelengths_nm: &[f64], range: GlassRange) -> Result<GlassData, PipelineError> {
-    let found = GlassCatalogue::built_in().find(name)?;
+pub fn glass_data(
+    name: &str,
+    makers: &[String],
+    wavelengths_nm: &[f64],
+    range: GlassRange,
+) -> Result<GlassData, PipelineError> {
+    let found = GlassCatalogue::built_in().find_among(name, makers)?;
     let at = |&nm: &f64| match range {
         GlassRange::Refuse => Ok((found.glass.index_at(nm)?, 0.0)),
         GlassRange::Extend => found.glass.extended_at(nm).map(|extended| (extended.index, extended.possible_error)),
@@ -78,11 +84,11 @@ mod tests {
     fn bk7_is_found_with_its_index() {
         assert!(glass_rows("n-bk7").iter().any(|row| row.name == "N-BK7"));
         assert!(glass_rows("").len() > 1000);
-        let data = glass_data("SCHOTT:N-BK7", &[587.5618], GlassRange::Refuse).unwrap();
+        let data = glass_data("SCHOTT:N-BK7", &[], &[587.5618], GlassRange::Refuse).unwrap();
         // The maker's data sheet: n_d 1.51680.
         assert!((data.indices[0] - 1.5168).abs() < 5e-6);
-        let message = glass_data("N-BK7", &[100.0], GlassRange::Refuse).unwrap_err().to_string();
+        let message = glass_data("N-BK7", &[], &[100.0], GlassRange::Refuse).unwrap_err().to_string();
         assert!(message.contains("100 nm"), "{message}");
-        assert!(glass_data("no such glass", &[500.0], GlassRange::Extend).is_err());
+        assert!(glass_data("no such glass", &[], &[500.0], GlassRange::Extend).is_err());
     }
 }

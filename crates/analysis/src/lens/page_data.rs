@@ -2,7 +2,7 @@
 
 use dioptric_optics::Lens;
 
-use crate::{AnalysisRequest, LensAnalysis, LensData, LensDefaults, LensInfoRequest, LensModulation};
+use crate::{AnalysisRequest, LensAnalysis, LensCurves, LensData, LensDefaults, LensInfoRequest, LensModulation};
 use dioptric_pipeline::PipelineError;
 
 /// The widest field that third-order sums are shown of, degrees.
@@ -19,8 +19,17 @@ pub struct LensPageData {
     pub data: Vec<LensData>,
     /// The field that its third-order sums are of, degrees.
     pub sums_field_deg: f64,
+    /// Curves over field, focus and wavelength.
+    pub curves: LensCurves,
     /// The modulation, or why there is none.
     pub modulation: Result<LensModulation, String>,
+}
+
+/// Returns the shortest and the longest of several wavelengths, nm: those between which color is counted.
+pub fn ends_of(wavelengths_nm: &[f64]) -> Option<[f64; 2]> {
+    let ends = |[first, last]: [f64; 2], nm: &f64| [first.min(*nm), last.max(*nm)];
+    let [first_nm, last_nm] = wavelengths_nm.iter().fold([f64::INFINITY, 0.0], ends);
+    (first_nm < last_nm).then_some([first_nm, last_nm])
 }
 
 impl LensPageData {
@@ -34,14 +43,16 @@ impl LensPageData {
         // Third-order sums say little of wide fields.
         let sums_field_deg = field_deg.min(MOST_FIELD_OF_SUMS_DEG);
         let distance_mm = Some(request.distance_mm).filter(|mm| mm.is_finite());
+        let ends_nm = ends_of(&request.wavelengths_nm);
         let data = |&wavelength_nm: &f64| {
             let question =
-                LensInfoRequest { wavelength_nm, distance_mm, field_deg: sums_field_deg, instead_of_f_and_c_nm: None };
+                LensInfoRequest { wavelength_nm, distance_mm, field_deg: sums_field_deg, colors_nm: ends_nm };
             LensData::new(&used.lens, &question)
         };
         let weights = used.weights_of(&request.wavelengths_nm);
         Ok(Self {
             data: request.wavelengths_nm.iter().map(data).collect::<Result<_, _>>()?,
+            curves: analysis.lens_curves(&lens)?,
             modulation: analysis.modulation(&lens, &weights).map_err(|error| error.to_string()),
             surface_comments: used.surface_comments.clone(),
             sums_field_deg,

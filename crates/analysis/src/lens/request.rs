@@ -1,12 +1,14 @@
 //! What to analyze a lens for.
 
+use std::f64::consts::FRAC_PI_2;
+
 use dioptric_optics::{
     MonoLens, ObjectPoint,
-    analysis::{PupilLight, PupilRule, STEEPEST_FIELD_DEG, field_limit_along_deg},
+    analysis::{PupilLight, PupilRule, STEEPEST_FIELD_DEG, WIDEST_FIELD_DEG, field_limit_along_deg},
     glam::DVec2,
 };
 
-use super::rows::FieldPlace;
+use super::{film::AnalysisFilm, rows::FieldPlace};
 use dioptric_pipeline::PipelineError;
 
 /// The share of the axial illumination down to which fields are chosen where none are given.
@@ -14,24 +16,13 @@ const DIMMEST: f64 = 0.25;
 /// How wide a spot may be, twice its root mean square, over the focal length, for fields to be chosen up to there.
 const WIDEST_SPOT: f64 = 0.05;
 
-/// Where the film is for an analysis.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum AnalysisFilm {
-    /// Where the spot on the axis is smallest, all wavelengths together.
-    BestFocus,
-    /// At the paraxial image, at the reference wavelength, of an object this far before the first vertex, mm.
-    FocusMm(f64),
-    /// This far behind the last vertex, mm.
-    FilmMm(f64),
-}
-
 /// The points of the field that are looked at.
 #[derive(Clone, Debug, PartialEq)]
 pub enum AnalysisFields {
     /// 0, 0.5, 0.7 and 1 of the field above the axis at which the illumination falls to a quarter; of a lens that is not
     /// rotationally symmetric the axis, that field above it, that beside it, and 0.7 of both.
     ByLight,
-    /// Angles at the entrance pupil in the x–z and the y–z plane, degrees.
+    /// Angles at the entrance pupil in the x–z and the y–z plane, degrees; of a far object up to 120 along one of them.
     AnglesDeg(Vec<[f64; 2]>),
     /// Places of the object point along x and y, mm from the axis; the object must not be far away.
     HeightsMm(Vec<[f64; 2]>),
@@ -61,44 +52,65 @@ pub struct AnalysisRequest {
     pub n_rings: usize,
 }
 
-/// A point of the field: its name, and the tangents of its angles.
+/// A point of the field: its name, and its angle from the axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Field {
     pub(super) place: FieldPlace,
-    pub(super) tan: DVec2,
+    /// Of a far point up to that of [`WIDEST_FIELD_DEG`].
+    pub(super) angle_rad: f64,
     /// The unit vector from the axis to the point; upwards on the axis.
     pub(super) direction: DVec2,
 }
 
 impl Field {
     fn of_angles([x_deg, y_deg]: [f64; 2]) -> Self {
-        let tan = DVec2::new(x_deg.to_radians().tan(), y_deg.to_radians().tan());
-        let field_deg = if x_deg == 0.0 { y_deg.abs() } else { tan.length().atan().to_degrees() };
+        let (field_deg, direction) = match (x_deg == 0.0, y_deg == 0.0) {
+            (true, _) => (y_deg.abs(), DVec2::new(0.0, if y_deg < 0.0 { -1.0 } else { 1.0 })),
+            (false, true) => (x_deg.abs(), DVec2::new(x_deg.signum(), 0.0)),
+            (false, false) => {
+                let tan = DVec2::new(x_deg.to_radians().tan(), y_deg.to_radians().tan());
+                (tan.length().atan().to_degrees(), tan.normalize())
+            }
+        };
         let place = FieldPlace { field_deg, field_xy_deg: [x_deg, y_deg], object_mm: None };
-        Self { place, tan, direction: direction_of(tan) }
+        Self { place, angle_rad: field_deg.to_radians(), direction }
     }
 
-    fn of_tan(tan: DVec2) -> Self {
-        let field_xy_deg = tan.to_array().map(|tan| tan.atan().to_degrees());
-        let place = FieldPlace { field_deg: tan.length().atan().to_degrees(), field_xy_deg, object_mm: None };
-        Self { place, tan, direction: direction_of(tan) }
+    /// Returns the field of this name.
+    pub(super) fn of_place(place: &FieldPlace) -> Self {
+        Self { place: *place, ..Self::of_angles(place.field_xy_deg) }
+    }
+
+    /// Returns the field at this angle in a direction, a unit vector.
+    fn along(direction: DVec2, field_deg: f64) -> Self {
+        match (direction.x == 0.0, direction.y == 0.0) {
+            (true, _) => Self::of_angles([0.0, direction.y * field_deg]),
+            (_, true) => Self::of_angles([direction.x * field_deg, 0.0]),
+            (false, false) => {
+                let tan = direction * field_deg.to_radians().tan();
+                let field_xy_deg = tan.to_array().map(|tan| tan.atan().to_degrees());
+                let place = FieldPlace { field_deg, field_xy_deg, object_mm: None };
+                Self { place, angle_rad: field_deg.to_radians(), direction }
+            }
+        }
     }
 
     /// Returns the field at a share of the angle from the axis.
     pub(super) fn at_share(&self, share: f64) -> Self {
-        let [x_deg, y_deg] = self.place.field_xy_deg;
-        let field = match x_deg == 0.0 {
-            true => Self::of_angles([x_deg, share * y_deg]),
-            false => Self::of_tan(self.direction * (share * self.place.field_deg).to_radians().tan()),
-        };
-        Self { direction: self.direction, ..field }
+        Self { direction: self.direction, ..Self::along(self.direction, share * self.place.field_deg) }
     }
-}
 
-fn direction_of(tan: DVec2) -> DVec2 {
-    match tan.x == 0.0 {
-        true => DVec2::new(0.0, if tan.y < 0.0 { -1.0 } else { 1.0 }),
-        false => tan.normalize(),
+    /// The tangent of the angle; `None` from 90° on.
+    pub(super) fn tan(&self) -> Option<f64> {
+        (self.angle_rad < FRAC_PI_2).then(|| self.angle_rad.tan())
+    }
+
+    /// Returns the point, `dioptres` = 1/Z away, as [`ObjectPoint::from_field`] has it.
+    pub(super) fn point(&self, lens: &MonoLens, dioptres: f64) -> ObjectPoint {
+        match dioptres == 0.0 {
+            true => ObjectPoint::far(self.angle_rad, self.direction),
+            false => ObjectPoint::from_field(lens, self.direction * self.angle_rad.tan(), dioptres),
+        }
     }
 }
 
@@ -108,9 +120,17 @@ impl AnalysisRequest {
         let n_fields = match &self.fields {
             AnalysisFields::ByLight => 1,
             AnalysisFields::AnglesDeg(fields) => {
-                let all = fields.iter().flatten();
-                if let Some(field) = all.clone().find(|field| !(-90.0..90.0).contains(*field) || **field == -90.0) {
-                    return Err(wrong("fields_deg", *field, "angles above -90 and below 90 degrees"));
+                let is_beyond = |field: &&[f64; 2]| {
+                    let [x, y] = field.map(f64::abs);
+                    let is_alone = self.distance_mm.is_infinite() && x.min(y) == 0.0;
+                    let widest = if is_alone { x.max(y) <= WIDEST_FIELD_DEG } else { x.max(y) < 90.0 };
+                    !widest || x.is_nan() || y.is_nan()
+                };
+                if let Some([x, y]) = fields.iter().find(is_beyond) {
+                    let field = if x.abs() > y.abs() || x.is_nan() { x } else { y };
+                    let expected =
+                        "angles of up to 120 degrees along x or along y of a far object, else below 90 degrees";
+                    return Err(wrong("fields_deg", *field, expected));
                 }
                 fields.len()
             }
@@ -138,7 +158,8 @@ impl AnalysisRequest {
 
     /// Returns the fields of a lens, of which none is steeper than rays are looked for, and what there is to say of them.
     pub(super) fn fields_of(&self, lens: &MonoLens, way_mm: f64) -> (Vec<Field>, Vec<String>) {
-        let steepest_tan = STEEPEST_FIELD_DEG.to_radians().tan();
+        // Far points are looked at by their angles, which end nowhere.
+        let steepest_deg = if self.distance_mm.is_infinite() { WIDEST_FIELD_DEG } else { STEEPEST_FIELD_DEG };
         let mut notes = Vec::new();
         let fields: Vec<Field> = match &self.fields {
             AnalysisFields::ByLight => {
@@ -152,7 +173,7 @@ impl AnalysisRequest {
                 }
                 if end == FieldEnd::Steepest {
                     notes.push(format!(
-                        "the light has not fallen to a quarter at {STEEPEST_FIELD_DEG}°, the steepest field that is \
+                        "the light has not fallen to a quarter at {steepest_deg}°, the steepest field that is \
                          looked at: the fields are shares of that"
                     ));
                 }
@@ -163,22 +184,22 @@ impl AnalysisRequest {
             }
             AnalysisFields::HeightsMm(heights_mm) => {
                 let of_height = |&height_mm: &[f64; 2]| {
-                    let field = Field::of_tan(DVec2::from_array(height_mm) / way_mm);
+                    let tan = DVec2::from_array(height_mm) / way_mm;
+                    let upwards = DVec2::new(0.0, if tan.y < 0.0 { -1.0 } else { 1.0 });
+                    let direction = if tan.x == 0.0 { upwards } else { tan.normalize() };
+                    let field = Field::along(direction, tan.length().atan().to_degrees());
                     Field { place: FieldPlace { object_mm: Some(height_mm), ..field.place }, ..field }
                 };
                 heights_mm.iter().map(of_height).collect()
             }
         };
-        let cut = |field: Field| match field.tan.length() > steepest_tan {
+        let cut = |field: Field| match field.place.field_deg > steepest_deg {
             true => {
                 notes.push(format!(
-                    "the field of {} is cut to {STEEPEST_FIELD_DEG}°, the steepest that is looked at",
+                    "the field of {} is cut to {steepest_deg}°, the steepest that is looked at",
                     field.place.label()
                 ));
-                match field.place.field_xy_deg {
-                    [0.0, y_deg] => Field::of_angles([0.0, STEEPEST_FIELD_DEG.copysign(y_deg)]),
-                    _ => Field::of_tan(field.direction * steepest_tan),
-                }
+                Field::along(field.direction, steepest_deg)
             }
             false => field,
         };
@@ -200,12 +221,13 @@ enum FieldEnd {
 
 /// Returns fields up to where the light falls to a quarter or no longer comes together, and which of them ends the fields.
 fn by_light(lens: &MonoLens, dioptres: f64) -> (Vec<Field>, FieldEnd) {
+    let steepest_deg = if dioptres == 0.0 { WIDEST_FIELD_DEG } else { STEEPEST_FIELD_DEG };
     let limit_deg = |direction| {
         let by_light_deg = field_limit_along_deg(lens, DIMMEST, direction, dioptres).unwrap_or(0.0);
         let by_blur_deg = blur_limit_deg(lens, direction, dioptres, by_light_deg);
         let end = match by_blur_deg {
             Some(_) => FieldEnd::Blur,
-            None if by_light_deg >= STEEPEST_FIELD_DEG => FieldEnd::Steepest,
+            None if by_light_deg >= steepest_deg => FieldEnd::Steepest,
             None => FieldEnd::Light,
         };
         (by_blur_deg.unwrap_or(by_light_deg), end)
@@ -233,7 +255,7 @@ fn blur_limit_deg(lens: &MonoLens, direction: DVec2, dioptres: f64, last_deg: f6
     let film_mm = lens.film_distance_mm_for(if dioptres == 0.0 { f64::INFINITY } else { distance_mm }).ok()?;
     let widest_mm = WIDEST_SPOT * lens.first_order().efl_mm.abs();
     let is_spot = |field_deg: f64| {
-        let point = ObjectPoint::from_field(lens, direction * field_deg.to_radians().tan(), dioptres);
+        let point = Field::along(direction, field_deg).point(lens, dioptres);
         let light = PupilLight::to_film(lens, &point, film_mm, PupilRule::of_rings(3));
         light.is_some_and(|light| {
             let (_, [xx, yy, _]) = light.moments(lens, film_mm);

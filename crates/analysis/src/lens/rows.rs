@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use crate::PlaneData;
+use dioptric_pipeline::number;
 
 /// The real-ray analysis of a lens.
 ///
@@ -41,6 +42,8 @@ pub struct LensAnalysis {
     /// Where the film is, behind the last vertex, mm.
     #[serde(rename = "film_mm")]
     pub film_distance_mm: f64,
+    /// What is there, in a few words: the image plane of the lens's file, a focus, or what was asked for.
+    pub film: String,
     /// Radius of the film, mm, positive where its center lies behind; none for a flat one.
     pub film_radius_mm: Option<f64>,
     /// The field at which the illumination of a far object falls to half, degrees.
@@ -78,12 +81,17 @@ impl FieldPlace {
     /// Returns the field in a few characters: `12.0°`, `5.0°/10.0°` along x and y, or `0.05 mm`.
     pub fn label(&self) -> String {
         match (self.object_mm, self.field_xy_deg) {
-            (Some([0.0, y_mm]), _) => format!("{y_mm} mm"),
-            (Some([x_mm, y_mm]), _) => format!("{x_mm}/{y_mm} mm"),
-            (None, [0.0, y_deg]) => format!("{y_deg:.1}°"),
-            (None, [x_deg, y_deg]) => format!("{x_deg:.1}°/{y_deg:.1}°"),
+            (Some([0.0, y_mm]), _) => format!("{} mm", number(y_mm)),
+            (Some([x_mm, y_mm]), _) => format!("{}/{} mm", number(x_mm), number(y_mm)),
+            (None, [0.0, y_deg]) => degrees(y_deg),
+            (None, [x_deg, y_deg]) => format!("{}/{}", degrees(x_deg), degrees(y_deg)),
         }
     }
+}
+
+/// Returns an angle as people write it: without a sign of nothing.
+fn degrees(angle_deg: f64) -> String {
+    format!("{:.1}°", (10.0 * angle_deg).round() / 10.0 + 0.0)
 }
 
 /// A chief ray of a grid of fields on the film, at the reference wavelength.
@@ -107,7 +115,7 @@ pub struct OpdMap {
     pub wavelength_nm: f64,
     /// Cells across the stop.
     pub n_across: usize,
-    /// Waves in each cell, positive for late light: rows from the bottom of the stop, each from its left (lens frame); none
+    /// Waves in each cell, positive where the wavefront is ahead: rows from the bottom of the stop, each from its left (lens frame); none
     /// outside the pupil.
     pub waves: Vec<Option<f64>>,
 }
@@ -185,10 +193,15 @@ pub struct WavefrontRow {
     pub rms_waves: f64,
     /// Largest less least, waves.
     pub peak_to_valley_waves: f64,
-    /// Strehl's ratio.
-    pub strehl: f64,
-    /// Zernike coefficients over the unit disc of the stop, in Noll's order from piston, waves rms.
+    /// Strehl's ratio: the highest point of the point spread function over that of the same light all in phase; none of a blur that
+    /// needs more nodes than a wave sum has.
+    pub strehl: Option<f64>,
+    /// What Maréchal's formula makes of the root mean square, exp(−(2πσ)²): within a hundredth down to ratios of 0.8.
+    pub strehl_of_rms: f64,
+    /// Zernike coefficients over the unit disc of the stop, in Noll's order from piston, waves rms: OpticStudio's standard ones.
     pub zernike_waves: Vec<f64>,
+    /// Coefficients of the 37 polynomials of the Fringe set, waves at the edge of that disc.
+    pub fringe_waves: Vec<f64>,
 }
 
 /// The edge of the true, vignetted pupil of a point in the plane of the paraxial entrance pupil.
@@ -218,7 +231,8 @@ pub struct FanRow {
     pub tangential_um: Vec<Option<f64>>,
     /// Transverse aberration along x of rays along x, µm.
     pub sagittal_um: Vec<Option<f64>>,
-    /// Optical path difference of rays along y, waves; positive for late light.
+    /// Optical path difference of rays along y, waves; positive where the wavefront is ahead of the
+    /// sphere about the chief ray's image, the sign of OpticStudio, CODE V and the third-order sums.
     pub tangential_waves: Vec<Option<f64>>,
     /// Optical path difference of rays along x, waves.
     pub sagittal_waves: Vec<Option<f64>>,

@@ -65,8 +65,12 @@ pub struct LensData {
     pub first_order: FirstOrder,
     /// The f-number by the real rays of the far point on the axis; `None` where none get through.
     pub real_f_number: Option<f64>,
-    /// Whether the stop limits the light of that point. Where it does not, f-number and diameters of pupils are those of the
-    /// beam that the rims let through.
+    /// The f-number of the round beam with as much light, of a lens whose pupil is no whole disc: with openings of other shapes or
+    /// obscurations, tilted or decentered.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub f_number_of_light: Option<f64>,
+    /// Whether the stop limits the light of the point on the axis at the object's distance. Where it does not, f-number and
+    /// diameters of pupils are those of the beam that the rims let through.
     pub stop_limits: bool,
     /// The surface whose rim limits it, counted from 0.
     pub limiting_surface: usize,
@@ -81,6 +85,9 @@ pub struct LensData {
     pub half_light_field_deg: Option<f64>,
     /// The field angle at which hardly any light is left, 1 %, degrees.
     pub last_light_field_deg: Option<f64>,
+    /// Distance of the film behind the last vertex that the lens's file states, mm.
+    #[serde(rename = "film_mm", skip_serializing_if = "Option::is_none")]
+    pub film_distance_mm: Option<f64>,
     /// The image of an object at the distance asked for.
     #[serde(flatten)]
     pub image: Option<ImageData>,
@@ -117,16 +124,16 @@ pub struct LensInfoRequest {
     pub distance_mm: Option<f64>,
     /// Half field of the third-order sums, degrees.
     pub field_deg: f64,
-    /// The two wavelengths, the shorter first, between which those sums count color where the lens is not known at the
-    /// F and C lines, as one for the infrared; without them the sums have no color.
-    pub instead_of_f_and_c_nm: Option<[f64; 2]>,
+    /// The two wavelengths, the shorter first, between which those sums count color; the F and C lines where none are named or
+    /// the lens is not known at them. A lens that is not known there either has sums without color.
+    pub colors_nm: Option<[f64; 2]>,
 }
 
 impl LensInfoRequest {
     /// Returns the wavelengths between which color is counted, nm.
     fn colors_nm(&self, lens: &Lens) -> Option<[f64; 2]> {
         let is_known = |lines_nm: &[f64; 2]| lines_nm.iter().all(|&nm| lens.at(nm).is_ok());
-        [Some([F_LINE_NM, C_LINE_NM]), self.instead_of_f_and_c_nm].into_iter().flatten().find(is_known)
+        [self.colors_nm, Some([F_LINE_NM, C_LINE_NM])].into_iter().flatten().find(is_known)
     }
 }
 
@@ -141,6 +148,10 @@ pub struct ImageData {
     pub magnification: f64,
     /// f-number of the cone at the image.
     pub working_f_number: f64,
+    /// Numerical aperture at the object, of real rays; `None` where no light gets through on the axis.
+    pub object_na: Option<f64>,
+    /// Numerical aperture at the image, of real rays.
+    pub image_na: Option<f64>,
 }
 
 impl PlaneData {
@@ -154,7 +165,7 @@ impl PlaneData {
 impl LensData {
     /// Returns what of the data of a lens is left out and why, in one sentence; nothing where it has all.
     pub fn note_on_third_order(lens: &Lens) -> Option<String> {
-        (!lens.is_rotational()).then(|| {
+        (!lens.is_centered_and_rotational()).then(|| {
             format!(
                 "{}: third-order sums and Petzval's radius are left out: only a centered lens of revolution has them",
                 lens.name()
@@ -179,26 +190,30 @@ impl LensData {
             object_distance_mm: distance_mm.unwrap_or(f64::INFINITY),
             chief_slope: field_deg.to_radians().tan(),
         };
-        let has_sums = lens.is_rotational();
+        let has_sums = lens.is_centered_and_rotational();
         let mut seidel = has_sums.then(|| lens.seidel(&settings)).transpose()?;
         if let (Some(seidel), None) = (&mut seidel, colors_nm) {
             for sums in seidel.per_surface.iter_mut().chain([&mut seidel.total]) {
                 (sums.c1, sums.c2) = (f64::NAN, f64::NAN);
             }
         }
-        let (first, limit) = (mono.first_order(), mono.limiting_beam());
+        let object_distance_mm = distance_mm.unwrap_or(f64::INFINITY);
+        let (first, limit) = (mono.first_order_for(object_distance_mm), mono.limiting_beam_for(object_distance_mm));
+        let has_odd_apertures = !lens.is_rotational() || mono.n_obscurations() > 0;
         let [half_light_field_deg, last_light_field_deg] = field_limits_deg(&mono, [0.5, 0.01]);
         Ok(Self {
             lens: lens.name().to_owned(),
             configurations: Vec::new(),
             first_order: first,
             real_f_number: mono.real_f_number(),
-            stop_limits: limit.is_none(),
+            f_number_of_light: has_odd_apertures.then(|| mono.f_number_of_light()).flatten(),
+            stop_limits: limit.is_none_or(|beam| beam.limiting_surface == mono.stop()),
             limiting_surface: limit.map_or(mono.stop(), |beam| beam.limiting_surface),
             pupil_magnification: first.pupil_magnification(),
             petzval_radius_mm: has_sums.then(|| petzval_radius_mm(lens, &mono)).transpose()?,
             half_light_field_deg,
             last_light_field_deg,
+            film_distance_mm: None,
             image: distance_mm.map(|distance_mm| image_of(&mono, distance_mm)).transpose()?,
             seidel_colors_nm: colors_nm,
             seidel: seidel.as_ref().map(|seidel| seidel.total),
@@ -226,7 +241,10 @@ fn image_of(lens: &MonoLens, distance_mm: f64) -> Result<ImageData, PipelineErro
         });
     }
     let conjugate = lens.conjugate(distance_mm);
+    let beam = lens.axial_beam(distance_mm);
     Ok(ImageData {
+        object_na: beam.map(|beam| lens.object_index() * beam.slope_before.atan().sin().abs()),
+        image_na: beam.map(|beam| lens.image_index() * beam.sine_after),
         distance_mm,
         image_distance_mm: conjugate.image_z_mm,
         magnification: conjugate.magnification,
@@ -277,7 +295,7 @@ mod tests {
     use approx::assert_relative_eq;
 
     fn question(distance_mm: Option<f64>) -> LensInfoRequest {
-        LensInfoRequest { wavelength_nm: 550.0, distance_mm, field_deg: 10.0, instead_of_f_and_c_nm: None }
+        LensInfoRequest { wavelength_nm: 550.0, distance_mm, field_deg: 10.0, colors_nm: None }
     }
 
     #[test]
@@ -326,14 +344,14 @@ mod tests {
         let question = LensInfoRequest { wavelength_nm: 10e3, ..question(None) };
         let data = LensData::new(&lens, &question).unwrap();
         assert!(data.seidel_colors_nm.is_none() && data.seidel.unwrap().c1.is_nan() && data.seidel.unwrap().s1 > 0.0);
-        let ends = LensInfoRequest { instead_of_f_and_c_nm: Some([8e3, 12e3]), ..question };
+        let ends = LensInfoRequest { colors_nm: Some([8e3, 12e3]), ..question };
         let data = LensData::new(&lens, &ends).unwrap();
         assert_eq!(data.seidel_colors_nm, Some([8e3, 12e3]));
         // C1 of one surface with the marginal ray coming in straight: A y Δ(δn/n) = c y² δn/n.
         let index = |nm: f64| lens.at(nm).unwrap().image_index();
         let expected = 12.0 * 12.0 / 50.0 * (index(8e3) - index(12e3)) / index(10e3);
         assert_relative_eq!(data.seidel.unwrap().c1, expected, max_relative = 1e-12);
-        let narrower = LensInfoRequest { instead_of_f_and_c_nm: Some([1e3, 12e3]), ..question };
+        let narrower = LensInfoRequest { colors_nm: Some([1e3, 12e3]), ..question };
         assert!(LensData::new(&lens, &narrower).unwrap().seidel_colors_nm.is_none());
     }
 

@@ -98,9 +98,19 @@ impl PsfSet {
     }
 
     fn modulation(&self, plotted: &[Plotted<'_>], reach_per_mm: f64) -> LineChart {
-        let mut lines = self.lines(plotted, |p, direction| {
-            steps(reach_per_mm).map(|f| (f, p.whole.modulation(direction, f))).collect()
+        let mut lines = self.lines(plotted, |p, direction| match &p.row.curves {
+            Some(curves) => {
+                let which = usize::from(direction != p.row.meridian_rad());
+                curves.modulation.iter().filter(|at| at.0 <= reach_per_mm).map(|(f, m, _)| (*f, m[which])).collect()
+            }
+            None => steps(reach_per_mm).map(|f| (f, p.whole.modulation(direction, f))).collect(),
         });
+        if let Some(curves) = plotted.iter().find_map(|p| p.row.curves.as_ref()) {
+            let within = curves.modulation.iter().filter(|at| at.0 <= reach_per_mm);
+            let points = within.map(|(f, _, limit)| (*f, limit[0])).collect();
+            let label = Some("diffraction limit".to_owned());
+            lines.push(Series { label, color: "#888888".to_owned(), points, is_dashed: false });
+        }
         if let Some(first) = self.points().next().filter(|point| point.len() > 1) {
             let start = first.start;
             let words = self.point_words(&self.rows[start]);
@@ -144,15 +154,20 @@ impl PsfSet {
         (title, x_label): (&str, &str),
         of: impl Fn(&Picture) -> EnclosedEnergy,
     ) -> LineChart {
+        let is_round = title.starts_with("Encircled");
         let energies: Vec<EnclosedEnergy> = plotted.iter().map(|p| of(&p.picture)).collect();
         let reach_um = energies.iter().map(|energy| energy.reach_um(0.98)).fold(0.0, f64::max) * 1.2;
         let lines = energies.iter().zip(plotted).enumerate().map(|(i, (energy, p))| Series {
             label: Some(self.label(p.row)),
             color: palette::line(i),
-            points: steps(reach_um).map(|reach| (reach, energy.within(reach))).collect(),
+            points: match p.row.curves.as_ref().filter(|_| is_round) {
+                Some(curves) => curves.encircled.iter().copied().filter(|(radius, _)| *radius <= reach_um).collect(),
+                None => steps(reach_um).map(|reach| (reach, energy.within(reach))).collect(),
+            },
             is_dashed: false,
         });
-        let y = ("share of the picture", Some((0.0, 1.0)));
+        let is_of_waves = is_round && plotted.iter().all(|p| p.row.curves.is_some());
+        let y = (if is_of_waves { "share of all light" } else { "share of the picture" }, Some((0.0, 1.0)));
         LineChart { legend: Corner::BottomRight, ..chart(title, (x_label, (0.0, reach_um)), y, lines.collect()) }
     }
 
@@ -261,17 +276,17 @@ mod tests {
     use dioptric_optics::Lens;
 
     use super::*;
+    use crate::AnalysisFilm;
     use crate::{PsfRequest, PsfSampling};
-    use dioptric_pipeline::FocusSpec;
     use dioptric_psf::Diffraction;
 
     fn request() -> PsfRequest {
         PsfRequest {
-            fields_deg: vec![0.0, 5.0],
-            field_y_deg: 0.0,
+            fields_deg: vec![[0.0, 0.0], [5.0, 0.0]],
             distances_mm: vec![8000.0],
             wavelengths_nm: vec![450.0, 600.0],
-            focus: FocusSpec::FilmMm(51.8145),
+            film: AnalysisFilm::FilmMm(51.8145),
+            focus_nm: Vec::new(),
             diffraction: Diffraction::Hurb { gamma: 1.0 },
             pixel_um: 4.0,
             size: None,
@@ -337,7 +352,7 @@ mod tests {
     fn a_set_of_many_shows_a_few_of_all() {
         let lens = Lens::built_in("paper-2el").unwrap().with_stop_diameter_mm(2.0).unwrap();
         let request = PsfRequest {
-            fields_deg: vec![0.0, 1.0, 2.0],
+            fields_deg: vec![[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]],
             distances_mm: vec![4000.0, 8000.0],
             wavelengths_nm: vec![450.0, 550.0, 650.0],
             diffraction: Diffraction::None,

@@ -86,7 +86,15 @@ impl PsfSet {
         let row = PsfRow::measure(name, centroid_mm, second, &Picture::new(picture.view(), self.pixel_um))
             .with_mtf(mtf_per_mm, |direction, f| self.modulation_of(&pictures, direction, f));
         Some(PolychromaticPsf {
-            row: PsfRow { is_polychromatic: true, energy, picture_share, wave_fraction, ..row },
+            row: PsfRow {
+                is_polychromatic: true,
+                film_distance_mm: first.film_distance_mm,
+                film: first.film.clone(),
+                energy,
+                picture_share,
+                wave_fraction,
+                ..row
+            },
             picture,
         })
     }

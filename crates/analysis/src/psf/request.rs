@@ -3,7 +3,8 @@
 use dioptric_optics::{Lens, MonoLens, glam::DVec2};
 use dioptric_psf::{Diffraction, ImageSettings, PointImage, PsfError};
 
-use dioptric_pipeline::{FocusSpec, PipelineError, REFERENCE_WAVELENGTH_NM, nearest_to_reference_nm};
+use crate::{AnalysisFilm, FilmPlace, FilmUse};
+use dioptric_pipeline::{PipelineError, REFERENCE_WAVELENGTH_NM, nearest_to_reference_nm};
 
 /// Wavelengths that are seen.
 const VISIBLE_NM: std::ops::RangeInclusive<f64> = 380.0..=780.0;
@@ -16,16 +17,16 @@ const AZIMUTHS: usize = 96;
 /// Which point-spread functions to compute, and how.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PsfRequest {
-    /// Field angles at the entrance pupil, to the right of the picture, degrees.
-    pub fields_deg: Vec<f64>,
-    /// How far above the axis all of these fields lie, degrees.
-    pub field_y_deg: f64,
+    /// Field angles at the entrance pupil, to the right of the picture and upwards, degrees.
+    pub fields_deg: Vec<[f64; 2]>,
     /// Distances of the points before the first vertex, mm; infinity for a star.
     pub distances_mm: Vec<f64>,
     /// Wavelengths, nm.
     pub wavelengths_nm: Vec<f64>,
-    /// Where the film is; a near object has no meaning here.
-    pub focus: FocusSpec,
+    /// Where the film is.
+    pub film: AnalysisFilm,
+    /// Wavelengths that are in focus together on a film that is sought, nm; none for those of the pictures.
+    pub focus_nm: Vec<f64>,
     /// Diffraction at the stop.
     pub diffraction: Diffraction,
     /// Side of a pixel, µm.
@@ -95,12 +96,23 @@ impl PsfRequest {
         Ok(self.reference(lens)?.wavelength_nm())
     }
 
+    /// Returns where the film is: of a focus to be found, that of the first distance.
+    ///
+    /// # Errors
+    /// When the lens is not known at a wavelength, or has no image to focus on.
+    pub fn film_place(&self, lens: &Lens) -> Result<FilmPlace, PipelineError> {
+        let reference_nm = self.reference_nm(lens)?;
+        let wavelengths_nm = if self.focus_nm.is_empty() { &self.wavelengths_nm } else { &self.focus_nm };
+        let distance_mm = self.distances_mm.first().copied().unwrap_or(f64::INFINITY);
+        self.film.place(lens, FilmUse { wavelengths_nm, reference_nm, distance_mm })
+    }
+
     /// Returns the points: fields outermost, then distances, then wavelengths.
     pub(crate) fn items(&self, lens: &Lens) -> Result<Vec<Item>, PipelineError> {
         let reference = self.reference(lens)?;
         let pupil_z_mm = reference.projection_center_z_mm();
         let mut items = Vec::new();
-        for &field_deg in &self.fields_deg {
+        for &[field_deg, field_y_deg] in &self.fields_deg {
             for &distance_mm in &self.distances_mm {
                 let z_mm = distance_mm + pupil_z_mm;
                 if z_mm <= 0.0 {
@@ -110,7 +122,7 @@ impl PsfRequest {
                 let dioptres = 1e3 / z_mm;
                 items.extend(self.wavelengths_nm.iter().map(|&wavelength_nm| Item {
                     field_deg,
-                    field_y_deg: self.field_y_deg,
+                    field_y_deg,
                     distance_mm,
                     wavelength_nm,
                     dioptres,
@@ -132,7 +144,7 @@ impl PsfRequest {
     }
 
     pub(crate) fn check(&self) -> Result<(), PipelineError> {
-        for &field in self.fields_deg.iter().chain([&self.field_y_deg]) {
+        for &field in self.fields_deg.iter().flatten() {
             if field.is_nan() || field.abs() >= 89.9 {
                 return Err(self.wrong("fields_deg", &field.to_string(), "angles below 89.9 degrees"));
             }

@@ -2,7 +2,7 @@
 
 use std::{f64::consts::FRAC_PI_2, fmt::Write};
 
-use dioptric_diffraction::Covariance;
+use dioptric_diffraction::{Covariance, TransferFunction, TransferMethod};
 use dioptric_optics::glam::DVec2;
 use dioptric_psf::Picture;
 use serde::Serialize;
@@ -21,6 +21,11 @@ pub struct PsfRow {
     pub field_y_deg: f64,
     /// Distance of the point before the first vertex, mm.
     pub distance_mm: f64,
+    /// Distance of the film behind the last vertex, mm.
+    #[serde(rename = "film_mm")]
+    pub film_distance_mm: f64,
+    /// What is at the film, in a few words.
+    pub film: String,
     /// Wavelength, nm; of polychromatic light, the mean.
     pub wavelength_nm: f64,
     /// Whether this is the light of all wavelengths of the point together.
@@ -63,9 +68,16 @@ pub struct PsfRow {
     /// Why waves that were asked for were not summed, if so.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fallback: Option<String>,
-    /// The Strehl ratio at the pattern's peak, where waves were summed.
+    /// The Strehl ratio: the highest point of the wave sum over that of the same light all in phase; where waves were asked for,
+    /// also of a blur whose picture is of rays.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub strehl: Option<f64>,
+    /// What is drawn of the transfer function, where waves were asked for.
+    #[serde(skip)]
+    pub(crate) curves: Option<WaveCurves>,
+    /// What the line widths, the encircled energies and the modulations are of: `waves` and `rays and diffraction limit`, which know of
+    /// no pixels and count all light, or the `picture` on its pixels.
+    pub measured_on: &'static str,
     /// Modulation at the frequencies asked for, of all light of the point: what lies outside of the picture counts as if it fell off
     /// with the third power of the distance.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -86,7 +98,23 @@ pub struct MtfRow {
     pub sagittal: f64,
     /// The same as tangential, by the name that it had before.
     pub radial: f64,
+    /// The tangential and the sagittal modulation that the pupil would leave without aberrations: the diffraction limit, where waves
+    /// were asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub limit: Option<[f64; 2]>,
 }
+
+/// What is drawn of a point's transfer function: free of pixels and windows.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct WaveCurves {
+    /// Frequencies, cycles per mm, with the tangential and the sagittal modulation and the limits of both.
+    pub(crate) modulation: Vec<(f64, [f64; 2], [f64; 2])>,
+    /// Radii, µm, and the share of all light within.
+    pub(crate) encircled: Vec<(f64, f64)>,
+}
+
+/// Places of a curve.
+const CURVE_PLACES: usize = 160;
 
 /// Returns the direction of the meridional plane on the film, from +x, for tangents of field angles.
 pub(crate) fn meridian_rad(field_tan: DVec2) -> f64 {
@@ -113,6 +141,8 @@ impl PsfRow {
             field_deg: name.field_deg,
             field_y_deg: name.field_y_deg,
             distance_mm: name.distance_mm,
+            film_distance_mm: f64::NAN,
+            film: String::new(),
             wavelength_nm: name.wavelength_nm,
             is_polychromatic: false,
             // Adding 0 takes the sign from a zero.
@@ -133,6 +163,8 @@ impl PsfRow {
             wave_fraction: None,
             fallback: None,
             strehl: None,
+            curves: None,
+            measured_on: "picture",
             mtf: Vec::new(),
         }
     }
@@ -148,9 +180,51 @@ impl PsfRow {
         let row = |&cycles_per_mm: &f64| {
             let tangential = modulation(meridian, cycles_per_mm);
             let sagittal = modulation(meridian + FRAC_PI_2, cycles_per_mm);
-            MtfRow { cycles_per_mm, tangential, sagittal, radial: tangential }
+            MtfRow { cycles_per_mm, tangential, sagittal, radial: tangential, limit: None }
         };
         Self { mtf: cycles_per_mm.iter().map(row).collect(), ..self }
+    }
+
+    /// Returns the row with the widths, radii and modulations of a transfer function and that of its diffraction limit in place of those of
+    /// the picture: they know of no pixels, and count all light.
+    pub(crate) fn with_transfer(self, transfer: &TransferFunction, limit: &TransferFunction) -> Self {
+        let meridian = self.meridian_rad();
+        let directions = [meridian, meridian + FRAC_PI_2];
+        let both = |transfer: &TransferFunction, f: f64| directions.map(|direction| transfer.modulation(direction, f));
+        let encircled = transfer.encircled();
+        let radius_um = |share: f64| 1e3 * encircled.radius_mm(share);
+        let width_um = |direction: f64| 1e3 * transfer.line_spread(direction).full_width_at_half_maximum_mm();
+        let mtf = self.mtf.iter().map(|row| {
+            let [tangential, sagittal] = both(transfer, row.cycles_per_mm);
+            let limit = Some(both(limit, row.cycles_per_mm));
+            MtfRow { cycles_per_mm: row.cycles_per_mm, tangential, sagittal, radial: tangential, limit }
+        });
+        let place = |i: usize, last: f64| last * i as f64 / CURVE_PLACES as f64;
+        let (cutoff_per_mm, reach_um) = (transfer.cutoff_per_mm(), 1.3 * radius_um(0.95));
+        let reach_um = if reach_um.is_finite() { reach_um } else { 3.0 * radius_um(0.8) };
+        let curves = WaveCurves {
+            modulation: (0..=CURVE_PLACES)
+                .map(|i| place(i, cutoff_per_mm))
+                .map(|f| (f, both(transfer, f), both(limit, f)))
+                .collect(),
+            encircled: (0..=CURVE_PLACES)
+                .map(|i| place(i, reach_um))
+                .map(|radius_um| (radius_um, encircled.share(1e-3 * radius_um)))
+                .collect(),
+        };
+        Self {
+            mtf: mtf.collect(),
+            lsf_fwhm_um: width_um(0.0),
+            lsf_fwhm_y_um: width_um(FRAC_PI_2),
+            ee50_radius_um: radius_um(0.5),
+            ee80_radius_um: radius_um(0.8),
+            curves: Some(curves),
+            measured_on: match transfer.method() {
+                TransferMethod::Waves => "waves",
+                TransferMethod::Rays => "rays and diffraction limit",
+            },
+            ..self
+        }
     }
 
     /// Whether none of the point's light reaches the film: all that is measured of it is then no number.
@@ -160,7 +234,7 @@ impl PsfRow {
 
     /// Whether so much of the light lies beside the picture that its metrics are not those of the point.
     pub fn is_cut(&self) -> bool {
-        !self.is_dark() && self.picture_share < 0.97
+        !self.is_dark() && self.picture_share < 0.97 && self.curves.is_none()
     }
 
     /// Whether any of the picture is the diffraction integral.

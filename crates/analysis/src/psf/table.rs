@@ -2,8 +2,10 @@
 
 use std::path::Path;
 
-use dioptric_diffraction::{PupilGrid, PupilSamples};
-use dioptric_optics::{Lens, ObjectPoint, glam::DVec2};
+use dioptric_diffraction::{
+    PupilSamples, TransferFunction, TransferQuality, WaveQuality, WaveWindow, WindowCenter, wave_psf,
+};
+use dioptric_optics::{Lens, MonoLens, ObjectPoint, glam::DVec2};
 use dioptric_psf::{ImageSettings, ModelUse, Picture, PointImage};
 use dioptric_scene::{ExrSamples, write_planes_exr};
 use ndarray::Array2;
@@ -13,8 +15,8 @@ use super::request::{Item, LARGEST};
 use super::row::{PointName, place_and_size};
 use super::spot::{PaperRays, Spot};
 use super::windowed::Windowed;
-use crate::{PsfRequest, PsfRow, PsfSampling};
-use dioptric_pipeline::{FocusSpec, PipelineError};
+use crate::{FilmPlace, PsfRequest, PsfRow, PsfSampling};
+use dioptric_pipeline::PipelineError;
 use dioptric_psf::Diffraction;
 
 /// Point-spread functions with their pictures.
@@ -22,6 +24,8 @@ use dioptric_psf::Diffraction;
 pub struct PsfSet {
     /// Distance of the film behind the last vertex, mm.
     pub film_distance_mm: f64,
+    /// What is there, in a few words.
+    pub film: String,
     /// Side of a pixel, µm.
     pub pixel_um: f64,
     /// What is measured: fields outermost, then distances, then wavelengths.
@@ -39,17 +43,12 @@ impl PsfRequest {
     /// When a number makes no sense, a glass is not known at a wavelength, or the lens cannot be focused.
     pub fn compute(&self, lens: &Lens) -> Result<PsfSet, PipelineError> {
         self.check()?;
-        let reference = self.reference(lens)?;
-        let film_distance_mm = match self.focus {
-            FocusSpec::DistanceMm(distance_mm) => reference.film_distance_mm_for(distance_mm)?,
-            FocusSpec::FilmMm(film_distance_mm) => film_distance_mm,
-            FocusSpec::NearObject => return Err(self.wrong("focus", "NearObject", "a distance or a film place")),
-        };
+        let FilmPlace { distance_mm: film_distance_mm, origin: film } = self.film_place(lens)?;
         let items = self.items(lens)?;
         let settings = self.image_settings(lens, film_distance_mm)?;
         let computed: Result<Vec<(PsfRow, Array2<f32>)>, PipelineError> =
             items.par_iter().map(|item| self.compute_one(item, lens, &settings)).collect();
-        let (rows, pictures): (Vec<PsfRow>, _) = computed?.into_iter().unzip();
+        let (mut rows, pictures): (Vec<PsfRow>, _) = computed?.into_iter().unzip();
         if !rows.iter().any(|row| row.energy > 0.0) {
             let found = format!("{:?}", self.fields_deg);
             let expected = format!("at least one field of which light gets through {} to the film", lens.name());
@@ -59,7 +58,10 @@ impl PsfRequest {
             true => vec![1.0; self.wavelengths_nm.len()],
             false => self.spectral_weights.clone(),
         };
-        Ok(PsfSet { film_distance_mm, pixel_um: self.pixel_um, rows, pictures, spectral_weights })
+        for row in &mut rows {
+            (row.film_distance_mm, row.film) = (film_distance_mm, film.clone());
+        }
+        Ok(PsfSet { film_distance_mm, film, pixel_um: self.pixel_um, rows, pictures, spectral_weights })
     }
 
     fn compute_one(
@@ -88,17 +90,50 @@ impl PsfRequest {
                 (spot, picture, None)
             }
         };
+        // Waves that the model leaves to rays, or blends with them, are summed for themselves.
+        let (picture, model) = match model {
+            Some(model) if self.diffraction == Diffraction::Wave && model.wave_fraction < 1.0 => {
+                self.summed(&mono, &point, film_distance_mm, picture, model)
+            }
+            model => (picture, model),
+        };
         let mut row = self.measure(item, &spot, &picture);
         if let Some(ModelUse { wave_fraction, fallback }) = model {
             (row.wave_fraction, row.fallback) = (Some(wave_fraction), fallback);
         }
-        if row.is_of_waves() {
-            let nodes =
-                PupilSamples::trace(&mono, &point, film_distance_mm, PupilGrid { n_radii: 24, n_azimuths: 96 }, None);
-            // Waves of a blur too large for these nodes have no peak to speak of.
-            row.strehl = nodes.and_then(|nodes| nodes.peak()).ok().map(|peak| peak.strehl);
+        if self.diffraction == Diffraction::Wave && !row.is_dark() {
+            if let Ok((transfer, limit)) =
+                TransferFunction::trace(&mono, &point, film_distance_mm, TransferQuality::Fine)
+            {
+                row = row.with_transfer(&transfer, &limit);
+            }
+            row.strehl = PupilSamples::peak_of(&mono, &point, film_distance_mm).ok().map(|peak| peak.strehl);
         }
         Ok((row, picture))
+    }
+
+    /// Returns the picture as the diffraction integral has it, on the pixels of one of rays; where it needs more nodes than a wave sum
+    /// has, that picture, and why.
+    fn summed(
+        &self,
+        mono: &MonoLens,
+        point: &ObjectPoint,
+        film_distance_mm: f64,
+        picture: Array2<f32>,
+        model: ModelUse,
+    ) -> (Array2<f32>, Option<ModelUse>) {
+        let (rows, columns) = picture.dim();
+        let window = WaveWindow { pitch_um: self.pixel_um, rows, columns, center: WindowCenter::Centroid };
+        match wave_psf(mono, point, film_distance_mm, &window, WaveQuality::default()) {
+            Ok(psf) => {
+                let model = ModelUse { wave_fraction: 1.0, fallback: None };
+                (psf.samples.mapv(|energy| energy as f32), Some(model))
+            }
+            Err(error) => {
+                let fallback = model.fallback.clone().or_else(|| Some(error.to_string()));
+                (picture, Some(ModelUse { fallback, ..model }))
+            }
+        }
     }
 
     /// Draws a picture: of the size asked for, or its own.
@@ -204,16 +239,21 @@ fn resized(picture: &Array2<f32>, size: usize) -> Array2<f32> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::AnalysisFilm;
     use approx::assert_relative_eq;
     use dioptric_optics::{Glass, Interface, Surface};
 
+    fn to_the_right(fields_deg: &[f64]) -> Vec<[f64; 2]> {
+        fields_deg.iter().map(|&deg| [deg, 0.0]).collect()
+    }
+
     fn request() -> PsfRequest {
         PsfRequest {
-            fields_deg: vec![0.0, 5.0],
-            field_y_deg: 0.0,
+            fields_deg: vec![[0.0, 0.0], [5.0, 0.0]],
             distances_mm: vec![8000.0],
             wavelengths_nm: vec![450.0, 650.0],
-            focus: FocusSpec::FilmMm(51.8145),
+            film: AnalysisFilm::FilmMm(51.8145),
+            focus_nm: Vec::new(),
             diffraction: Diffraction::None,
             pixel_um: 2.0,
             size: None,
@@ -266,8 +306,7 @@ mod tests {
     fn tangential_is_radial_on_every_side() {
         let of = |x_deg: f64, y_deg: f64| {
             let request = PsfRequest {
-                fields_deg: vec![x_deg],
-                field_y_deg: y_deg,
+                fields_deg: vec![[x_deg, y_deg]],
                 wavelengths_nm: vec![550.0],
                 mtf_per_mm: vec![0.5],
                 ..request()
@@ -301,38 +340,41 @@ mod tests {
     #[test]
     fn a_sharp_point_is_of_waves_and_a_blurred_one_is_not() {
         let wave = PsfRequest {
-            fields_deg: vec![0.0],
+            fields_deg: vec![[0.0; 2]],
             distances_mm: vec![2000.0, 300.0],
             wavelengths_nm: vec![550.0],
-            focus: FocusSpec::DistanceMm(2000.0),
+            film: AnalysisFilm::FocusMm(2000.0),
             diffraction: Diffraction::Wave,
             ..request()
         };
         let set = wave.compute(&Lens::built_in("dgauss-50mm").unwrap().with_f_number(8.0, 550.0).unwrap()).unwrap();
-        assert_eq!([set.rows[0].wave_fraction, set.rows[1].wave_fraction], [Some(1.0), Some(0.0)]);
+        // Waves are summed wherever nodes suffice.
+        assert_eq!(set.rows[0].wave_fraction, Some(1.0));
+        assert!(set.rows[1].wave_fraction == Some(1.0) || set.rows[1].fallback.is_some());
         let strehl = set.rows[0].strehl.unwrap();
-        assert!(strehl > 0.7 && strehl <= 1.0 && set.rows[1].strehl.is_none(), "{strehl}");
+        assert!(strehl > 0.7 && strehl <= 1.0 && set.rows[1].strehl.unwrap() < 0.05, "{strehl}");
         let paper = PsfRequest { sampling: PsfSampling::Paper { n_across: 21, jitter: true }, ..wave };
         assert!(paper.compute(&paper_lens()).is_err());
     }
 
     #[test]
     fn fields_above_the_axis_are_turned_ones() {
-        let beside = PsfRequest { fields_deg: vec![5.0], ..request() }.compute(&paper_lens()).unwrap();
-        let above = PsfRequest { fields_deg: vec![0.0], field_y_deg: 5.0, ..request() }.compute(&paper_lens()).unwrap();
+        let beside = PsfRequest { fields_deg: vec![[5.0, 0.0]], ..request() }.compute(&paper_lens()).unwrap();
+        let above = PsfRequest { fields_deg: vec![[0.0, 5.0]], ..request() }.compute(&paper_lens()).unwrap();
         for (a, b) in beside.rows.iter().zip(&above.rows) {
             assert_relative_eq!(a.centroid_x_mm, b.centroid_y_mm, epsilon = 1e-6);
             assert_relative_eq!(a.sigma_x_um, b.sigma_y_um, max_relative = 1e-3);
             assert_relative_eq!(a.lsf_fwhm_um, b.lsf_fwhm_y_um, max_relative = 1e-2);
         }
-        assert!(PsfRequest { field_y_deg: 90.0, ..request() }.compute(&paper_lens()).is_err());
+        assert!(PsfRequest { fields_deg: vec![[0.0, 90.0]], ..request() }.compute(&paper_lens()).is_err());
     }
 
     #[test]
     fn a_dark_point_has_no_size() {
         // A microscope sees nothing at 10°.
-        let focus = FocusSpec::DistanceMm(2000.0);
-        let request = PsfRequest { fields_deg: vec![0.0, 10.0], distances_mm: vec![2000.0], focus, ..request() };
+        let film = AnalysisFilm::FocusMm(2000.0);
+        let fields_deg = to_the_right(&[0.0, 10.0]);
+        let request = PsfRequest { fields_deg, distances_mm: vec![2000.0], film, ..request() };
         let set = request.compute(&Lens::built_in("microscope-20x").unwrap()).unwrap();
         assert!(!set.rows[0].is_dark() && set.rows[2].is_dark() && !set.rows[2].is_cut());
         assert!(set.rows[2].ee50_radius_um.is_nan() && set.rows[2].lsf_fwhm_um.is_nan());
@@ -349,10 +391,10 @@ mod tests {
         };
         let lens = Lens::new("infrared", "test", vec![side(50.0, glass, 3.0), side(70.0, Glass::Air, 0.0)], 0).unwrap();
         let infrared = PsfRequest {
-            fields_deg: vec![0.0],
+            fields_deg: vec![[0.0; 2]],
             distances_mm: vec![f64::INFINITY],
             wavelengths_nm: vec![10e3],
-            focus: FocusSpec::DistanceMm(f64::INFINITY),
+            film: AnalysisFilm::FocusMm(f64::INFINITY),
             diffraction: Diffraction::Wave,
             pixel_um: 10.0,
             ..request()
@@ -380,12 +422,11 @@ mod tests {
     #[test]
     fn nonsense_is_refused() {
         for wrong in [
-            PsfRequest { fields_deg: vec![90.0], ..request() },
+            PsfRequest { fields_deg: vec![[90.0, 0.0]], ..request() },
             PsfRequest { distances_mm: vec![-1.0], ..request() },
             PsfRequest { wavelengths_nm: vec![f64::INFINITY], ..request() },
             PsfRequest { pixel_um: 0.0, ..request() },
             PsfRequest { size: Some(0), ..request() },
-            PsfRequest { focus: FocusSpec::NearObject, ..request() },
         ] {
             assert!(wrong.compute(&paper_lens()).is_err(), "{wrong:?}");
         }

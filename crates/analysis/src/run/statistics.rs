@@ -189,7 +189,7 @@ pub(super) fn lens_data(capture: &Capture, corner_tan: f64) -> Result<LensData, 
         wavelength_nm: REFERENCE_WAVELENGTH_NM,
         distance_mm: capture.place.focus_distance_mm,
         field_deg: corner_tan.atan().to_degrees(),
-        instead_of_f_and_c_nm: None,
+        colors_nm: None,
     };
     LensData::new(&capture.lens.lens, &question)
 }

@@ -108,7 +108,14 @@ impl Waves {
     /// To a place δ beside the reference they all go further by the same δ²/2R, which |U|² does not feel, and
     /// by d·δ: so they are summed like plane waves, and like Huygens' to the next order, δ² NA²/R.
     fn from_exit_pupil(rays: &FilmRays, reference_mm: DVec2) -> Option<Self> {
-        let pupil_mm = rays.exit_pupil_mm?;
+        rays.exit_pupil_mm?;
+        let waves = Self::each_from_exit_pupil(rays, reference_mm);
+        waves.phi_mm.iter().all(|phi| phi.is_finite()).then_some(waves)
+    }
+
+    /// The same for each ray by itself: of one that does not cross the sphere the path is no number.
+    pub(super) fn each_from_exit_pupil(rays: &FilmRays, reference_mm: DVec2) -> Self {
+        let pupil_mm = rays.exit_pupil_mm.unwrap_or(DVec3::NAN);
         let center_mm = rays.film_point_mm(reference_mm);
         // A pupil behind the film is a virtual one: the waves run backwards to it.
         let radius_mm = center_mm.distance(pupil_mm).copysign(-pupil_mm.z);
@@ -123,6 +130,6 @@ impl Waves {
             (d, rays.opl_mm[i] - rays.image_index * beyond_mm)
         };
         let (d, phi_mm): (Vec<DVec2>, Vec<f64>) = (0..rays.points_mm.len()).map(wave).unzip();
-        phi_mm.iter().all(|phi| phi.is_finite()).then_some(Self { propagation: Propagation::Fresnel, d, phi_mm })
+        Self { propagation: Propagation::Fresnel, d, phi_mm }
     }
 }

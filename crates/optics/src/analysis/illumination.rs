@@ -84,8 +84,12 @@ pub fn field_limits_deg<const N: usize>(lens: &MonoLens, shares: [f64; N]) -> [O
     shares.map(|share| cones.limit_deg(share))
 }
 
-/// Returns the same along a direction of the field, a unit vector, for points `dioptres` = 1/Z away; at most 88°.
+/// Returns the same along a direction of the field, a unit vector, for points `dioptres` = 1/Z away; of near ones at most 88°.
 pub fn field_limit_along_deg(lens: &MonoLens, share: f64, direction: DVec2, dioptres: f64) -> Option<f64> {
+    if dioptres == 0.0 {
+        let point = |field_deg: f64| ObjectPoint::far(field_deg.to_radians(), direction);
+        return Cones::of(lens, WIDEST_FIELD_DEG, &point).limit_deg(share);
+    }
     let point = |field_deg: f64| ObjectPoint::from_field(lens, direction * field_deg.to_radians().tan(), dioptres);
     Cones::of(lens, STEEPEST_FIELD_DEG, &point).limit_deg(share)
 }

@@ -24,7 +24,7 @@ pub(super) fn is_deeplens(value: &Value) -> bool {
 /// Reads a lens from the JSON value of a `DeepLens` file, which has no name of its own.
 pub(super) fn lens_from_deeplens(value: &Value, name: &str, glasses: &Glasses) -> Result<LensFile, TextError> {
     let file = Object::new(value, "")?;
-    let mut interfaces: Vec<Interface> = Vec::new();
+    let (mut interfaces, mut openings): (Vec<Interface>, Vec<Aperture>) = (Vec::new(), Vec::new());
     let (mut stops, mut object_medium) = (Vec::new(), Glass::Air);
     let rows = file.objects("surfaces")?;
     for (i, row) in rows.iter().enumerate() {
@@ -35,8 +35,11 @@ pub(super) fn lens_from_deeplens(value: &Value, name: &str, glasses: &Glasses) -
             stops.push(i);
         }
         let shape = shape(kind, row)?;
+        // A square rim has its corners on the circle of the stated radius.
         if row.get("is_square") == Some(&Value::Bool(true)) {
-            return Err(wrong("is_square", "a square rim is not supported".to_owned()));
+            let half_mm = row.number("r")? * std::f64::consts::FRAC_1_SQRT_2;
+            let outline = Outline::Rectangle { half_x_mm: half_mm, half_y_mm: half_mm };
+            openings.push(Aperture { surface: i, outline, center_mm: [0.0; 2], is_obscuration: false });
         }
         let curvature_per_mm = if matches!(kind, "Plane" | "ThinLens") { 0.0 } else { curvature_per_mm(row)? };
         if let (0, Some(name)) = (i, row.text("mat1")) {
@@ -76,7 +79,7 @@ pub(super) fn lens_from_deeplens(value: &Value, name: &str, glasses: &Glasses) -
     let &[stop] = stops.as_slice() else { return Err(OpticsError::Stops { n_stops: stops.len() }.into()) };
     let source = file.text("info").unwrap_or("a DeepLens file");
     let surface = interfaces.len() - 1;
-    let openings = element.iter().map(|grating| grating.opening(surface)).collect();
+    openings.extend(element.iter().map(|grating| grating.opening(surface)));
     let lens = Lens::new_with_apertures(name, source, interfaces, stop, openings)?;
     let diffractive = element.iter().map(|grating| grating.diffractive(surface)).collect();
     let mut read = LensFile::of_lens(lens.with_object_medium(object_medium)?.with_diffractive(diffractive)?);

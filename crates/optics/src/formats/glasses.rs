@@ -41,17 +41,30 @@ impl<'a> Glasses<'a> {
         if let Some(private) = self.private.iter().find(|glass| glass.name.eq_ignore_ascii_case(name)) {
             return found(private.glass.clone());
         }
+        let makers: Vec<String> = self.options.makers.iter().chain(&self.makers).cloned().collect();
         for catalogue in &self.options.catalogues {
-            match catalogue.find_among(name, &self.makers) {
+            match catalogue.find_among(name, &makers) {
                 Ok(entry) => return found(entry.glass.clone()),
                 Err(OpticsError::Unknown { .. }) => {}
                 Err(error) => return Err(error.to_string()),
             }
         }
-        let error = match GlassCatalogue::built_in().find_among(name, &self.makers) {
+        let error = match GlassCatalogue::built_in().find_among(name, &makers) {
             Ok(entry) => return Ok(self.built_in(name, entry)),
             Err(error) => error,
         };
+        // Where nobody says whose, a name that several have is that of the catalogue which design programs look in first.
+        if let (OpticsError::Ambiguous { candidates, .. }, Ok(entry)) =
+            (&error, GlassCatalogue::built_in().find_among(name, &[USUAL_MAKER.to_owned()]))
+        {
+            let full_name = entry.full_name();
+            let others: Vec<&str> = candidates.iter().map(String::as_str).filter(|other| *other != full_name).collect();
+            let note = format!(
+                "glass '{name}' is in several catalogues: {full_name} is taken, not {}; --catalog MAKER chooses another",
+                others.join(" or ")
+            );
+            return Ok(Found { glass: Glass::Named(full_name), note: Some(note) });
+        }
         self.instead(name, nd_vd).ok_or_else(|| {
             let stated = match nd_vd {
                 Some(PLACEHOLDER) => {
@@ -69,7 +82,8 @@ impl<'a> Glasses<'a> {
     /// Returns a glass of the built-in catalogue, with a note where its maker is none of those that the file names.
     fn built_in(&self, name: &str, entry: &CatalogueGlass) -> Found {
         let full_name = entry.full_name();
-        let is_of_file = self.makers.iter().any(|maker| maker.eq_ignore_ascii_case(&entry.maker));
+        let named = self.makers.iter().chain(&self.options.makers);
+        let is_of_file = named.into_iter().any(|maker| maker.eq_ignore_ascii_case(&entry.maker));
         let note = (!self.makers.is_empty() && !is_of_file).then(|| {
             format!(
                 "glass '{name}' is in none of the file's catalogues ({}): it is {full_name}",
@@ -100,6 +114,9 @@ impl<'a> Glasses<'a> {
     }
 }
 
+/// The maker whose glass a name means that several have, where neither the file nor its reader names any.
+const USUAL_MAKER: &str = "SCHOTT";
+
 /// What Zemax writes as index and Abbe number of a glass of a catalogue, unless they are stored with the file: no data.
 const PLACEHOLDER: (f64, f64) = (1.5, 40.0);
 
@@ -116,6 +133,28 @@ pub(super) fn constant(index: f64) -> Glass {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn name_of_several_glasses_is_that_of_the_first_maker_named() {
+        let find = |name: &str, of_user: &[&str], of_file: &[&str]| {
+            let own = |list: &[&str]| list.iter().map(|&maker| maker.to_owned()).collect::<Vec<_>>();
+            let options = ReadOptions { makers: own(of_user), ..Default::default() };
+            let mut glasses = Glasses::new(&options);
+            glasses.makers = own(of_file);
+            let found = glasses.find(name, None)?;
+            Ok::<_, String>((found.glass, found.note))
+        };
+        let named = |name: &str| Glass::Named(name.to_owned());
+        // SCHOTT, HIKARI and CDGM have an F2; of two others two makers have one.
+        let (glass, note) = find("F2", &[], &[]).unwrap();
+        assert!(glass == named("SCHOTT:F2") && note.unwrap().contains("CDGM:F2 or HIKARI:F2"));
+        assert_eq!(find("F2", &["HIKARI"], &[]).unwrap(), (named("HIKARI:F2"), None));
+        assert_eq!(find("F2", &[], &["CDGM"]).unwrap(), (named("CDGM:F2"), None));
+        assert_eq!(find("F2", &["HIKARI"], &["CDGM"]).unwrap(), (named("HIKARI:F2"), None));
+        let message = find("BAF4", &[], &[]).unwrap_err();
+        assert!(message.contains("CDGM:BAF4") && message.contains("HIKARI:BAF4"), "{message}");
+        assert_eq!(find("BAF4", &["cdgm"], &[]).unwrap().0, named("CDGM:BAF4"));
+    }
 
     #[test]
     fn placeholder_of_zemax_is_no_glass() {

@@ -138,6 +138,8 @@ pub enum SeqNumbers {
 pub struct ReadOptions {
     /// Catalogues to look in before the built-in one.
     pub catalogues: Vec<GlassCatalogue>,
+    /// Makers whose glass a name means that several have, the first first; before those that the file names.
+    pub makers: Vec<String>,
     /// What to do with a glass that no catalogue has.
     pub missing_glass: MissingGlass,
     /// What the numbers of surfaces are in a CODE V file that does not say; `None` for what is plausible.

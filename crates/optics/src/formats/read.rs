@@ -5,7 +5,7 @@ use std::path::Path;
 use crate::{GlassCatalogue, Lens, OpticsError};
 
 use super::{
-    dat,
+    bench, dat,
     decode::{bytes_of, text_of},
     deeplens,
     glasses::Glasses,
@@ -19,7 +19,7 @@ use super::{
 };
 
 impl Lens {
-    /// Reads a lens file, by its extension: `.ron` (our own), `.dat`, `.json`, `.zmx`, `.seq` or `.len`.
+    /// Reads a lens file, by its extension: `.ron` (our own), `.dat`, `.json`, `.zmx`, `.seq`, `.len` or `.lens`.
     ///
     /// [`LensFile::read`](crate::LensFile::read) returns what else the file states, as where the film lies.
     ///
@@ -33,7 +33,7 @@ impl Lens {
 
 impl LensFile {
     /// Reads a lens file, by its extension: `.ron` (our own), `.dat` or `.txt`, `.json` (ISET's omni format or
-    /// `DeepLens`), `.zmx` (Zemax), `.seq` (CODE V) or `.len` (OSLO).
+    /// `DeepLens`), `.zmx` (Zemax), `.seq` (CODE V), `.len` (OSLO), `.txt` (the Optical Bench's) or `.lens`.
     ///
     /// A glass catalogue beside a `.zmx` file that has its name and the extension `.agf` is read with it.
     ///
@@ -61,6 +61,8 @@ impl LensFile {
         let glasses = Glasses::new(options);
         let read: Result<Self, TextError> = match extension.as_str() {
             "ron" => file_from_ron(&text),
+            "lens" => bench::lens_from_lens_text(&text, &name),
+            "txt" if bench::is_bench(&text) => bench::lens_from_bench(&text, &name, &glasses),
             "dat" | "txt" => match pbrt_list::numbers_of(&text) {
                 Some(numbers) => pbrt_list::lens_from_numbers(&numbers, &name).map(Self::of_lens),
                 None => dat::lens_from_dat(&text, &name).map(Self::of_lens),
@@ -70,7 +72,7 @@ impl LensFile {
             "zmx" => zmx::lens_from_zmx(&text, &name, glasses),
             "seq" => seq::lens_from_seq(&text, &name, glasses),
             _ => {
-                let expected = "expected .ron, .dat, .txt, .json, .zmx, .seq or .len";
+                let expected = "expected .ron, .dat, .txt, .json, .zmx, .seq, .len or .lens";
                 let reason = format!("the extension '.{extension}' is no lens format; {expected}");
                 return Err(OpticsError::Io { path: path.to_owned(), reason });
             }

@@ -48,9 +48,27 @@ impl SystemSurface {
             let extent_mm = aperture.extent_mm();
             let is_rotational = self.shape.is_rotational();
             self.semi_aperture_mm = Some(if is_rotational { extent_mm.min(widest_mm(&self)) } else { extent_mm });
+            self.is_rim_fixed = true;
         }
-        self.is_rim_fixed = true;
         self.apertures.push(aperture);
+        self
+    }
+}
+
+impl SystemSurface {
+    /// Returns the surface with a rim that is no wider than the surface itself, and adds a note where it was.
+    pub(super) fn with_rim_that_fits(mut self, notes: &mut Vec<String>) -> Self {
+        let widest_mm = widest_mm(&self) * (1.0 - 1e-9);
+        if let Some(semi_aperture_mm) = self.semi_aperture_mm.filter(|mm| *mm > widest_mm) {
+            notes.push(format!(
+                "line {}: a diameter of {} mm does not fit on a surface of radius {} mm: it is cut to {:.4} mm",
+                self.line,
+                2.0 * semi_aperture_mm,
+                1.0 / self.curvature_per_mm,
+                2.0 * widest_mm
+            ));
+            self.semi_aperture_mm = Some(widest_mm);
+        }
         self
     }
 }
@@ -133,6 +151,8 @@ pub(super) struct System {
 
 /// How far from the axis a ray is that stands for those of first-order theory, mm.
 const NEAR_AXIS_MM: f64 = 1e-6;
+/// By how much of it a stated beam may be wider than the stop's rim and still fill it: rims in files are rounded.
+const ROUNDED: f64 = 1e-3;
 /// Directions in which rays are sent through the edge of the pupil.
 const N_AZIMUTHS: usize = 32;
 /// A rim that was found by rays is this much wider than they need, so that rounding does not cut them.
@@ -279,17 +299,14 @@ impl System {
     /// Which surfaces are planes at which nothing happens to any ray.
     pub(super) fn dummies(&self) -> Vec<bool> {
         let is_dummy = |(i, surface): (usize, &SystemSurface)| {
-            let medium_before = match i {
-                0 => &self.object_medium,
-                _ => &self.surfaces[i - 1].medium_after,
-            };
             let is_plane = surface.shape == Shape::Sphere && surface.curvature_per_mm == 0.0;
             self.stop != Some(i)
                 && is_plane
                 && !surface.is_mirror
                 && surface.phase.is_none()
                 && !surface.is_rim_fixed
-                && surface.medium_after == *medium_before
+                && surface.apertures.is_empty()
+                && surface.medium_after == *self.medium_before(i)
         };
         self.surfaces.iter().enumerate().map(is_dummy).collect()
     }
@@ -375,13 +392,42 @@ impl System {
         };
         let semi_aperture_mm = now_mm * ratio;
         if semi_aperture_mm > 0.0 && semi_aperture_mm.is_finite() {
-            return Ok(semi_aperture_mm);
+            return Ok(self.within_rim_of_stop_mm(mono.stop(), semi_aperture_mm, beam));
         }
         let (beam, pupil_mm) = (beam.summary(), ratio * first.entrance_pupil_diameter_mm);
         Err(plain(&format!(
             "{beam} makes an entrance pupil of {pupil_mm} mm and a stop of {} mm; expected positive ones",
             2.0 * semi_aperture_mm
         )))
+    }
+
+    /// Returns half the diameter of the stop that a stated beam asks for or, where what bounds the light on the stop's own surface
+    /// is narrower, of that, which is noted.
+    ///
+    /// Openings bound it, and fixed rims of surfaces that bend light: so do Zemax's. A rim that the beam exceeds by rounding does not.
+    fn within_rim_of_stop_mm(&mut self, stop: usize, beam_mm: f64, beam: Beam) -> f64 {
+        let stated = &self.surfaces[stop];
+        let openings = stated.apertures.iter().filter(|aperture| !aperture.is_obscuration).map(Aperture::extent_mm);
+        let bends_light = stated.curvature_per_mm != 0.0
+            || stated.shape != Shape::Sphere
+            || stated.medium_after != *self.medium_before(stop);
+        let rim = stated.semi_aperture_mm.filter(|_| stated.is_rim_fixed && bends_light);
+        let rim_mm = openings.chain(rim).fold(f64::INFINITY, f64::min);
+        if rim_mm >= beam_mm * (1.0 - ROUNDED) {
+            return beam_mm;
+        }
+        self.notes.push(format!(
+            "the rim or opening of the stop, {:.4} mm across, limits the light: {} would fill {:.4} mm",
+            2.0 * rim_mm,
+            beam.summary(),
+            2.0 * beam_mm
+        ));
+        rim_mm
+    }
+
+    /// The medium before a surface.
+    fn medium_before(&self, surface: usize) -> &Glass {
+        surface.checked_sub(1).map_or(&self.object_medium, |before| &self.surfaces[before].medium_after)
     }
 
     /// Returns half the diameter of a stop of which the file says nothing: the widest axial beam, to first order, that
@@ -533,7 +579,15 @@ fn widen(
     };
     let mut places: Vec<DVec2> = (0..N_AZIMUTHS).map(on_ring).collect();
     places.push(vignetting.center);
-    let coordinates = PupilCoordinates::entrance(mono);
+    // An opening may reach farther to one side than the beam that is named after it.
+    let is_by_opening = mono.limiting_beam().is_some_and(|beam| beam.is_limited_by_opening);
+    let coordinates = match mono.first_order_of_stop() {
+        first if is_by_opening => PupilCoordinates::Entrance {
+            z_mm: first.entrance_pupil_z_mm,
+            radius_mm: 0.5 * first.entrance_pupil_diameter_mm,
+        },
+        _ => PupilCoordinates::entrance(mono),
+    };
     let mut rays = coordinates.rays(mono, point, &places);
     if coordinates != PupilCoordinates::stop(mono) && !fills_stop(mono, rays.clone(), &places) {
         let aimed = PupilCoordinates::stop(mono).rays(mono, point, &places);

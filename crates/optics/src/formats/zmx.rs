@@ -102,6 +102,8 @@ struct Zmx {
     stored: usize,
     operands: Vec<ZmxOperand>,
     surfaces: Vec<ZmxSurface>,
+    /// The number that the file gives each of them.
+    surface_numbers: Vec<usize>,
     notes: Vec<String>,
 }
 
@@ -110,8 +112,14 @@ impl Zmx {
         match line.keyword {
             "SURF" => {
                 let number = line.count(0)?;
-                if number != self.surfaces.len() {
-                    return Err(line.wrong(format!("surface {number} where {} was expected", self.surfaces.len())));
+                // Files that were edited by hand leave numbers out; other lines name surfaces by the numbers that are there.
+                match self.surface_numbers.last() {
+                    Some(&last) if number <= last => {
+                        return Err(
+                            line.wrong(format!("surface {number} after surface {last}; expected ascending numbers"))
+                        );
+                    }
+                    _ => self.surface_numbers.push(number),
                 }
                 self.surfaces.push(ZmxSurface::begin(line.number));
                 Ok(())
@@ -198,11 +206,27 @@ impl Zmx {
             .then(|| format!("solves and pickups are not worked out anew: the stored values stand at surface {which}"))
     }
 
+    /// Returns a sentence on numbers of surfaces that the file leaves out, if it does.
+    fn note_on_gaps(&self) -> Option<String> {
+        let last = self.surface_numbers.last().copied().unwrap_or(0);
+        let missing: Vec<String> = (0..last)
+            .filter(|number| !self.surface_numbers.contains(number))
+            .map(|number| number.to_string())
+            .collect();
+        (!missing.is_empty()).then(|| {
+            format!(
+                "the file has no surface {}: the next stands in its place, and nothing between them",
+                missing.join(", ")
+            )
+        })
+    }
+
     fn into_system(mut self, name: &str, mut glasses: Glasses) -> Result<System, TextError> {
         glasses.makers = std::mem::take(&mut self.makers);
         let mm = self.mm_per_unit.unwrap_or(1.0);
         let mut notes = std::mem::take(&mut self.notes);
         notes.extend(self.note_on_solves());
+        notes.extend(self.note_on_gaps());
         let [object, .., image] = self.surfaces.as_slice() else {
             let reason = format!("the file has {} surfaces; expected an object and an image", self.surfaces.len());
             return Err(TextError { line: None, reason });

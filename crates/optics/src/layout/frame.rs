@@ -115,11 +115,11 @@ impl Frame {
     pub(super) fn keys(&self, words: &str, layout: &Layout, fans: &[Fan], svg: &mut String) {
         let (mut x, y) =
             (MARGIN_PX + LETTER_PX * (words.chars().count() + 4) as f64, self.height_px - 0.6 * FOOT_PX + 5.0);
-        if layout.field_tans.len() > 1 {
-            for (i, tan) in layout.field_tans.iter().enumerate() {
+        if layout.fields_deg.len() > 1 {
+            for (i, field_deg) in layout.fields_deg.iter().enumerate() {
                 let color = FIELD_COLORS[i % FIELD_COLORS.len()];
                 let dark = if fans.iter().any(|fan| fan.field == i) { "" } else { " dark" };
-                let text = format!("{:.1}°{dark}", tan.atan().to_degrees());
+                let text = format!("{field_deg:.1}°{dark}");
                 let _ = writeln!(svg, "<text x=\"{x:.1}\" y=\"{y:.1}\" fill=\"{color}\">{text}</text>");
                 x += 16.0 + LETTER_PX * text.chars().count() as f64;
             }

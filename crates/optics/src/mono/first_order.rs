@@ -1,7 +1,9 @@
 //! First-order optics of a lens at one wavelength: pupils, f-numbers, images.
 
+use glam::{DVec2, DVec3};
+
 use crate::{
-    AxialBeam, Conjugate, FirstOrder, MonoLens, OpticsError,
+    Aperture, AxialBeam, Conjugate, FirstOrder, MonoLens, ObjectPoint, OpticsError, PupilRegion,
     paraxial::{self, MarginalRay, Matrix},
     trace::{Kind, Step},
 };
@@ -9,6 +11,8 @@ use crate::{
 /// How far an entrance pupil may be for counting from its center, over the first rim's radius: then counts are good to
 /// 1e-12 of the rim.
 const FARTHEST_PUPIL: f64 = 1e4;
+/// Azimuths of the outline of a pupil whose area is wanted: a multiple of 8, so that corners of squares are among them.
+const AREA_AZIMUTHS: usize = 192;
 
 impl MonoLens {
     /// Focal lengths, principal planes and pupils.
@@ -25,6 +29,23 @@ impl MonoLens {
         self.first_order.with_entrance_pupil_diameter_mm(2.0 * beam.height_mm)
     }
 
+    /// The same, with the diameters of the pupils and the f-number of a beam from the point on the axis at this distance before the first
+    /// vertex, mm (infinite for a far one): where a rim limits its light and not the stop, it is wider or narrower than that of a
+    /// far point.
+    pub fn first_order_for(&self, object_distance_mm: f64) -> FirstOrder {
+        if object_distance_mm.is_infinite() {
+            return self.first_order();
+        }
+        let Some(beam) = self.limiting_beam_for(object_distance_mm) else { return self.first_order };
+        let way_mm = object_distance_mm + self.first_order.entrance_pupil_z_mm;
+        let diameter_mm = 2.0 * (beam.slope_before * way_mm).abs();
+        if diameter_mm.is_finite() {
+            self.first_order.with_entrance_pupil_diameter_mm(diameter_mm)
+        } else {
+            self.first_order
+        }
+    }
+
     /// The same for a beam that fills the stop, whether it gets through or not.
     pub fn first_order_of_stop(&self) -> FirstOrder {
         self.first_order
@@ -34,22 +55,51 @@ impl MonoLens {
     ///
     /// Some lens files state a stop that is wider than what their rims let through.
     pub fn limiting_beam(&self) -> Option<AxialBeam> {
-        if !(self.first_order.entrance_pupil_diameter_mm.is_finite() && self.first_order.power_per_mm != 0.0) {
+        if !self.has_far_pupil() {
             return None;
         }
         let beam = self.far_beam.get_or_init(|| self.axial_beam(f64::INFINITY));
         beam.filter(|beam| !beam.is_limited_by_stop)
     }
 
+    /// The same of the point at this distance before the first vertex, mm; infinite for a far one.
+    pub fn limiting_beam_for(&self, object_distance_mm: f64) -> Option<AxialBeam> {
+        match object_distance_mm.is_infinite() {
+            true => self.limiting_beam(),
+            false => self.axial_beam(object_distance_mm).filter(|beam| !beam.is_limited_by_stop),
+        }
+    }
+
+    /// Whether a far point on the axis has an image and its light a width before the lens.
+    fn has_far_pupil(&self) -> bool {
+        self.first_order.entrance_pupil_diameter_mm.is_finite() && self.first_order.power_per_mm != 0.0
+    }
+
+    /// The f-number for a far object of the round beam with as much light as gets through on the axis, what obscurations stop left
+    /// out: the focal length over 2 √(A/π) of the pupil's area A. `None` where no light does, or the lens has no power.
+    ///
+    /// Of a lens with round rims alone it is [`real_f_number`](Self::real_f_number); a rectangular stop, or one with a hole, has
+    /// the light, and so the exposure, of this f-number.
+    pub fn f_number_of_light(&self) -> Option<f64> {
+        let point = ObjectPoint::Infinite(DVec3::Z);
+        let area_mm2 = self.over_clear_pupil(&|lens: &Self| {
+            PupilRegion::find(lens, &point, AREA_AZIMUTHS).map_or(0.0, |region| region.area_mm2())
+        });
+        let f_number = self.first_order.efl_mm.abs() / (2.0 * (area_mm2 / std::f64::consts::PI).sqrt());
+        (area_mm2 > 0.0 && f_number.is_finite()).then_some(f_number)
+    }
+
     /// Returns a sentence on what limits the light of the point on the axis at this distance before the first vertex, mm (infinite
     /// for a far one), if it is not the stop.
     pub fn note_on_limit(&self, object_distance_mm: f64) -> Option<String> {
         let is_far = object_distance_mm.is_infinite();
-        let beam = match is_far {
-            true => self.limiting_beam()?,
-            false => self.axial_beam(object_distance_mm).filter(|beam| !beam.is_limited_by_stop)?,
-        };
+        let beam = self.limiting_beam_for(object_distance_mm)?;
         let (surface, rim_mm) = (beam.limiting_surface, 2.0 * self.semi_aperture_mm(beam.limiting_surface));
+        let limit = match beam.is_limited_by_opening {
+            true => format!("an opening of surface {surface}"),
+            false => format!("the rim of surface {surface}, {rim_mm:.4} mm across"),
+        };
+        let stop = if surface == self.stop { "not by the round rim of the stop" } else { "not by the stop" };
         let (filled_mm, stop_mm) = (2.0 * beam.stop_radius_mm, 2.0 * self.stop_semi_aperture_mm());
         let (point, f_numbers) = match is_far {
             true => {
@@ -59,8 +109,8 @@ impl MonoLens {
             false => (format!("{object_distance_mm} mm before the lens"), String::new()),
         };
         Some(format!(
-            "light from the axis {point} is limited by the rim of surface {surface}, {rim_mm:.4} mm across, not by the stop, of \
-             which it fills {filled_mm:.4} of {stop_mm:.4} mm{f_numbers}"
+            "light from the axis {point} is limited by {limit}, {stop}, of which it fills {filled_mm:.4} of \
+             {stop_mm:.4} mm{f_numbers}"
         ))
     }
 
@@ -77,11 +127,17 @@ impl MonoLens {
     /// Focal lengths, principal planes and pupils in the x–z plane; those of [`first_order`](Self::first_order) unless
     /// a surface is curved differently along x and y.
     pub fn first_order_x(&self) -> FirstOrder {
-        // Of a lens of revolution nothing differs.
-        if self.steps.iter().all(|step| !matches!(step.kind, Kind::Toric(_))) {
+        let is_toric = self.steps.iter().any(|step| matches!(step.kind, Kind::Toric(_)));
+        if is_toric {
+            return paraxial::first_order(&self.steps_along_x(), self.stop, self.wavelength_nm);
+        }
+        // Of surfaces of revolution only openings may differ.
+        let are_apertures_round = self.steps.iter().flat_map(|step| &step.apertures).all(Aperture::is_rotational);
+        if are_apertures_round || !self.has_far_pupil() {
             return self.first_order();
         }
-        paraxial::first_order(&self.steps_along_x(), self.stop, self.wavelength_nm)
+        let beam = self.axial_beam_along(f64::INFINITY, DVec2::X).filter(|beam| !beam.is_limited_by_stop);
+        beam.map_or(self.first_order, |beam| self.first_order.with_entrance_pupil_diameter_mm(2.0 * beam.height_mm))
     }
 
     /// Returns the steps as the x–z plane cuts them.
@@ -114,11 +170,7 @@ impl MonoLens {
     /// a rim limits the light and not the stop, the one that starts as the real marginal ray does.
     pub(crate) fn marginal_ray(&self, object_distance_mm: f64) -> MarginalRay {
         let to_stop = self.marginal_ray_of_stop(object_distance_mm);
-        let beam = match object_distance_mm.is_infinite() {
-            true => self.limiting_beam(),
-            false => self.axial_beam(object_distance_mm).filter(|beam| !beam.is_limited_by_stop),
-        };
-        match beam {
+        match self.limiting_beam_for(object_distance_mm) {
             Some(beam) if object_distance_mm.is_infinite() => to_stop.scaled(beam.height_mm / to_stop.height_mm),
             Some(beam) => to_stop.scaled((beam.slope_before * self.object_index() / to_stop.reduced_slope).abs()),
             None => to_stop,

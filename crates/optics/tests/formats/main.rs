@@ -1,6 +1,7 @@
 //! Files of lenses and glasses: read, refused and written. One program, which is compiled and linked once.
 
 mod absorption;
+mod bench;
 mod glass;
 mod len;
 mod more;

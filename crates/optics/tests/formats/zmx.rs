@@ -219,12 +219,20 @@ fn mistakes_are_reported_by_line_and_keyword() {
         message("UNIT MM", "UNIT FURLONG"),
         "lens.zmx:4: UNIT: 'FURLONG' is no unit of length; expected MM, CM, IN or METER"
     );
-    assert!(message("SURF 2", "SURF 7").contains("SURF: surface 7 where 2 was expected"));
+    assert!(message("SURF 2", "SURF 1").contains("SURF: surface 1 after surface 1; expected ascending numbers"));
     assert!(message("  STOP\n", "").contains("exactly one stop, but 0"));
     assert!(message("DISZ 5.0", "DISZ INFINITY").contains("surface 0: thickness is inf"));
     assert!(message("ENPD 1.0E+1", "ENPD -1").contains("the stated entrance pupil of -1 mm makes"));
     assert!(message("ENPD 1.0E+1", "ENPD 1e9").contains("does not fit"));
     assert!(read("").unwrap_err().to_string().contains("the file has 0 surfaces"));
+}
+
+#[test]
+fn numbers_of_surfaces_that_are_left_out_are_noted() {
+    let file = read(&SINGLET.replace("SURF 2", "SURF 4").replace("SURF 3", "SURF 5")).unwrap();
+    assert_eq!(file.lens, read(SINGLET).unwrap().lens);
+    let note = "the file has no surface 2, 3: the next stands in its place, and nothing between them";
+    assert!(file.notes.iter().any(|found| found == note), "{:?}", file.notes);
 }
 
 #[test]

@@ -180,8 +180,16 @@ fn zemax_apertures_are_read_and_written() {
         let file = read(&ZMX.replace("HERE", lines));
         let of = |&(outline, center_mm, is_obscuration)| Aperture { surface: 0, outline, center_mm, is_obscuration };
         assert_eq!(file.lens.apertures(), expected.iter().map(of).collect::<Vec<_>>(), "{lines}");
-        // The stated pupil decides how wide the stop is.
-        assert!((file.lens.stop_semi_aperture_mm() - 5.0).abs() < 1e-12);
+        // The stated pupil decides how wide the stop is, unless the opening lies within it.
+        let reach_mm = if lines.starts_with("SQAP") {
+            13f64.sqrt()
+        } else if lines.starts_with("ELAP") {
+            4.0
+        } else {
+            5.0
+        };
+        assert!((file.lens.stop_semi_aperture_mm() - reach_mm).abs() < 1e-12, "{lines}");
+        assert_eq!(file.notes.iter().any(|note| note.contains("limits the light")), reach_mm < 5.0, "{:?}", file.notes);
         match expected.as_slice() {
             [] | [(Outline::Circle { .. }, _, true)] => {
                 assert_eq!(read(&file.to_zmx().unwrap()).lens.apertures(), file.lens.apertures())
@@ -216,7 +224,8 @@ fn drawing_shows_openings_and_obscurations() {
     let layout = Layout {
         film_distance_mm: 90.0,
         object_distance_mm: f64::INFINITY,
-        field_tans: vec![0.0],
+        film_label: "film".to_owned(),
+        fields_deg: vec![0.0],
         wavelengths_nm: vec![550.0],
         n_rays: 3,
         width_px: 900.0,
@@ -225,4 +234,132 @@ fn drawing_shows_openings_and_obscurations() {
     let (bare, drawn) = (with(&[]).draw(&layout).unwrap(), with(&[hole]).draw(&layout).unwrap());
     assert_eq!((bare.matches("3.5\"").count(), drawn.matches("3.5\"").count()), (0, 1));
     assert_ne!(with(&[OPENING]).draw(&layout).unwrap(), bare);
+}
+
+/// What lets light through beside a beam of 5 mm radius: the outline, its middle, and whether it is an obscuration.
+type Bound = (Outline, [f64; 2], bool);
+
+/// The light through a disc of 5 mm that a bound leaves, mm², by counting.
+fn clear_area_mm2((outline, center_mm, is_obscuration): Bound) -> f64 {
+    const STEP_MM: f64 = 0.01;
+    let aperture = Aperture { surface: 0, outline, center_mm, is_obscuration };
+    let at = |i: i32| STEP_MM * (f64::from(i) + 0.5);
+    let row = |j: i32| (-500..500).filter(|&i| at(i).hypot(at(j)) < 5.0 && aperture.is_clear_at(at(i), at(j))).count();
+    (-500..500).map(row).sum::<usize>() as f64 * STEP_MM * STEP_MM
+}
+
+/// Two plane plates in parallel light, and an ideal lens of 50 mm: light keeps its height, so every surface bounds it alike.
+fn file_with(format: &str, surface: usize, (outline, [x, y], is_obscuration): Bound) -> LensFile {
+    let words = |circle: &str, rectangle: [&str; 2], ellipse: [&str; 2]| match outline {
+        Outline::Circle { radius_mm } => format!("{circle} {radius_mm}"),
+        Outline::Rectangle { half_x_mm, half_y_mm } => {
+            format!("{} {half_x_mm} {} {half_y_mm}", rectangle[0], rectangle[1])
+        }
+        Outline::Ellipse { half_x_mm, half_y_mm } => format!("{} {half_x_mm} {} {half_y_mm}", ellipse[0], ellipse[1]),
+    };
+    let text = match format {
+        "a.ron" => {
+            let row = |i: usize| {
+                let (stop, medium) = if i == 1 { ("stop: true, ", "") } else { ("", ", medium: Constant(index: 1.5)") };
+                let medium = if i == 0 { medium } else { "" };
+                format!("({stop}semi_aperture_mm: {}, thickness_mm: 2.0{medium})", if i == 1 { 5.0 } else { 20.0 })
+            };
+            let aperture = Aperture { surface, outline, center_mm: [x, y], is_obscuration };
+            format!(
+                "(name: \"a\", source: \"test\", surfaces: [{}, {}, (semi_aperture_mm: 20.0, shape: ThinLens(power_per_mm: 0.02), \
+                 thickness_mm: 0.0)], apertures: [(surface: {surface}, outline: {}, center_mm: ({x:?}, {y:?}), \
+                 is_obscuration: {is_obscuration})])",
+                row(0),
+                row(1),
+                format!("{:?}", aperture.outline).replace(" { ", "(").replace(" }", ")")
+            )
+        }
+        "a.zmx" => {
+            let [circle, square, elliptic] =
+                if is_obscuration { ["OBSC 0", "SQOB", "ELOB"] } else { ["CLAP 0", "SQAP", "ELAP"] };
+            let line = words(circle, [square, ""], [elliptic, ""]);
+            let of = |i: usize| if i == surface { format!("  {line} 0\n  OBDC {x} {y}\n") } else { String::new() };
+            format!(
+                "MODE SEQ\nUNIT MM X W X CM MR CPMM\nENPD 10\nFTYP 0 0 1 1 0 0 0\nXFLN 0\nYFLN 0\nPWAV 1\nWAVM 1 0.55 1\n\
+                 SURF 0\n  DISZ INFINITY\nSURF 1\n  DISZ 2\n  GLAS ___BLANK 1 0 1.5 0\n  DIAM 20\n{}SURF 2\n  STOP\n  DISZ 2\n  \
+                 DIAM 5\n{}SURF 3\n  TYPE PARAXIAL\n  PARM 1 50\n  DISZ 50\n  DIAM 20\nSURF 4\n  DISZ 0\n",
+                of(0),
+                of(1)
+            )
+        }
+        _ => {
+            let obs = if is_obscuration { "OBS " } else { "" };
+            let line = match outline {
+                Outline::Circle { radius_mm } => format!("CIR {obs}{radius_mm}"),
+                Outline::Rectangle { half_x_mm, half_y_mm } => format!("REX {obs}{half_x_mm}; REY {obs}{half_y_mm}"),
+                Outline::Ellipse { half_x_mm, half_y_mm } => format!("ELX {obs}{half_x_mm}; ELY {obs}{half_y_mm}"),
+            };
+            let line = format!("{line}; ADX {obs}{x}; ADY {obs}{y}");
+            let of = |i: usize| if i == surface { line.as_str() } else { "" };
+            format!(
+                "RDM\nDIM M\nEPD 10\nWL 550\nSO 0 1e11\nS 0 2 1.5\n{}\nS 0 2\nSTO\n{}\nS 50 5 1.5\nS -50 40\nSI 0 0\n",
+                of(0),
+                of(1)
+            )
+        }
+    };
+    LensFile::from_bytes(Path::new(format), text.as_bytes(), &ReadOptions::default()).unwrap()
+}
+
+#[test]
+fn what_bounds_light_bounds_it_on_every_surface_of_every_format() {
+    let circle = |radius_mm| Outline::Circle { radius_mm };
+    let ellipse = Outline::Ellipse { half_x_mm: 2.0, half_y_mm: 3.0 };
+    let rectangle = Outline::Rectangle { half_x_mm: 2.5, half_y_mm: 1.5 };
+    let bounds: [Bound; 9] = [
+        (circle(2.0), [0.0; 2], false),
+        (circle(2.0), [1.5, -0.5], false),
+        (ellipse, [0.0; 2], false),
+        (ellipse, [0.5, 1.0], false),
+        (rectangle, [0.0; 2], false),
+        (rectangle, [-1.0, 0.5], false),
+        (circle(2.0), [0.0; 2], true),
+        (ellipse, [0.0; 2], true),
+        (rectangle, [1.0, 0.0], true),
+    ];
+    for bound in bounds {
+        let area_mm2 = clear_area_mm2(bound);
+        for surface in [0, 1] {
+            for format in ["a.ron", "a.zmx", "a.seq"] {
+                let file = file_with(format, surface, bound);
+                let lens = file.lens.at(550.0).unwrap();
+                let efl_mm = lens.first_order().efl_mm;
+                let found = lens.f_number_of_light().unwrap();
+                // Cells of a hundredth of a millimetre count an area to a part in a thousand.
+                let expected = efl_mm / (2.0 * (area_mm2 / PI).sqrt());
+                assert!((found / expected - 1.0).abs() < 1e-3, "{format} {surface} {bound:?}: {found} {expected}");
+                let first = lens.first_order();
+                if let (Outline::Circle { radius_mm }, [0.0, 0.0], false) = bound {
+                    // A round opening about the axis is the rim.
+                    assert!((first.entrance_pupil_diameter_mm - 2.0 * radius_mm).abs() < 1e-9, "{format} {surface}");
+                    assert!(file.lens.apertures().is_empty() && file.lens.is_rotational());
+                }
+                if let (Outline::Rectangle { half_x_mm, half_y_mm }, [0.0, 0.0], false) = bound {
+                    let widths_mm = [lens.first_order_x(), first].map(|first| first.entrance_pupil_diameter_mm);
+                    for (found, half_mm) in widths_mm.into_iter().zip([half_x_mm, half_y_mm]) {
+                        assert!((found - 2.0 * half_mm).abs() < 1e-9, "{format} {surface}: {found}");
+                    }
+                    let note = lens.note_on_limit(f64::INFINITY).unwrap();
+                    assert!(note.contains("an opening of surface"), "{note}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn circle_on_the_stop_limits_the_stated_beam() {
+    let text = "RDM;LEN\nEPD 20\nDIM M\nWL 587.6\nSO 0 1e14\nS 50 5 1.5168\nSTO\nCIR 5\nS -50 45\nCIR 12\nSI 0 0\nGO\n";
+    let file = LensFile::from_bytes(Path::new("a.seq"), text.as_bytes(), &ReadOptions::default()).unwrap();
+    let lens = file.lens.at(587.6).unwrap();
+    assert!((lens.first_order().entrance_pupil_diameter_mm - 10.0).abs() < 1e-12);
+    assert!((lens.real_f_number().unwrap() / lens.first_order().f_number - 1.0).abs() < 1e-9);
+    let note = "the rim or opening of the stop, 10.0000 mm across, limits the light: the stated entrance pupil of 20 mm would fill \
+                20.0000 mm";
+    assert!(file.notes.iter().any(|found| found == note), "{:?}", file.notes);
 }

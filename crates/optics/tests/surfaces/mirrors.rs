@@ -593,7 +593,8 @@ fn mirrors_are_drawn_with_rays_to_the_film() {
         let layout = Layout {
             film_distance_mm: film_mm,
             object_distance_mm: f64::INFINITY,
-            field_tans: vec![0.0, 0.002],
+            film_label: "film".to_owned(),
+            fields_deg: vec![0.0, 0.1],
             wavelengths_nm: vec![550.0],
             n_rays: 7,
             width_px: 900.0,

@@ -183,9 +183,15 @@ pub struct LensReadOptions {
 impl LensReadOptions {
     /// Returns it as options of the lens readers.
     fn options(&self) -> Result<ReadOptions, PipelineError> {
-        let catalogues = self.glasses.iter().map(|path| GlassCatalogue::read(path)).collect::<Result<_, _>>()?;
+        // A catalogue is a file, or that of a maker, whose glass a name then means that several have.
+        let built_in = GlassCatalogue::built_in().makers();
+        let is_maker = |path: &Path| built_in.iter().any(|maker| path.as_os_str().eq_ignore_ascii_case(maker));
+        let (makers, files): (Vec<&PathBuf>, Vec<&PathBuf>) =
+            self.glasses.iter().partition(|path| is_maker(path) && !path.exists());
+        let catalogues = files.into_iter().map(|path| GlassCatalogue::read(path)).collect::<Result<_, _>>()?;
+        let makers = makers.into_iter().map(|path| path.to_string_lossy().into_owned()).collect();
         let Self { missing_glass, seq_numbers, configuration, .. } = *self;
-        Ok(ReadOptions { catalogues, missing_glass, seq_numbers, configuration })
+        Ok(ReadOptions { catalogues, makers, missing_glass, seq_numbers, configuration })
     }
 }
 

@@ -33,7 +33,9 @@ pub(super) fn resolve(inputs: &LensInputs) -> Result<ResolvedLens, PipelineError
     let note_on_stop = inputs.stop.note_at(&file.lens, REFERENCE_WAVELENGTH_NM);
     let lens = inputs.movements.apply(inputs.stop.apply(file.lens)?)?;
     let reference = lens.at(REFERENCE_WAVELENGTH_NM)?;
-    let notes = file.notes.into_iter().chain(note_on_stop).chain(reference.note_on_limit(f64::INFINITY)).collect();
+    // What limits the light is that of the lens's own object.
+    let note_on_limit = reference.note_on_limit(file.object_distance_mm.unwrap_or(f64::INFINITY));
+    let notes = file.notes.into_iter().chain(note_on_stop).chain(note_on_limit).collect();
     Ok(ResolvedLens { lens, reference, notes })
 }
 

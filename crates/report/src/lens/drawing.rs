@@ -2,7 +2,7 @@
 
 use dioptric_optics::{Layout, Lens};
 
-use dioptric_pipeline::{PipelineError, REFERENCE_WAVELENGTH_NM};
+use dioptric_pipeline::PipelineError;
 
 /// Rays of each fan.
 const RAYS: usize = 9;
@@ -18,35 +18,35 @@ pub struct LensDrawing {
     pub distance_mm: f64,
     /// Wavelengths of the rays, nm; focus and f-number are those of the first.
     pub wavelengths_nm: Vec<f64>,
-    /// Distance of the film behind the last vertex, mm; `None` for where the object is in focus.
-    pub film_distance_mm: Option<f64>,
+    /// Distance of the film behind the last vertex, mm.
+    pub film_distance_mm: f64,
+    /// What is written beside the film.
+    pub film_label: String,
 }
 
 impl LensDrawing {
     /// Returns the drawing as an SVG document, to scale.
     ///
     /// # Errors
-    /// When a field is not below 89.9°, a glass is not known at the wavelength, or the lens cannot be focused.
+    /// When a field is wider than a drawing shows, or a glass is not known at the wavelength.
     pub fn to_svg(&self, lens: &Lens) -> Result<String, PipelineError> {
-        if let Some(field) = self.fields_deg.iter().find(|field| field.is_nan() || field.abs() >= 89.9) {
+        let (widest, expected) = match self.distance_mm.is_finite() {
+            true => (-89.9..=89.9, "angles below 89.9 degrees of an object at a finite distance"),
+            false => (Layout::WIDEST_FIELDS_DEG, "angles of up to 120 degrees"),
+        };
+        if let Some(field) = self.fields_deg.iter().find(|field| !widest.contains(*field)) {
             return Err(PipelineError::Value {
                 origin: "the drawing".to_owned(),
                 key: "fields_deg",
                 found: field.to_string(),
-                expected: "angles below 89.9 degrees".to_owned(),
+                expected: expected.to_owned(),
             });
         }
-        let film_distance_mm = match self.film_distance_mm {
-            Some(film_distance_mm) => film_distance_mm,
-            None => {
-                let reference_nm = self.wavelengths_nm.first().copied().unwrap_or(REFERENCE_WAVELENGTH_NM);
-                lens.at(reference_nm)?.film_distance_mm_for(self.distance_mm)?
-            }
-        };
         Ok(lens.draw(&Layout {
-            film_distance_mm,
+            film_distance_mm: self.film_distance_mm,
+            film_label: self.film_label.clone(),
             object_distance_mm: self.distance_mm,
-            field_tans: self.fields_deg.iter().map(|field| field.to_radians().tan()).collect(),
+            fields_deg: self.fields_deg.clone(),
             wavelengths_nm: self.wavelengths_nm.clone(),
             n_rays: RAYS,
             width_px: WIDTH_PX,
@@ -63,7 +63,8 @@ mod tests {
             fields_deg: vec![0.0, 14.0],
             distance_mm: 2000.0,
             wavelengths_nm: vec![550.0],
-            film_distance_mm: None,
+            film_distance_mm: 55.0,
+            film_label: "film".to_owned(),
         }
     }
 
@@ -76,8 +77,10 @@ mod tests {
     #[test]
     fn a_field_beyond_the_horizon_is_refused() {
         let lens = Lens::built_in("dgauss-50mm").unwrap();
-        for wrong in [90.0, f64::NAN] {
-            assert!(LensDrawing { fields_deg: vec![wrong], ..drawing() }.to_svg(&lens).is_err());
+        for wrong in [121.0, f64::NAN] {
+            assert!(
+                LensDrawing { fields_deg: vec![wrong], distance_mm: f64::INFINITY, ..drawing() }.to_svg(&lens).is_err()
+            );
         }
     }
 }

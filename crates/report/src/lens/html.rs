@@ -1,6 +1,7 @@
 //! The page of an analysis for a browser.
 
-use dioptric_analysis::{LensData, LensPageData, placement_lines, surface_rows};
+use dioptric_analysis::{LensData, LensPageData, WavefrontRow, placement_lines, surface_rows};
+use dioptric_optics::{Layout, SeidelSums};
 use dioptric_pipeline::PipelineError;
 
 use super::{AnalysisPlots, LensDrawing, glass_map::glass_map_svg};
@@ -39,6 +40,10 @@ impl LensPage<'_> {
                          that, by HURB.";
             body += &section("Modulation", &(charts + &note(words)));
         }
+        let curves = page::charts(self.shown.curves.0.iter().map(|(_, chart)| chart));
+        body += &section("Focus, spots and light over wavelength, field and film", &curves);
+        body += &section("Aberrations of each surface", &self.surface_sums());
+        body += &section("Zernike coefficients", &self.zernike());
         let fans = "Tangential rays and curves are those in the plane of axis and field (along y), sagittal ones across it \
                     (along x): solid and dashed where they share a plot. Each spot has its own scale; the gray circle is Airy's \
                     first zero.";
@@ -56,7 +61,7 @@ impl LensPage<'_> {
     /// Draws the lens with the rays of the fields, as far as a drawing shows them.
     fn drawing(&self) -> Result<String, PipelineError> {
         let analysis = self.plots.0;
-        let steepest_deg = 89.0;
+        let steepest_deg = if analysis.distance_mm.is_finite() { 89.0 } else { *Layout::WIDEST_FIELDS_DEG.end() };
         let mut fields_deg: Vec<f64> = analysis.fields.iter().map(|row| row.place.field_xy_deg[1]).collect();
         fields_deg.retain(|field_deg| field_deg.abs() < steepest_deg);
         fields_deg.sort_by(f64::total_cmp);
@@ -65,7 +70,8 @@ impl LensPage<'_> {
             fields_deg,
             distance_mm: analysis.distance_mm,
             wavelengths_nm: vec![analysis.reference_nm],
-            film_distance_mm: Some(analysis.film_distance_mm),
+            film_distance_mm: analysis.film_distance_mm,
+            film_label: format!("film: {}", analysis.film),
         };
         drawing.to_svg(&self.shown.lens)
     }
@@ -143,6 +149,82 @@ impl LensPage<'_> {
             self.shown.sums_field_deg
         );
         self.by_wavelength(&rows) + &note(&words)
+    }
+
+    /// The Seidel sums of each surface at the reference wavelength, in waves of the wavefront at the edge of pupil and field.
+    fn surface_sums(&self) -> String {
+        let reference_nm = self.plots.0.reference_nm;
+        let data = self.shown.data.iter().find(|data| data.first_order.wavelength_nm == reference_nm);
+        let Some((data, total)) = data.and_then(|data| Some((data, data.seidel?))) else { return self.third_order() };
+        // W040, W131, W222, W220 of Petzval's part, W311, W020 and W111 of color (Welford 1986, 8.2).
+        let waves = |sums: &SeidelSums| {
+            let per_mm = 1.0 / (reference_nm * 1e-6);
+            [sums.s1 / 8.0, sums.s2 / 2.0, sums.s3 / 2.0, sums.s4 / 4.0, sums.s5 / 2.0, sums.c1 / 2.0, sums.c2]
+                .map(|mm| mm * per_mm)
+        };
+        let all: Vec<[f64; 7]> = data.seidel_surfaces.iter().map(waves).collect();
+        let largest: Vec<f64> = (0..7).map(|i| all.iter().map(|row| row[i].abs()).fold(0.0, f64::max)).collect();
+        let cell = |value: f64, largest: f64| {
+            if !value.is_finite() {
+                return "<td class=\"n\">–</td>".to_owned();
+            }
+            let width = if largest > 0.0 { 3.0 * (value / largest).abs() } else { 0.0 };
+            let color = if value < 0.0 { "#d55e00" } else { "#0072b2" };
+            format!(
+                "<td class=\"n\">{:.3}<br><span style=\"display:inline-block;height:.3em;width:{width:.2}em;background:{color}\"></span></td>",
+                value + 0.0
+            )
+        };
+        let row = |(surface, values): (usize, &[f64; 7])| {
+            let cells: String = values.iter().zip(&largest).map(|(value, largest)| cell(*value, *largest)).collect();
+            format!("<tr><td>{surface}</td>{cells}</tr>\n")
+        };
+        let rows: String = all.iter().enumerate().map(row).collect();
+        let sums: String = waves(&total).map(|value| cell(value, 0.0)).concat();
+        let words = format!(
+            "Third-order wavefront aberrations at the edge of pupil and field ({:.2}°), waves of {reference_nm:.1} nm, in Welford's signs: \
+             W040 = S1/8, W131 = S2/2, W222 = S3/2, W220 = S4/4 (Petzval's), W311 = S5/2, and color W020 = C1/2, W111 = C2{}.",
+            self.shown.sums_field_deg,
+            data.seidel_colors_nm.map_or(String::new(), |[short, long]| format!(" from {short:.1} to {long:.1} nm"))
+        );
+        format!(
+            "<table>\n<tr><th>surface</th><th class=\"n\">W040</th><th class=\"n\">W131</th><th class=\"n\">W222</th>\
+             <th class=\"n\">W220</th><th class=\"n\">W311</th><th class=\"n\">W020</th><th class=\"n\">W111</th></tr>\n{rows}\
+             <tr><td>sum</td>{sums}</tr>\n</table>\n{}",
+            note(&words)
+        )
+    }
+
+    /// The coefficients of the wavefronts of the reference wavelength, a column a field.
+    fn zernike(&self) -> String {
+        let analysis = self.plots.0;
+        let spots: Vec<_> = analysis
+            .spots
+            .iter()
+            .filter(|spot| spot.wavelength_nm == analysis.reference_nm)
+            .filter_map(|spot| Some((spot.place.label(), spot.wavefront.as_ref()?)))
+            .collect();
+        if spots.is_empty() {
+            return note("No field has a wavefront.");
+        }
+        let head: String = spots.iter().map(|(label, _)| format!("<th class=\"n\">{label}</th>")).collect();
+        let table = |name: &str, of: &dyn Fn(&WavefrontRow) -> &Vec<f64>| {
+            let n_terms = of(spots[0].1).len();
+            let row = |term: usize| {
+                let cells: String = spots
+                    .iter()
+                    .map(|(_, front)| format!("<td class=\"n\">{:.4}</td>", of(front)[term] + 0.0))
+                    .collect();
+                format!("<tr><td>Z{}</td>{cells}</tr>\n", term + 1)
+            };
+            let rows: String = (0..n_terms).map(row).collect();
+            format!("<details><summary>{name}</summary>\n<table>\n<tr><th></th>{head}</tr>\n{rows}</table></details>\n")
+        };
+        let words = "Over the unit disc of the stop, at the reference wavelength, about the best sphere; positive where the wavefront is \
+                     ahead of it, the sign of OpticStudio and CODE V.";
+        table("Noll's order, waves rms (OpticStudio: Zernike standard)", &|front| &front.zernike_waves)
+            + &table("Fringe set, waves at the edge", &|front| &front.fringe_waves)
+            + &note(words)
     }
 
     /// Returns a table of rows with one column a wavelength.

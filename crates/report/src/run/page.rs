@@ -28,7 +28,8 @@ pub(super) fn render(page: &Page<'_>) -> Result<String, PipelineError> {
             .collect(),
         distance_mm: page.run.capture.place.focus_distance_mm.unwrap_or(f64::INFINITY),
         wavelengths_nm: vec![REFERENCE_WAVELENGTH_NM],
-        film_distance_mm: Some(page.run.capture.place.film_distance_mm),
+        film_distance_mm: page.run.capture.place.film_distance_mm,
+        film_label: "film".to_owned(),
     };
     let pictures = Pictures {
         picture: picture(page)?,

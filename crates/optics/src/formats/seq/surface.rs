@@ -425,20 +425,13 @@ impl SeqSurface {
     /// Returns the surface with the openings and obscurations that the file states for it.
     fn with_apertures(&self, mm: f64, mut surface: SystemSurface) -> SystemSurface {
         let mut opening = self.opening;
-        // A circle off the axis is an opening; one about the axis is the rim.
-        if opening.center != [0.0; 2] {
-            opening.radius = self.clear_radius;
-        }
+        opening.radius = self.clear_radius;
         for (stated, is_obscuration) in [(opening, false), (self.obscuration, true)] {
             let stated = if self.is_turned() { stated.turned() } else { stated };
             let center_mm = stated.center.map(|place| place * mm);
             for outline in stated.outlines(mm) {
                 surface = surface.with_aperture(Aperture { surface: 0, outline, center_mm, is_obscuration });
             }
-        }
-        // A circle about the axis bounds light beside another opening.
-        if let (Some(radius), true) = (self.clear_radius, opening.center == [0.0; 2]) {
-            surface.semi_aperture_mm = surface.semi_aperture_mm.map(|rim_mm| rim_mm.min(radius * mm));
         }
         if let Some(radius) = self.hole_radius {
             let outline = Outline::Circle { radius_mm: radius * mm };

@@ -92,6 +92,10 @@ impl Zmx {
         if n < 2 {
             return self.into_system(name, glasses.clone())?.build();
         }
+        if self.surface_numbers.iter().enumerate().any(|(i, number)| i != *number) {
+            let reason = "MNUM: several configurations of a file that leaves out numbers of surfaces are not supported";
+            return Err(TextError { line: None, reason: reason.to_owned() });
+        }
         if n > MOST_CONFIGURATIONS {
             let reason = format!("MNUM: {n} configurations, expected at most {MOST_CONFIGURATIONS}");
             return Err(TextError { line: None, reason });

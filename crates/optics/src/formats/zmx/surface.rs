@@ -298,15 +298,7 @@ impl ZmxSurface {
         let circle = |radius: f64| Outline::Circle { radius_mm: radius * mm };
         let (half_x_mm, half_y_mm) = (first * mm, second * mm);
         match keyword.as_str() {
-            // A round rim about the axis.
-            "CLAP" if *first == 0.0 && center_mm == [0.0; 2] => {
-                SystemSurface { semi_aperture_mm: Some(second * mm), is_rim_fixed: true, ..surface }
-            }
             "CLAP" if *first == 0.0 => surface.with_aperture(of(circle(*second), false)),
-            "CLAP" if center_mm == [0.0; 2] => {
-                let ring = SystemSurface { semi_aperture_mm: Some(second * mm), ..surface };
-                ring.with_aperture(of(circle(*first), true))
-            }
             "CLAP" => surface.with_aperture(of(circle(*second), false)).with_aperture(of(circle(*first), true)),
             "OBSC" => surface.with_aperture(of(circle(*second), true)),
             "ELAP" | "ELOB" => surface.with_aperture(of(Outline::Ellipse { half_x_mm, half_y_mm }, keyword == "ELOB")),

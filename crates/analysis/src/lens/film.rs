@@ -1,0 +1,87 @@
+//! Where the film is: one rule for everything that is asked of a lens.
+
+use dioptric_optics::{
+    Lens, MonoLens, ObjectPoint,
+    analysis::{Autofocus, PupilRule},
+    glam::DVec2,
+};
+
+use dioptric_pipeline::PipelineError;
+
+/// Where the film is to be.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum AnalysisFilm {
+    /// At the image plane that the file of the lens states, this far behind the last vertex, mm.
+    OfFile(f64),
+    /// Where the spot on the axis is smallest, all wavelengths together.
+    BestFocus,
+    /// At the paraxial image, at the reference wavelength, of an object this far before the first vertex, mm.
+    FocusMm(f64),
+    /// This far behind the last vertex, mm.
+    FilmMm(f64),
+}
+
+/// For what a film is looked for.
+#[derive(Clone, Copy, Debug)]
+pub struct FilmUse<'a> {
+    /// The wavelengths that are to be in focus together, nm.
+    pub wavelengths_nm: &'a [f64],
+    /// The wavelength of paraxial images and of the field, nm.
+    pub reference_nm: f64,
+    /// Distance of the object before the first vertex, mm; infinite for a far one.
+    pub distance_mm: f64,
+}
+
+/// A film that was found.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FilmPlace {
+    /// Distance behind the last vertex, mm.
+    pub distance_mm: f64,
+    /// What is there, in a few words.
+    pub origin: String,
+}
+
+/// Rings of the rays by which a film is found.
+const RINGS: usize = 12;
+
+impl AnalysisFilm {
+    /// Returns where the film is.
+    ///
+    /// # Errors
+    /// When a glass is not known at a wavelength, or there is no image to focus on.
+    pub fn place(self, lens: &Lens, of: FilmUse<'_>) -> Result<FilmPlace, PipelineError> {
+        let reference = lens.at(of.reference_nm)?;
+        let paraxial = |distance_mm| Ok::<f64, PipelineError>(reference.film_distance_mm_for(distance_mm)?);
+        let distance_mm = match self {
+            Self::OfFile(film_mm) | Self::FilmMm(film_mm) => film_mm,
+            Self::FocusMm(distance_mm) => paraxial(distance_mm)?,
+            Self::BestFocus => {
+                let from = paraxial(of.distance_mm);
+                let lenses = of.wavelengths_nm.iter().map(|&nm| lens.at(nm)).collect::<Result<Vec<MonoLens>, _>>()?;
+                let found =
+                    from.as_ref().ok().and_then(|&from_mm| best_on_axis(&reference, &lenses, of.distance_mm, from_mm));
+                found.map_or(from, |(film_mm, _)| Ok(film_mm))?
+            }
+        };
+        Ok(FilmPlace { distance_mm, origin: self.origin() })
+    }
+
+    /// Returns what is at the film, in a few words.
+    pub fn origin(self) -> String {
+        match self {
+            Self::OfFile(_) => "the image plane of the lens's file".to_owned(),
+            Self::BestFocus => "the smallest spot on the axis".to_owned(),
+            Self::FocusMm(distance_mm) if distance_mm.is_infinite() => "the paraxial image of a far object".to_owned(),
+            Self::FocusMm(distance_mm) => format!("the paraxial image of an object at {distance_mm} mm"),
+            Self::FilmMm(_) => "where it was asked for".to_owned(),
+        }
+    }
+}
+
+/// Returns the film with the smallest spot of the point on the axis, sought about `from_mm`, and its size, both mm; `None` where no
+/// light comes from there.
+fn best_on_axis(reference: &MonoLens, lenses: &[MonoLens], distance_mm: f64, from_mm: f64) -> Option<(f64, f64)> {
+    let dioptres = 1e3 / (distance_mm + reference.projection_center_z_mm());
+    let axis = [ObjectPoint::from_field(reference, DVec2::ZERO, dioptres)];
+    Autofocus { lenses, points: &axis, rule: PupilRule::of_rings(RINGS) }.best_film_mm(from_mm)
+}

@@ -1,0 +1,121 @@
+//! The Optical Bench's text and `.lens` files of photographic patents.
+
+#![expect(clippy::unwrap_used, reason = "a helper of tests fails by panicking")]
+
+use std::path::{Path, PathBuf};
+
+use dioptric_golden::needs_shared;
+use dioptric_optics::{LensFile, ReadOptions, Shape};
+
+/// The folder of the files; tests that need it are left out where it is not there.
+fn folder() -> PathBuf {
+    dioptric_golden::shared("data/lenses/bench").unwrap()
+}
+
+fn bench(name: &str) -> LensFile {
+    LensFile::read(&folder().join(name), &ReadOptions::default()).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// The lenses that have a listing of first-order data beside them, by another program.
+const LISTED: [(&str, &str); 7] = [
+    ("canon-fd50mm-f1.2--US004364643_Example02.txt", "canon-fd50mm-f1.2--paraxial.txt"),
+    ("leica-m-noctilux-50mm-f1.0--leica-noctilux-50mm-f1.txt", "leica-m-noctilux-50mm-f1.0--paraxial.txt"),
+    ("nikkor-28mm-f1.4e--nikkor-28mmf1.4-afs.txt", "nikkor-28mm-f1.4e--paraxial.txt"),
+    ("nikkor-50mm-f1.2AIS--US004621909_Example03.txt", "nikkor-50mm-f1.2AIS--paraxial.txt"),
+    ("version10--Noct-Nikkor-58mmf1.2.txt", "version10--paraxial.txt"),
+    ("version2--Noct-Nikkor-58mmf1.2-v2-1.txt", "version2--paraxial.txt"),
+    ("zeiss-contax-planar-50mm-f1.4--US003874771_Example01.txt", "zeiss-contax-planar-50mm-f1.4--paraxial.txt"),
+];
+
+#[needs_shared]
+#[test]
+fn bench_lenses_have_the_focal_length_of_their_listing() {
+    for (name, listing) in LISTED {
+        let listing = std::fs::read_to_string(folder().join(listing)).unwrap();
+        let value = |key: &str| -> f64 {
+            let line = listing.lines().find(|line| line.split_whitespace().next() == Some(key)).unwrap();
+            line.split_whitespace().nth(1).unwrap().parse().unwrap()
+        };
+        let first = bench(name).lens.at(587.5618).unwrap().first_order();
+        for (found, key) in [(first.efl_mm, "effective_focal_length"), (first.bfl_mm, "back_focal_length")] {
+            let expected = value(key);
+            // The listing's glasses are constant indices; named ones of catalogues differ by a few units of the fifth digit.
+            assert!((found / expected - 1.0).abs() < 3e-4, "{name}: {key} {found} {expected}");
+        }
+    }
+}
+
+#[needs_shared]
+#[test]
+fn columns_of_variable_distances_are_configurations() {
+    let file = bench("sigma-50mm-f1.4-art--JP2015-114366_Example04.txt");
+    let states = file.states();
+    assert_eq!(states.len(), 2);
+    assert_eq!((states[0].object_distance_mm, states[1].object_distance_mm), (None, Some(258.0)));
+    // The second is in focus at its own distance: magnification −0.1736.
+    let near = states[1].lens.at(587.5618).unwrap().conjugate(258.0);
+    assert!((near.magnification + 0.1736).abs() < 5e-4, "{near:?}");
+    assert!(
+        (near.image_z_mm - states[1].film_distance_mm.unwrap()).abs() < 0.1,
+        "{near:?} {:?}",
+        states[1].film_distance_mm
+    );
+    let far = states[0].lens.at(587.5618).unwrap().first_order();
+    assert!((far.efl_mm - 48.50).abs() < 0.05, "{}", far.efl_mm);
+    assert_eq!(file.configuration_names()[1], "47.65 mm, object at 258 mm");
+}
+
+#[needs_shared]
+#[test]
+fn all_bench_files_are_read_or_are_no_lenses() {
+    let mut n_read = 0;
+    for entry in std::fs::read_dir(folder()).unwrap() {
+        let path = entry.unwrap().path();
+        let name = path.file_name().unwrap().to_string_lossy().into_owned();
+        if name.ends_with("paraxial.txt") {
+            assert!(LensFile::read(&path, &ReadOptions::default()).is_err());
+            continue;
+        }
+        let file = LensFile::read(&path, &ReadOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+        let first = file.lens.at(587.5618).unwrap().first_order();
+        assert!(first.efl_mm.is_finite() && first.f_number.is_finite(), "{name}");
+        if name.ends_with(".lens") {
+            let text = std::fs::read_to_string(&path).unwrap();
+            let stated = text.lines().find_map(|line| line.strip_prefix("focal_length:")).unwrap();
+            let stated: f64 = stated.trim().parse().unwrap();
+            // Nominal focal lengths are rounded.
+            assert!((first.efl_mm / stated - 1.0).abs() < 0.03, "{name}: {} {stated}", first.efl_mm);
+            assert!(file.film_distance_mm.is_some());
+        }
+        n_read += 1;
+    }
+    assert_eq!(n_read, 20);
+}
+
+#[test]
+fn what_a_bench_file_has_wrong_is_said_with_its_line() {
+    let text = "[descriptive data]\ntitle\tA\n[variable distances]\nd0\tInfinity\nBf\t40\n[lens data]\n1\t50\t5\t1.5\t20\t60\n\
+                2AS\tAS\t1\t\t15\n3\t-50\tBf\t\t20\n[aspherical data]\n3\t-50\t-0.5\t1e-6\n";
+    let read = |text: &str| LensFile::from_bytes(Path::new("a.txt"), text.as_bytes(), &ReadOptions::default());
+    let file = read(text).unwrap();
+    assert_eq!((file.lens.stop(), file.film_distance_mm), (1, Some(40.0)));
+    assert_eq!(file.lens.interfaces()[2].surface.shape, Shape::EvenAsphere { conic: -0.5, coefficients: vec![1e-6] });
+    for (wrong, right, words) in [
+        ("\tBf\t\t20", "\td9\t\t20", "line 9: the distance behind a surface is 'd9'"),
+        ("1\t50\t", "1\tx\t", "line 7: the radius is 'x', expected a number"),
+        ("\n3\t-50\t-0.5", "\n4\t-50\t-0.5", "line 11: there is no surface '4' in [lens data]"),
+    ] {
+        let message = read(&text.replace(wrong, right)).unwrap_err().to_string();
+        assert!(message.contains(words), "{message}");
+    }
+    let of_lens = |text: &str| LensFile::from_bytes(Path::new("a.lens"), text.as_bytes(), &ReadOptions::default());
+    let text = "name: A\nfocal_length: 50\nsurfaces:\n 50 5 1.5 60 20 1\n stop 1 1 0 15 0\n -50 45 1 0 20 0\n";
+    let file = of_lens(text).unwrap();
+    assert!(file.notes.iter().any(|note| note.contains("the coatings of 1 surfaces are left out")), "{:?}", file.notes);
+    assert_eq!(
+        (file.lens.stop(), file.film_distance_mm, file.lens.interfaces()[0].surface.semi_aperture_mm),
+        (1, Some(45.0), 10.0)
+    );
+    let message = of_lens(&text.replace("focal_length", "focal")).unwrap_err().to_string();
+    assert!(message.contains("line 2: 'focal: 50' is not known"), "{message}");
+}
