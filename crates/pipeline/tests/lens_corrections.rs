@@ -310,6 +310,7 @@ fn irradiance_without_its_lens_is_refused() {
         exit_pupil_mm: None,
         f_number: None,
         seed: 1,
+        chip_seed: 0,
         outputs: camera.outputs,
     };
     let message = request.sense(std::path::Path::new("irradiance.exr")).unwrap_err().to_string();

@@ -4,7 +4,7 @@ use dioptric_analysis::{
     AnalysisFields, AnalysisFilm, AnalysisRequest, LensDefaults, LensPageData, PsfRequest, PsfSampling,
 };
 use dioptric_optics::{Glass, Interface, Lens, LensFile, Shape, Surface};
-use dioptric_pipeline::{Diffraction, FocusSpec};
+use dioptric_pipeline::Diffraction;
 use dioptric_report::{AnalysisPlots, LensPage, psf_mosaic};
 
 fn analysis_request() -> AnalysisRequest {
