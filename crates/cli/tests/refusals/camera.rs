@@ -43,9 +43,9 @@ pub(crate) const CHANGED: &[(&str, &str, &str)] = &[
     ("stop: FNumber(4.0)", "stop: FNumber(NaN)", "FNumber is NaN, expected "),
     ("stop: FNumber(4.0)", "stop: FNumber(inf)", "FNumber is inf, expected "),
     ("stop: FNumber(4.0)", "stop: FNumber(0.5)", "dgauss-50mm opens to f/2.028 at most"),
-    ("stop: FNumber(4.0)", "stop: FNumber(1e-300)", "dgauss-50mm opens to f/2.028 at most"),
+    ("stop: FNumber(4.0)", "stop: FNumber(1e-300)", "expected 0.05 to 100000"),
     ("stop: FNumber(4.0)", "stop: DiameterMm(-3.0)", "DiameterMm is -3, expected "),
-    ("stop: FNumber(4.0)", "stop: DiameterMm(1e9)", "the stop of dgauss-50mm opens to at most 17.1 mm"),
+    ("stop: FNumber(4.0)", "stop: DiameterMm(1e9)", "DiameterMm is 1000000000, expected "),
     ("stop: FNumber(4.0)", "stop: Fnumber(4.0)", "Unexpected variant named `Fnumber` in enum `StopSpec`"),
     ("stop: FNumber(4.0)", "stop: 4.0", r#"Found invalid std identifier "4.0", try the raw"#),
     (
@@ -77,7 +77,7 @@ pub(crate) const CHANGED: &[(&str, &str, &str)] = &[
     ("pitch_um: 200.0", "pitch_um: 0.0", "pitch_um is 0, expected "),
     ("pitch_um: 200.0", "pitch_um: -200.0", "pitch_um is -200, expected "),
     ("pitch_um: 200.0", "pitch_um: inf", "pitch_um is inf, expected "),
-    ("pitch_um: 200.0", "pitch_um: 1e12", "the automatic exposure finds no light to meter, and"),
+    ("pitch_um: 200.0", "pitch_um: 1e12", "pitch_um is 1000000000000, expected "),
     (
         "film: Pixels(columns: 48, rows: 32, pitch_um: 200.0)",
         "film: Pixel(48)",
@@ -126,7 +126,7 @@ pub(crate) const CHANGED: &[(&str, &str, &str)] = &[
     (
         "ListNm([450.0, 550.0, 650.0])",
         "Range(first_nm: 400.0, last_nm: 700.0, step_nm: 1e-9)",
-        "400:700:0.000000001 nm is not a wavelength range with a",
+        "step_nm is 0.000000001, expected ",
     ),
     (
         "ListNm([450.0, 550.0, 650.0])",
