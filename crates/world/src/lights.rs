@@ -7,7 +7,7 @@ use glam::Vec3;
 use std::{f32::consts::TAU, f64::consts::PI};
 
 use crate::{
-    Hit, Light, LightId, LightSample, Receiver, SpectralCurve,
+    Hit, Light, LightId, LightSample, Receiver, ShapeId, SpectralCurve,
     area_light::AreaLight,
     light::visible_power,
     light_tree::{BELOW_ONE, LightBounds, LightTree},
@@ -102,6 +102,14 @@ impl Lights {
             false => Choice::Tree(Box::new(ManyLights::new(&lights, shapes))),
         };
         Self { lights, choice, skies }
+    }
+
+    /// The shape that is a light; `None` of lights that are no shapes.
+    pub(crate) fn shape_of(&self, light: LightId) -> Option<ShapeId> {
+        match &self.lights[light.0 as usize] {
+            Source::Area(area) => Some(area.shape()),
+            Source::Alone(_) | Source::Sky(_) => None,
+        }
     }
 
     pub(crate) fn len(&self) -> usize {

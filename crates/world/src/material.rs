@@ -7,6 +7,7 @@ use crate::{
     bsdf::{Lobe, MAX_LOBES},
     fresnel,
     microfacet::Ggx,
+    pattern::OwnFrame,
     sampling::Frame,
     texture::Textures,
 };
@@ -82,6 +83,8 @@ pub enum Relief {
     Heights(TextureId),
     /// A picture of normals: red, green and blue 0–1 stand for −1 to 1 along u, v and the normal.
     Normals(TextureId),
+    /// The [tilt](crate::Pattern::tilt) of a pattern.
+    Pattern(TextureId),
 }
 
 impl SpectralCurve {
@@ -152,6 +155,7 @@ impl Material {
 pub(crate) struct Surfaces<'a> {
     pub(crate) surfaces: &'a [Surface],
     pub(crate) textures: Textures<'a>,
+    pub(crate) place: OwnFrame<'a>,
 }
 
 impl Surfaces<'_> {
@@ -241,6 +245,10 @@ impl Surfaces<'_> {
                 let normal = (along_u + slope_u * n).cross(along_v + slope_v * n).normalize_or(n);
                 let normal = if normal.dot(n) < 0.0 { -normal } else { normal };
                 Frame::about_with(normal, hit.dp_du)
+            }
+            Some(Relief::Pattern(pattern)) => {
+                let tilted = self.textures.1.normal + self.textures.tilt(pattern);
+                Frame::about_with(self.place.world_normal(tilted), hit.dp_du)
             }
             Some(Relief::Normals(normals)) => {
                 let n = Vec3::from_array(self.textures.rgb(normals, hit.uv).map(|v| 2.0 * v - 1.0));

@@ -2,9 +2,12 @@
 
 use std::sync::Arc;
 
-use glam::{Mat2, Vec2};
+use glam::{DVec3, Mat2, Vec2};
 
-use crate::{ImageTexture, SpectralCurve, TextureId};
+use crate::{
+    ImageTexture, PatternPoint, PatternRef, SpectralCurve, TextureId,
+    pattern::MOST_SHARES,
+};
 
 /// A value over a surface: a spectrum where a color is asked for, a number where a number is.
 ///
@@ -38,6 +41,13 @@ pub enum Texture {
         /// The share of the second, 0–1.
         amount: TextureId,
     },
+    /// Textures that share the surface by a formula of the place, in the frame of the shape.
+    Pattern {
+        /// Up to 32 textures.
+        of: Vec<TextureId>,
+        /// What each counts where.
+        by: PatternRef,
+    },
 }
 
 /// Texture coordinates as a function of those of the surface: `matrix · uv + offset`.
@@ -70,17 +80,18 @@ impl Texture {
     /// The textures that this one is made of.
     pub(crate) fn parts(&self) -> impl Iterator<Item = TextureId> {
         let parts: [Option<TextureId>; 3] = match self {
-            Self::Curve(_) | Self::Image { .. } => [None; 3],
+            Self::Curve(_) | Self::Image { .. } | Self::Pattern { .. } => [None; 3],
             Self::Checkerboard { fields: [a, b], .. } | Self::Product([a, b]) => [Some(*a), Some(*b), None],
             Self::Blend { of: [a, b], amount } => [Some(*a), Some(*b), Some(*amount)],
         };
-        parts.into_iter().flatten()
+        let of_pattern = if let Self::Pattern { of, .. } = self { of.as_slice() } else { &[] };
+        parts.into_iter().flatten().chain(of_pattern.iter().copied())
     }
 }
 
-/// Looks textures up.
+/// Looks textures up; those by formula at a point.
 #[derive(Clone, Copy)]
-pub(crate) struct Textures<'a>(pub(crate) &'a [Texture]);
+pub(crate) struct Textures<'a>(pub(crate) &'a [Texture], pub(crate) &'a PatternPoint);
 
 impl Textures<'_> {
     /// Returns the spectrum at a point; not held to any range.
@@ -102,6 +113,29 @@ impl Textures<'_> {
                 let amount = self.number(*amount, uv).clamp(0.0, 1.0);
                 std::array::from_fn(|i| a[i] + amount * (b[i] - a[i]))
             }
+            Texture::Pattern { of, by } => {
+                let mut sum = [0.0; N];
+                for (share, part) in self.shares(of, by) {
+                    let value = self.spectral(part, uv, wavelengths_nm);
+                    sum.iter_mut().zip(value).for_each(|(sum, value)| *sum += share * value);
+                }
+                sum
+            }
+        }
+    }
+
+    /// Returns the textures of a pattern that count at the point, each with its share.
+    fn shares<'b>(self, of: &'b [TextureId], by: &PatternRef) -> impl Iterator<Item = (f32, TextureId)> + use<'b> {
+        let mut shares = [0.0; MOST_SHARES];
+        by.shares(self.1, &mut shares[..of.len()]);
+        shares.into_iter().zip(of.iter().copied()).filter(|(share, _)| *share != 0.0)
+    }
+
+    /// Returns the relief of a pattern at the point: what is added to its normal.
+    pub(crate) fn tilt(self, id: TextureId) -> DVec3 {
+        match &self.0[id.0 as usize] {
+            Texture::Pattern { by, .. } => by.tilt(self.1),
+            _ => DVec3::ZERO,
         }
     }
 
@@ -115,6 +149,9 @@ impl Textures<'_> {
             Texture::Blend { of: [a, b], amount } => {
                 let [a, b] = [*a, *b].map(|t| self.number(t, uv));
                 a + self.number(*amount, uv).clamp(0.0, 1.0) * (b - a)
+            }
+            Texture::Pattern { of, by } => {
+                self.shares(of, by).map(|(share, part)| share * self.number(part, uv)).sum()
             }
         }
     }

@@ -3,12 +3,13 @@
 use glam::{DAffine3, DVec3, Vec2, Vec3};
 
 use crate::{
-    Bsdf, Emission, GroupId, Hit, InstanceId, Light, LightSample, Material, MaterialId, Ray, Receiver, Relief, Shape,
+    Bsdf, Emission, GroupId, Hit, InstanceId, Light, LightSample, Material, MaterialId, PatternPoint, Ray, Receiver, Relief, Shape,
     ShapeId, Texture, TextureId, TriangleMesh, WorldCamera, WorldError,
     group::{Crossing, Group, GroupParts, Instance, Parts, Primitive},
     lights::Lights,
     material::{Surface, Surfaces},
     mesh::normal_matrix,
+    pattern::{Frames, MOST_SHARES, Patterned},
     placed::{PlacedKind, PlacedShape},
     shape::Quadric,
     texture::{MAX_DEPTH, Textures},
@@ -27,6 +28,7 @@ pub struct World {
     lights: Lights,
     cameras: Vec<WorldCamera>,
     notes: Vec<String>,
+    patterned: Patterned,
 }
 
 /// All that a ray can meet.
@@ -55,6 +57,13 @@ impl Parts for Geometry {
     }
 }
 
+impl Frames for Geometry {
+    fn instance_place(&self, instance: InstanceId) -> (&DAffine3, &DAffine3) {
+        let Instance { place, inverse, .. } = &self.instances[instance.0 as usize];
+        (place, inverse)
+    }
+}
+
 impl World {
     /// Returns where a ray first meets a surface nearer than `t_max_m`.
     pub fn intersect(&self, ray: &Ray, t_max_m: f32) -> Option<Hit> {
@@ -75,18 +84,33 @@ impl World {
     ///
     /// `outgoing` has length 1 and points away from the surface, against the ray that met it.
     pub fn bsdf<const N: usize>(&self, hit: &Hit, outgoing: Vec3, wavelengths_nm: &[f32; N]) -> Bsdf<N> {
-        let surfaces = Surfaces { surfaces: &self.surfaces, textures: Textures(&self.textures) };
-        surfaces.bsdf(hit, outgoing, wavelengths_nm)
+        let (place, at) = self.patterned.place_of(hit, &self.geometry);
+        let textures = Textures(&self.textures, &at);
+        Surfaces { surfaces: &self.surfaces, textures, place }.bsdf(hit, outgoing, wavelengths_nm)
     }
 
     /// Returns the radiance, W m⁻² sr⁻¹ nm⁻¹, that the surface at a hit gives of itself towards `outgoing`.
     pub fn emission<const N: usize>(&self, hit: &Hit, outgoing: Vec3, wavelengths_nm: &[f32; N]) -> [f32; N] {
         match &self.geometry.shapes[hit.shape.0 as usize].emission {
             Some(emission) if emission.is_two_sided || hit.geometric_normal.dot(outgoing) > 0.0 => {
-                emission.radiance.at(wavelengths_nm)
+                let share = self.glow_at(hit.shape, hit.point, hit.instance);
+                emission.radiance.at(wavelengths_nm).map(|l| share * l)
             }
             _ => [0.0; N],
         }
+    }
+
+    /// Returns what the glow of a shape is multiplied by at a point of it.
+    fn glow_at(&self, shape: ShapeId, point: Vec3, instance: Option<InstanceId>) -> f32 {
+        let Some(texture) = self.patterned.glow_of(shape) else { return 1.0 };
+        let place = self.patterned.place(shape, instance, &self.geometry);
+        let at = PatternPoint { point_m: place.own_point(point), ..PatternPoint::default() };
+        Textures(&self.textures, &at).number(texture, Vec2::ZERO).max(0.0)
+    }
+
+    /// Whether two shapes are one thing: the same shape, or some that were [joined](WorldBuilder::join).
+    pub fn are_one_thing(&self, a: ShapeId, b: ShapeId) -> bool {
+        a == b || self.patterned.are_joined(a, b)
     }
 
     /// Returns the radiance, W m⁻² sr⁻¹ nm⁻¹, that comes from a direction in which nothing is met.
@@ -104,7 +128,14 @@ impl World {
         u: [f32; 2],
         wavelengths_nm: &[f32; N],
     ) -> Option<LightSample<N>> {
-        self.lights.sample(&self.geometry.shapes, &at.into(), u_light, u, wavelengths_nm)
+        let at = at.into();
+        let drawn = self.lights.sample(&self.geometry.shapes, &at, u_light, u, wavelengths_nm)?;
+        if !self.patterned.has_glow() {
+            return Some(drawn);
+        }
+        let Some(shape) = self.lights.shape_of(drawn.light) else { return Some(drawn) };
+        let share = self.glow_at(shape, at.point + drawn.distance_m * drawn.direction, None);
+        Some(LightSample { radiance: drawn.radiance.map(|l| share * l), ..drawn })
     }
 
     /// Returns the density, 1/sr, with which [`sample_light`](Self::sample_light) draws the glowing point of a hit.
@@ -218,6 +249,7 @@ impl TriangleMesh {
             primitive: triangle,
             material: MaterialId(0),
             instance: None,
+            footprint_m: 0.0,
         }
     }
 }
@@ -249,6 +281,7 @@ impl Quadric {
             primitive: 0,
             material: MaterialId(0),
             instance: None,
+            footprint_m: 0.0,
         }
     }
 }
@@ -296,6 +329,8 @@ pub struct WorldBuilder {
     lights: Vec<Light>,
     cameras: Vec<WorldCamera>,
     notes: Vec<String>,
+    glows: Vec<(ShapeId, TextureId)>,
+    things: Vec<Vec<ShapeId>>,
 }
 
 /// A shape to be placed.
@@ -327,6 +362,8 @@ impl WorldBuilder {
             lights: Vec::new(),
             cameras: Vec::new(),
             notes: Vec::new(),
+            glows: Vec::new(),
+            things: Vec::new(),
         }
     }
 
@@ -378,6 +415,16 @@ impl WorldBuilder {
         }
     }
 
+    /// Multiplies the glow of a shape by a texture, asked as a number by position: not by texture coordinates or normals.
+    pub fn vary_emission(&mut self, shape: ShapeId, by: TextureId) {
+        self.glows.push((shape, by));
+    }
+
+    /// Says that shapes are one thing, such as a vase and its inside: what one of them hides lies behind them all.
+    pub fn join(&mut self, shapes: impl IntoIterator<Item = ShapeId>) {
+        self.things.push(shapes.into_iter().collect());
+    }
+
     /// Begins a group of shapes that stands nowhere until it is placed by [`add_instance`](Self::add_instance).
     pub fn add_group(&mut self) -> GroupId {
         self.n_groups += 1;
@@ -418,7 +465,8 @@ impl WorldBuilder {
     /// When a part names another that isn't there, a shape has no extent, or a transform can't be undone.
     pub fn build(self) -> Result<World, WorldError> {
         self.check()?;
-        let Self { shapes, n_groups, instances, surfaces, textures, lights, cameras, notes } = self;
+        let patterned = Patterned::of(&self.textures, self.shapes.iter().map(|s| s.place), &self.glows, &self.things);
+        let Self { shapes, n_groups, instances, surfaces, textures, lights, cameras, notes, .. } = self;
         let mut placed: Vec<PlacedShape> = shapes.into_iter().map(NewShape::placed).collect();
         let instances: Vec<Instance> = instances
             .into_iter()
@@ -442,7 +490,7 @@ impl WorldBuilder {
         groups.insert(0, Group::build(root));
         let lights = Lights::new(lights, &mut placed);
         let geometry = Geometry { shapes: placed, instances, groups };
-        Ok(World { geometry, surfaces, textures, lights, cameras, notes })
+        Ok(World { geometry, surfaces, textures, lights, cameras, notes, patterned })
     }
 
     fn check(&self) -> Result<(), WorldError> {
@@ -477,11 +525,18 @@ impl WorldBuilder {
         }
         for surface in &self.surfaces {
             let relief = surface.relief.map(|relief| match relief {
-                Relief::Heights(texture) | Relief::Normals(texture) => texture,
+                Relief::Heights(texture) | Relief::Normals(texture) | Relief::Pattern(texture) => texture,
             });
             for texture in surface.material.textures().into_iter().chain(relief) {
                 named("a material", "texture", texture.0, self.textures.len())?;
             }
+        }
+        for (shape, texture) in &self.glows {
+            named("a glow", "shape", shape.0, self.shapes.len())?;
+            named("a glow", "texture", texture.0, self.textures.len())?;
+        }
+        for shape in self.things.iter().flatten() {
+            named("a thing", "shape", shape.0, self.shapes.len())?;
         }
         Surfaces::check_blends(&self.surfaces)?;
         // Textures are made of earlier ones, so that none is made of itself, and aren't nested too deep for a stack.
@@ -490,6 +545,10 @@ impl WorldBuilder {
             for part in texture.parts() {
                 named("a texture", "earlier texture", part.0, index)?;
                 depths[index] = depths[index].max(depths[part.0 as usize] + 1);
+            }
+            if texture.parts().count() > MOST_SHARES {
+                let (what, n) = ("textures of a pattern", texture.parts().count() as u64);
+                return Err(WorldError::TooMany { what, n, limit: MOST_SHARES as u64 });
             }
             if depths[index] > MAX_DEPTH {
                 let what = "textures within textures";
