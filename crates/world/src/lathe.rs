@@ -3,7 +3,7 @@
 use glam::{DVec2, DVec3};
 use std::f64::consts::{PI, TAU};
 
-use crate::{WorldError, shape::SurfacePoint};
+use crate::WorldError;
 
 /// A surface turned about the z axis, in bands on each of which radius² is a parabola of the height.
 ///
@@ -17,6 +17,16 @@ pub struct Lathe {
     z_min_m: f64,
     z_max_m: f64,
     max_radius_m: f64,
+}
+
+/// A point of a quadric's surface, in the frame of its shape or its group.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct SurfacePoint {
+    pub(crate) point: DVec3,
+    pub(crate) normal: DVec3,
+    pub(crate) dp_du: DVec3,
+    pub(crate) dp_dv: DVec3,
+    pub(crate) uv: DVec2,
 }
 
 /// radius² = c₀ + c₁ (z − bottom) + c₂ (z − bottom)² from `bottom` to `top`.
@@ -263,8 +273,7 @@ impl Lathe {
 
     /// Slices of bands, then rings, with their areas, m².
     fn areas(&self) -> impl Iterator<Item = (f64, (Part<'_>, usize))> {
-        let of_band =
-            |band| (0..SLICES).map(move |slice| (Band::slice_area(band, slice), (Part::Band(band), slice)));
+        let of_band = |band| (0..SLICES).map(move |slice| (Band::slice_area(band, slice), (Part::Band(band), slice)));
         let of_ring = |ring: &Ring| PI * (ring.outer * ring.outer - ring.inner * ring.inner);
         let rings = self.rings.iter().map(move |ring| (of_ring(ring), (Part::Ring(ring), 0)));
         self.bands.iter().flat_map(of_band).chain(rings)
@@ -438,7 +447,8 @@ mod tests {
 
     #[test]
     fn bad_profiles_are_refused() {
-        for bad in [&[[0.0, 1.0]][..], &[[0.0, 1.0], [0.0, 2.0]], &[[0.0, 1.0], [1.0, -1.0]], &[[0.0, f64::NAN], [1.0, 1.0]]]
+        for bad in
+            [&[[0.0, 1.0]][..], &[[0.0, 1.0], [0.0, 2.0]], &[[0.0, 1.0], [1.0, -1.0]], &[[0.0, f64::NAN], [1.0, 1.0]]]
         {
             assert!(Lathe::smooth(bad).is_err() && Lathe::cones(bad).is_err(), "{bad:?}");
         }

@@ -31,6 +31,7 @@ mod mesh;
 mod metals;
 mod microfacet;
 mod pattern;
+mod patterned;
 mod placed;
 mod ray;
 mod sampling;

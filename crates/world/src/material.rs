@@ -7,7 +7,7 @@ use crate::{
     bsdf::{Lobe, MAX_LOBES},
     fresnel,
     microfacet::Ggx,
-    pattern::OwnFrame,
+    patterned::OwnFrame,
     sampling::Frame,
     texture::Textures,
 };

@@ -3,7 +3,7 @@
 use glam::{DAffine3, DVec2, DVec3};
 use std::f64::consts::TAU;
 
-use crate::{Lathe, TriangleMesh, WorldError, mesh::normal_matrix};
+use crate::{Lathe, TriangleMesh, WorldError, lathe::SurfacePoint, mesh::normal_matrix};
 
 /// A shape about its own origin.
 #[derive(Clone, Debug, PartialEq)]
@@ -69,16 +69,6 @@ pub(crate) struct Quadric {
     place: DAffine3,
     inverse: DAffine3,
     normals_by: glam::DMat3,
-}
-
-/// A point of a quadric's surface, in the frame of its group.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct SurfacePoint {
-    pub(crate) point: DVec3,
-    pub(crate) normal: DVec3,
-    pub(crate) dp_du: DVec3,
-    pub(crate) dp_dv: DVec3,
-    pub(crate) uv: DVec2,
 }
 
 impl Quadric {

@@ -4,10 +4,7 @@ use std::sync::Arc;
 
 use glam::{DVec3, Mat2, Vec2};
 
-use crate::{
-    ImageTexture, PatternPoint, PatternRef, SpectralCurve, TextureId,
-    pattern::MOST_SHARES,
-};
+use crate::{ImageTexture, PatternPoint, PatternRef, SpectralCurve, TextureId, pattern::MOST_SHARES};
 
 /// A value over a surface: a spectrum where a color is asked for, a number where a number is.
 ///
@@ -150,9 +147,7 @@ impl Textures<'_> {
                 let [a, b] = [*a, *b].map(|t| self.number(t, uv));
                 a + self.number(*amount, uv).clamp(0.0, 1.0) * (b - a)
             }
-            Texture::Pattern { of, by } => {
-                self.shares(of, by).map(|(share, part)| share * self.number(part, uv)).sum()
-            }
+            Texture::Pattern { of, by } => self.shares(of, by).map(|(share, part)| share * self.number(part, uv)).sum(),
         }
     }
 

@@ -3,13 +3,14 @@
 use glam::{DAffine3, DVec3, Vec2, Vec3};
 
 use crate::{
-    Bsdf, Emission, GroupId, Hit, InstanceId, Light, LightSample, Material, MaterialId, PatternPoint, Ray, Receiver, Relief, Shape,
-    ShapeId, Texture, TextureId, TriangleMesh, WorldCamera, WorldError,
+    Bsdf, Emission, GroupId, Hit, InstanceId, Light, LightSample, Material, MaterialId, PatternPoint, Ray, Receiver,
+    Relief, Shape, ShapeId, Texture, TextureId, TriangleMesh, WorldCamera, WorldError,
     group::{Crossing, Group, GroupParts, Instance, Parts, Primitive},
     lights::Lights,
     material::{Surface, Surfaces},
     mesh::normal_matrix,
-    pattern::{Frames, MOST_SHARES, Patterned},
+    pattern::MOST_SHARES,
+    patterned::{Frames, Patterned},
     placed::{PlacedKind, PlacedShape},
     shape::Quadric,
     texture::{MAX_DEPTH, Textures},

@@ -68,7 +68,9 @@ mod tests {
         let nm = [400.0, 500.0, 600.0, 700.0];
         let mut n_lit = 0;
         for i in 0..4000_u32 {
-            let number = |salt: u32| (i.wrapping_mul(0x9e37_79b1 ^ salt).wrapping_mul(0x85eb_ca6b) >> 8) as f32 / (1 << 24) as f32;
+            let number = |salt: u32| {
+                (i.wrapping_mul(0x9e37_79b1 ^ salt).wrapping_mul(0x85eb_ca6b) >> 8) as f32 / (1 << 24) as f32
+            };
             let aim = Vec3::new(2.0 * number(1) - 1.0, 2.0 * number(2) - 1.0, 1.5 * number(3) - 0.2).normalize();
             let hit = world.intersect(&Ray { origin: Vec3::new(0.0, 0.225, 0.0), direction: aim }, f32::INFINITY);
             let mut hit = hit.expect("the room is closed");

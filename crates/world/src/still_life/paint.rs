@@ -431,9 +431,7 @@ fn label(point: DVec3, footprint: f64) -> Mix {
     let ink = print(x + 0.028, 0.004 - y, [0.0030, 0.0075], 18, footprint) * cover(-y, footprint);
     let crest = stripes(x.hypot(y - 0.022), 0.0035, footprint) * cover(0.013 - x.hypot(y - 0.022), footprint);
     let rule = line(y.abs() - 0.039, 0.0012, footprint);
-    Mix::one(Pigment::Linen.index())
-        .under(Pigment::Crimson.index(), crest.max(rule))
-        .under(Pigment::Ink.index(), ink)
+    Mix::one(Pigment::Linen.index()).under(Pigment::Crimson.index(), crest.max(rule)).under(Pigment::Ink.index(), ink)
 }
 
 fn die(point: DVec3, normal: DVec3, footprint: f64) -> Mix {

@@ -1,5 +1,7 @@
 //! What stands where in the still life.
 
+use std::sync::OnceLock;
+
 use glam::{DAffine3, DMat3, DVec3};
 
 use super::{
@@ -9,8 +11,8 @@ use super::{
     pigment::{Pigment, PigmentIndex, below_coat, reflectance},
 };
 use crate::{
-    Beyond, Emission, Lathe, Material as Surface, MaterialId, PatternRef, Relief, Shape, ShapeId, SpectralCurve, Texture,
-    TextureId, TriangleMesh, WorldBuilder,
+    Beyond, Emission, Lathe, Material as Surface, MaterialId, PatternRef, Relief, Shape, ShapeId, SpectralCurve,
+    Texture, TextureId, TriangleMesh, WorldBuilder,
 };
 use dioptric_spectrum::{Illuminant, Observer, WavelengthGrid};
 
@@ -29,7 +31,11 @@ struct Object {
 enum Material {
     Matte(Paint),
     /// Under a clear coat of this index; smooth where alpha is 0.
-    Coated { paint: Paint, index: f64, alpha: f64 },
+    Coated {
+        paint: Paint,
+        index: f64,
+        alpha: f64,
+    },
     /// A polished metal of the color of a pigment.
     Metal(PigmentIndex),
     /// Dark glass with a label.
@@ -231,14 +237,21 @@ enum Light {
 
 /// Returns the glow of a luminance, cd/m².
 fn glow(light: Light, luminance: f64, is_two_sided: bool) -> Emission {
-    let illuminant = match light {
-        Light::Day => Illuminant::Daylight(6200.0),
-        Light::Warm => Illuminant::Blackbody(2850.0),
+    // Of 1 cd/m².
+    static UNITS: OnceLock<[SpectralCurve; 2]> = OnceLock::new();
+    let unit = |illuminant: Illuminant| {
+        let grid = WavelengthGrid::uniform(360.0, 830.0, 5.0).expect("a valid range");
+        let shape = illuminant.spectrum();
+        let own = Observer::Cie1931.xyz(&grid, &shape.sample_or_zero(&grid)).luminance_cd_m2();
+        SpectralCurve::new(&shape, Beyond::Zero).scaled((1.0 / own) as f32)
     };
-    let fine = WavelengthGrid::uniform(300.0, 1100.0, 1.0).expect("a valid range");
-    let shape = illuminant.spectrum();
-    let own = Observer::Cie1931.xyz(&fine, &shape.sample_or_zero(&fine)).luminance_cd_m2();
-    Emission { radiance: SpectralCurve::new(&shape, Beyond::Zero).scaled((luminance / own) as f32), is_two_sided }
+    let units = UNITS.get_or_init(|| [unit(Illuminant::Daylight(6200.0)), unit(Illuminant::Blackbody(2850.0))]);
+    let [day, warm] = units;
+    let unit = match light {
+        Light::Day => day,
+        Light::Warm => warm,
+    };
+    Emission { radiance: unit.clone().scaled(luminance as f32), is_two_sided }
 }
 
 /// The window in the left wall: two by three panes of sky.
@@ -325,7 +338,11 @@ fn apple_skin(seed: u8) -> Material {
 }
 
 fn table(things: &mut Things) {
-    things.push(vec![block([1.0, 0.02, 0.82], Frame::at(0.05, -0.02, 1.24), Material::Coated { paint: Paint::Planks, index: 1.46, alpha: 0.035 })]);
+    things.push(vec![block(
+        [1.0, 0.02, 0.82],
+        Frame::at(0.05, -0.02, 1.24),
+        Material::Coated { paint: Paint::Planks, index: 1.46, alpha: 0.035 },
+    )]);
     let cloth = Frame::at(-0.02, CLOTH_HALF.y, 1.12).turned_deg(16.0);
     things.push(vec![block(CLOTH_HALF.to_array(), cloth, Material::Matte(Paint::Cloth))]);
 }
@@ -438,8 +455,13 @@ fn vase(things: &mut Things) {
     ];
     let inner = [[0.12, 0.050], [0.180, 0.0345], [0.203, 0.0265], [0.215, 0.0275], [0.224, 0.0345]];
     let at = Frame::at(0.165, 0.0, 1.27);
-        let mut objects = vec![
-        rimmed(&profile, [0.224, 0.0345, 0.0375], at, Material::Coated { paint: Paint::Vase, index: 1.576, alpha: 0.0 }),
+    let mut objects = vec![
+        rimmed(
+            &profile,
+            [0.224, 0.0345, 0.0375],
+            at,
+            Material::Coated { paint: Paint::Vase, index: 1.576, alpha: 0.0 },
+        ),
         turned(&inner, at, Material::glossy(Pigment::Porcelain.index())),
     ];
     let mouth = DVec3::new(0.165, 0.21, 1.27);
@@ -510,7 +532,7 @@ fn far_end(things: &mut Things) {
         [0.098, 0.0155],
     ];
     let on_books = Frame::at(-0.285, y, 1.72);
-        let candle = Frame { origin: on_books.origin + DVec3::new(0.0, 0.098, 0.0), ..on_books };
+    let candle = Frame { origin: on_books.origin + DVec3::new(0.0, 0.098, 0.0), ..on_books };
     let wick = Frame { origin: candle.origin + DVec3::new(0.0, 0.128, 0.0), ..candle };
     things.push(vec![
         rimmed(&stick, [0.098, 0.0, 0.0155], on_books, brass),
@@ -547,7 +569,7 @@ fn pencils(things: &mut Things) {
     let at = Frame::at(-0.105, 0.0, 1.52);
     let outside = [[0.0, 0.036], [0.003, 0.0385], [0.050, 0.0405], [0.092, 0.0415]];
     let inside = [[0.004, 0.036], [0.050, 0.0375], [0.092, 0.0385]];
-        let glaze = Material::glossy(Pigment::Teal.index());
+    let glaze = Material::glossy(Pigment::Teal.index());
     let mut objects = vec![rimmed(&outside, [0.092, 0.0385, 0.0415], at, glaze), turned(&inside, at, glaze)];
     let pigments: [PigmentIndex; 6] = [
         Pigment::Lemon.index(),
@@ -562,7 +584,11 @@ fn pencils(things: &mut Things) {
         let foot = at.origin + DVec3::new(-0.020 * angle.cos(), 0.006, -0.020 * angle.sin());
         let tip = at.origin + DVec3::new(0.055 * angle.cos(), 0.170, 0.045 * angle.sin());
         let pencil = [[0.0, 0.0037], [0.152, 0.0037], [0.173, 0.0002]];
-        objects.push(cone(&pencil, Frame::along(foot, tip), Material::Coated { paint: Paint::Pencil(pigment), index: 1.54, alpha: 0.0 }));
+        objects.push(cone(
+            &pencil,
+            Frame::along(foot, tip),
+            Material::Coated { paint: Paint::Pencil(pigment), index: 1.54, alpha: 0.0 },
+        ));
     }
     things.push(objects);
 }
@@ -615,12 +641,7 @@ fn back(things: &mut Things) {
     things.push(books);
     let bowl = [[0.0, 0.045], [0.010, 0.050], [0.045, 0.105], [0.075, 0.128]];
     things.push(vec![
-        rimmed(
-            &bowl,
-            [0.068, 0.0, 0.12],
-            Frame::at(0.25, 0.010, 3.70),
-            Material::glossy(Pigment::Cobalt.index()),
-        ),
+        rimmed(&bowl, [0.068, 0.0, 0.12], Frame::at(0.25, 0.010, 3.70), Material::glossy(Pigment::Cobalt.index())),
         ball(0.042, Frame::at(0.205, 0.115, 3.69), ORANGE),
         ball(0.040, Frame::at(0.295, 0.113, 3.68), ORANGE),
         ball(0.041, Frame::at(0.252, 0.135, 3.73), ORANGE),
@@ -664,7 +685,7 @@ fn lamps(things: &mut Things) {
     let lights = (0..13).map(|i| {
         let x = -1.30 + 0.098 * f64::from(i) + 0.02 * unit(i64::from(i), 4, 4);
         let frame = Frame::at(x, string(x), 3.90 + 0.03 * unit(i64::from(i), 9, 9));
-        ball(0.0065, frame, Material::Lamp(16_000.0))
+        ball(0.0065, frame, Material::Lamp(6_000.0))
     });
     things.push(lights.collect());
 }
