@@ -60,7 +60,7 @@ const MOST: Duration = Duration::from_secs(60);
 /// The longest that a refusal of a number may take: no lens is traced and no scene opened before it.
 const AT_ONCE: Duration = Duration::from_secs(10);
 
-/// SplitMix64, so that a pair is found again by its number.
+/// `SplitMix64`, so that a pair is found again by its number.
 struct Draw(u64);
 
 impl Draw {
