@@ -108,7 +108,7 @@ fn request(arguments: &SceneArgs) -> anyhow::Result<SceneRequest> {
     scene.illuminant = arguments.illuminant.as_deref().map(parse_illuminant).transpose()?;
     let wavelengths_nm =
         arguments.wavelengths_nm.as_deref().map(|list| parse_numbers("--wavelengths-nm", list)).transpose()?;
-    if arguments.rotate_deg % 90 != 0 {
+    if !arguments.rotate_deg.is_multiple_of(90) {
         anyhow::bail!("--rotate-deg is {}, expected 90, 180 or 270", arguments.rotate_deg);
     }
     Ok(SceneRequest {

@@ -16,11 +16,11 @@ pub(crate) struct SceneFileArgs {
     /// What 1 of the depth's numbers is: mm, cm, m, or so many of them a metre, as 5000/m; of a disparity px or 256/px
     #[arg(long, value_name = "UNIT")]
     pub(crate) depth_unit: Option<String>,
-    /// What the depth's numbers are: axial, radial, inverse, inverse:NEAR_M,FAR_M (the largest and the smallest number) or
-    /// disparity:BASELINE_M[,OFFSET_PX] [default: axial]
+    /// What the depth's numbers are: axial, radial, inverse, `inverse:NEAR_M,FAR_M` (the largest and the smallest number) or
+    /// `disparity:BASELINE_M`[,`OFFSET_PX`] [default: axial]
     #[arg(long, value_name = "KIND")]
     pub(crate) depth_kind: Option<DepthKind>,
-    /// Camera data of the scene: our JSON, Open3D's, nerfstudio's, COLMAP's cameras.txt or OpenCV's YAML
+    /// Camera data of the scene: our JSON, `Open3D`'s, nerfstudio's, COLMAP's cameras.txt or `OpenCV`'s YAML
     #[arg(long, value_name = "FILE")]
     pub(crate) view: Option<PathBuf>,
     /// What a cube's numbers are: radiance, reflectance or photons

@@ -6,7 +6,7 @@ use crate::{DiffractionError, PupilGrid, ReferenceSphere, Wavefront, WavefrontRe
 
 /// Returns the optical path of the chief ray less that of the rays through these places, waves, each up to the sphere
 /// about the chief ray's film point (of the film as it is curved) through the paraxial exit pupil: positive where the wavefront is
-/// ahead of the sphere, as OpticStudio and CODE V have it, and Welford, whose third-order sums have the same sign.
+/// ahead of the sphere, as `OpticStudio` and CODE V have it, and Welford, whose third-order sums have the same sign.
 ///
 /// The chief ray is that through the middle of the pupil as the sampling has it: of the real stop, if it aims at that.
 /// A ray that does not arrive has none; `None` altogether if not even the chief ray arrives.

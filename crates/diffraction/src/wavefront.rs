@@ -76,7 +76,7 @@ pub struct Wavefront {
     pub energy: Vec<f64>,
     /// Whether light takes this way: `false` behind an obscuration.
     pub is_clear: Vec<bool>,
-    /// The reference's optical path less the ray's, waves: positive where the wavefront is ahead of the sphere, the sign of OpticStudio,
+    /// The reference's optical path less the ray's, waves: positive where the wavefront is ahead of the sphere, the sign of `OpticStudio`,
     /// CODE V and Welford.
     pub opd_waves: Vec<f64>,
     /// The place on the film about which the wave converges best (of its reference), mm along its own x and y.
@@ -174,7 +174,7 @@ impl Wavefront {
     }
 
     /// Returns the coefficients of the first `n_terms` of Zernike's polynomials in Noll's order
-    /// ([`zernike`](crate::zernike)), in waves rms, over the unit disc of the stop: OpticStudio's standard ones.
+    /// ([`zernike`](crate::zernike)), in waves rms, over the unit disc of the stop: `OpticStudio`'s standard ones.
     pub fn zernike_waves(&self, n_terms: usize) -> Vec<f64> {
         fit(noll, &self.pupil, &self.opd_waves, &self.energy, n_terms)
     }

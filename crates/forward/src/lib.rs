@@ -1,6 +1,6 @@
 //! From a scene and the image of a lens to spectral irradiance on the film.
 //!
-//! Each point of the film gathers what it sees: E(x) = I(x) Σ_k w_k(x) (L ∗ h_k)(x), with kernels h_k of sum 1 at the corners k of the tile that x lies in, weights
+//! Each point of the film gathers what it sees: E(x) = I(x) `Σ_k` `w_k(x)` (L ∗ `h_k)(x`), with kernels `h_k` of sum 1 at the corners k of the tile that x lies in, weights
 //! of sum 1, and the irradiance I of a uniform scene (`docs/forward.md`). Surfaces at different depths are blurred in layers and laid one behind the other, so that near
 //! ones hide far ones.
 //!

@@ -76,8 +76,8 @@ pub(crate) fn level(planes: &[Array2<f32>], tile: Option<&Tile>, channel: usize)
     let period = tile.map_or((1, 1), |tile| (tile.rows(), tile.columns()));
     let stride = ((rows * columns / LEVEL_SAMPLES) as f64).sqrt().floor().max(1.0) as usize;
     let mut samples: Vec<f32> = Vec::new();
-    for row in (0..rows).filter(|row| row / period.0 % stride == 0) {
-        for column in (0..columns).filter(|column| column / period.1 % stride == 0) {
+    for row in (0..rows).filter(|row| (row / period.0).is_multiple_of(stride)) {
+        for column in (0..columns).filter(|column| (column / period.1).is_multiple_of(stride)) {
             match tile {
                 Some(tile) if tile.filter_at(row, column) == channel => samples.push(planes[0][(row, column)]),
                 Some(_) => {}

@@ -198,7 +198,7 @@ pub struct WavefrontRow {
     pub strehl: Option<f64>,
     /// What Maréchal's formula makes of the root mean square, exp(−(2πσ)²): within a hundredth down to ratios of 0.8.
     pub strehl_of_rms: f64,
-    /// Zernike coefficients over the unit disc of the stop, in Noll's order from piston, waves rms: OpticStudio's standard ones.
+    /// Zernike coefficients over the unit disc of the stop, in Noll's order from piston, waves rms: `OpticStudio`'s standard ones.
     pub zernike_waves: Vec<f64>,
     /// Coefficients of the 37 polynomials of the Fringe set, waves at the edge of that disc.
     pub fringe_waves: Vec<f64>,
@@ -232,7 +232,7 @@ pub struct FanRow {
     /// Transverse aberration along x of rays along x, µm.
     pub sagittal_um: Vec<Option<f64>>,
     /// Optical path difference of rays along y, waves; positive where the wavefront is ahead of the
-    /// sphere about the chief ray's image, the sign of OpticStudio, CODE V and the third-order sums.
+    /// sphere about the chief ray's image, the sign of `OpticStudio`, CODE V and the third-order sums.
     pub tangential_waves: Vec<Option<f64>>,
     /// Optical path difference of rays along x, waves.
     pub sagittal_waves: Vec<Option<f64>>,

@@ -1,9 +1,9 @@
 //! Two tables of photographic patents: the text of the Optical Bench, and the `.lens` files that others make of it.
 //!
 //! Optical Bench text has sections in brackets whose cells are separated by tabs: `[variable distances]`, a column each focal length or
-//! focus, whose names stand for distances in the rows of `[lens data]` (number, radius, distance, n_d, diameter, V_d and the name of the
+//! focus, whose names stand for distances in the rows of `[lens data]` (number, radius, distance, `n_d`, diameter, `V_d` and the name of the
 //! glass); and `[aspherical data]` (number, radius, conic constant, coefficients of r⁴, r⁶, …).
-//! `.lens` files have a line a surface: radius, distance, n_d, V_d, diameter (though they call it a semi-aperture) and whether it is coated.
+//! `.lens` files have a line a surface: radius, distance, `n_d`, `V_d`, diameter (though they call it a semi-aperture) and whether it is coated.
 
 use crate::{Glass, ImageSurface, Shape};
 

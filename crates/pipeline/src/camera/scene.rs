@@ -116,7 +116,7 @@ impl FlatSize {
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub enum SceneSource {
-    /// A spectral EXR, an ENVI header or its file of numbers, a MATLAB file, an array of NumPy, a stack of TIFF pages, a folder of band
+    /// A spectral EXR, an ENVI header or its file of numbers, a MATLAB file, an array of `NumPy`, a stack of TIFF pages, a folder of band
     /// pictures, or an ordinary picture.
     File(PathBuf),
     /// The built-in still life, with objects at several depths.

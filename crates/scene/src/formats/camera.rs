@@ -1,4 +1,4 @@
-//! Camera data in a file of its own: ours, or one of `Open3D`, nerfstudio, COLMAP or OpenCV.
+//! Camera data in a file of its own: ours, or one of `Open3D`, nerfstudio, COLMAP or `OpenCV`.
 
 use std::{
     fs,
@@ -50,7 +50,7 @@ pub(super) struct CameraData {
     pub(super) note: Option<String>,
 }
 
-/// The distortion of a lens as OpenCV has it: k1, k2, p1, p2, k3, k4, k5, k6.
+/// The distortion of a lens as `OpenCV` has it: k1, k2, p1, p2, k3, k4, k5, k6.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Distortion([f64; 8]);
 
@@ -99,7 +99,7 @@ impl CameraData {
     }
 
     /// Reads camera data: JSON of ours (`width`, `height`, `fx_px`, `fy_px`, `cx_px`, `cy_px`), of `Open3D` (`intrinsic_matrix`) or of
-    /// nerfstudio (`fl_x`, …), COLMAP's `cameras.txt`, or OpenCV's YAML (`camera_matrix`).
+    /// nerfstudio (`fl_x`, …), COLMAP's `cameras.txt`, or `OpenCV`'s YAML (`camera_matrix`).
     ///
     /// # Errors
     /// When it is none of these, lacks what is needed, or has a model of a lens that is not known.
@@ -336,7 +336,7 @@ fn numbers_of(value: &Value, name: &str) -> Result<Vec<f64>, String> {
     Ok(numbers)
 }
 
-/// Returns OpenCV's list of coefficients, which may be shorter.
+/// Returns `OpenCV`'s list of coefficients, which may be shorter.
 fn coefficients(list: &[f64]) -> Result<[f64; 8], String> {
     let mut k = [0.0; 8];
     if list.iter().skip(8).any(|v| *v != 0.0) {
@@ -385,7 +385,7 @@ fn of_colmap(path: &Path, text: &str) -> Result<CameraData, String> {
     })
 }
 
-/// Reads OpenCV's YAML of a calibration: `camera_matrix`, `distortion_coefficients`, `image_width`, `image_height`.
+/// Reads `OpenCV`'s YAML of a calibration: `camera_matrix`, `distortion_coefficients`, `image_width`, `image_height`.
 fn of_opencv(path: &Path, text: &str) -> Result<CameraData, String> {
     // `key: value` lines, in which the `data: [...]` of a matrix belongs to the key above; lists may run over lines.
     let mut entries: Vec<(String, String)> = vec![];

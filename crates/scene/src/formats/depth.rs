@@ -236,7 +236,7 @@ pub(super) fn likely_beside(picture: &Path) -> Vec<String> {
     names
 }
 
-/// Reads a file of depth: a gray picture of 8 or 16 bits, a TIFF of floats, PFM, EXR or an array of NumPy.
+/// Reads a file of depth: a gray picture of 8 or 16 bits, a TIFF of floats, PFM, EXR or an array of `NumPy`.
 ///
 /// Codes of 16 bits are millimetres, floats metres, unless something says otherwise; codes of 8 bits and the floats of a PFM, which
 /// may be disparities, need their unit or kind.

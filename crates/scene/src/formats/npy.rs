@@ -1,4 +1,4 @@
-//! Arrays of NumPy (`.npy`): the format of its documentation, "numpy.lib.format", versions 1 to 3.
+//! Arrays of `NumPy` (`.npy`): the format of its documentation, "numpy.lib.format", versions 1 to 3.
 
 use std::{fs::File, io::Read, path::Path};
 
@@ -149,7 +149,7 @@ fn entries_of(header: &str) -> Result<Vec<(String, String)>, String> {
 pub(super) mod tests {
     use super::*;
 
-    /// Returns the bytes of an array, as NumPy writes them.
+    /// Returns the bytes of an array, as `NumPy` writes them.
     pub(crate) fn npy(descr: &str, fortran: bool, shape: &str, data: &[u8]) -> Vec<u8> {
         let order = if fortran { "True" } else { "False" };
         let mut header = format!("{{'descr': '{descr}', 'fortran_order': {order}, 'shape': {shape}, }}");

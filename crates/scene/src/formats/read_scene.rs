@@ -61,7 +61,7 @@ pub struct ReadOptions {
 }
 
 /// Reads a scene from a spectral or ordinary EXR (`.exr`), an ENVI header (`.hdr`) or its file of numbers, a MATLAB file (`.mat`), an
-/// array of NumPy (`.npy`), a TIFF of any kind, a folder with a picture a band, or an ordinary picture (`.png`, `.jpg`, `.webp`, `.bmp`,
+/// array of `NumPy` (`.npy`), a TIFF of any kind, a folder with a picture a band, or an ordinary picture (`.png`, `.jpg`, `.webp`, `.bmp`,
 /// `.ppm`, `.pfm`, Radiance `.hdr`).
 ///
 /// Camera data comes from the options, else from the file, else from a `NAME.camera.json` beside it; depth from the options, else

@@ -506,7 +506,7 @@ impl Area {
     fn lines(from: usize, to: usize, pitch: usize, (first, n): (usize, usize)) -> Vec<Option<usize>> {
         let number = |line: usize| {
             let line = first + line;
-            (line >= from && line < to && (line - from) % pitch == 0).then(|| (line - from) / pitch)
+            (line >= from && line < to && (line - from).is_multiple_of(pitch)).then(|| (line - from) / pitch)
         };
         (0..n).map(number).collect()
     }
