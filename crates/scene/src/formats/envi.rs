@@ -45,6 +45,7 @@ pub(super) fn contents_of_envi(path: &Path, options: &ReadOptions) -> Result<Con
     let file = EnviFile::open(path, options.reading.wavelengths_nm.as_deref(), wanted_nm)?;
     let (meaning, what) = file.meaning(options)?;
     let mut notes: Vec<String> = file.notes.clone();
+    notes.extend(file.unused_unit(path));
     let order = file.order();
     let own = WavelengthGrid::new(order.iter().map(|&band| file.wavelengths_nm[band]).collect())
         .map_err(|reason| SceneError::Values { file: path.to_owned(), reason })?;
@@ -179,6 +180,15 @@ impl EnviFile {
         let mut order: Vec<usize> = (0..self.header.bands).filter(is_good).collect();
         order.sort_by(|&a, &b| self.wavelengths_nm[a].total_cmp(&self.wavelengths_nm[b]));
         order
+    }
+
+    /// Returns the note of data units that are none of light, and say more than that the numbers are a share or a count.
+    fn unused_unit(&self, path: &Path) -> Option<String> {
+        const PLAIN: [&str; 9] =
+            ["", "reflectance", "transmittance", "unitless", "dimensionless", "none", "unknown", "dn", "%"];
+        let unit = self.header.data_units.as_deref()?;
+        let is_plain = PLAIN.contains(&unit.to_lowercase().as_str()) || LightUnit::parse(unit).is_some();
+        if is_plain { None } else { note_of(path, "unit", &[unit.to_owned()]) }
     }
 
     /// Decides what the numbers are, and says so.

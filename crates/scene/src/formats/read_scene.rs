@@ -315,7 +315,12 @@ fn of_mat(path: &Path, options: &ReadOptions) -> Result<Contents, SceneError> {
         notes.push(format!("{} of {n_samples} samples of all bands were below 0 and are 0", scene.n_clipped));
     }
     let view = view.transpose().map_err(|error| unreadable(path, error))?.map(|view| CameraData::of_view(path, view));
-    let contents = Contents::of(Image::Spectral(scene.image), "radiance of its photons");
+    let choice = options.reading.no_data.unwrap_or_default();
+    let grid = scene.image.grid().clone();
+    let mut planes = scene.image.into_planes();
+    notes.extend(mend(path, &grid, &mut planes, choice)?.note(path, choice));
+    let image = SpectralImage::new(Quantity::Radiance, grid, planes)?;
+    let contents = Contents::of(Image::Spectral(image), "radiance of its photons");
     Ok(Contents { depth, view, light: scene.light, notes, heeds: Heeds::Nothing, ..contents })
 }
 
@@ -378,7 +383,7 @@ fn camera_of(
         (None, None) => match (own, beside) {
             (Some(own), beside) => {
                 leave(None, beside.as_ref());
-                Some((own, Some(name.clone())))
+                Some((own.with_aspect(frame.aspect), Some(name.clone())))
             }
             (None, Some(beside)) => {
                 let data = of_frame(&beside)?;
@@ -426,13 +431,14 @@ fn raw_depth(
             let reason = format!("it has no depth that a unit or a kind could be said of: expected --depth FILE{hint}");
             return Err(unreadable(path, reason));
         }
-        contents.notes.extend(note_of(path, "file that may be a depth (--depth)", &likely));
+        let note = note_of(path, "likely depth file", &likely);
+        contents.notes.extend(note.map(|note| note + ": --depth FILE names one"));
         return Ok(None);
     };
-    if options.depth_m.is_some() {
-        unused.push(format!("one depth (--depth-m), as it has {}", depth.from));
-    }
     contents.notes.extend(note_of(path, "depth", &unused));
+    if options.depth_m.is_some() {
+        contents.notes.push(format!("{}: --depth-m is not used, since it has {}", name_of(path), depth.from));
+    }
     if !frame.is_whole(rows, columns) && depth.values.dim() == (frame.rows, frame.columns) {
         let at = |row: usize, column: usize| {
             let (row, column) = (row as i64 + frame.y0, column as i64 + frame.x0);
@@ -465,6 +471,10 @@ fn finish(path: &Path, name: String, mut contents: Contents, options: &ReadOptio
         );
     }
     sources.view = camera.as_ref().and_then(|(_, from)| from.clone());
+    if camera.is_none() && (frame.aspect - 1.0).abs() > 1e-6 {
+        let what = "times as wide as high, which counts with a field of view or camera data alone";
+        contents.notes.push(format!("{}: its samples are {} {what}", name_of(path), frame.aspect));
+    }
     let straight = camera.as_ref().and_then(|(camera, _)| camera.straightened(rows, columns));
     let mut view = camera.map(|(camera, _)| camera.view());
     if let Some((how, note)) = &straight {

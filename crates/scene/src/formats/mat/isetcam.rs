@@ -198,7 +198,6 @@ fn of_iset(path: &Path, file: &MatFile) -> Result<IsetScene, SceneError> {
     let mut planes: Vec<Option<Array2<f32>>> = planes.into_iter().map(Some).collect();
     let planes = order.iter().filter_map(|&band| planes[band].take()).collect();
     let image = SpectralImage::new(Quantity::Radiance, grid, planes).map_err(values)?;
-    image.check_samples().map_err(values)?;
     let light = light.map(|spectrum| light_of(&spectrum)).transpose().map_err(wrong)?;
     let notes = unused_of(path, file).map_err(wrong)?;
     Ok(IsetScene { image, depth_m, distance_m, horizontal_fov_deg, light, n_clipped, notes })
