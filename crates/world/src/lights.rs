@@ -79,6 +79,9 @@ const LEAST_SHARE: f32 = 1.0 / 16.0;
 /// Meshes of more triangles are one light of the tree each.
 const MOST_PARTS: usize = 1 << 20;
 
+/// The number of a shape, and that of a triangle of a mesh.
+pub(crate) type PartOfShape = (u32, Option<u32>);
+
 impl Lights {
     /// Returns the lights of a world: those that are no shapes, then the glowing shapes of the root group.
     pub(crate) fn new(alone: Vec<Light>, shapes: &mut [PlacedShape]) -> Self {
@@ -116,7 +119,7 @@ impl Lights {
         u_light: f32,
         u: [f32; 2],
         wavelengths_nm: &[f32; N],
-    ) -> Option<(LightSample<N>, Option<(u32, Option<u32>)>)> {
+    ) -> Option<(LightSample<N>, Option<PartOfShape>)> {
         let Chosen { light: index, triangle, probability, rest } = self.choose(at, u_light, u)?;
         let light = LightId(index as u32);
         let mut place = None;

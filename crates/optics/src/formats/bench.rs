@@ -196,7 +196,7 @@ impl Bench<'_> {
             Ok(number) => Some(number),
             Err(_) => {
                 let is_variable = self.variables.iter().any(|row| row.cell(0).eq_ignore_ascii_case(distance));
-                if !is_variable && !(distance.is_empty() && is_last) {
+                if !(is_variable || distance.is_empty() && is_last) {
                     let expected = "expected a number or a name of [variable distances]";
                     return Err(row.wrong(format!("the distance behind a surface is '{distance}', {expected}")));
                 }

@@ -92,7 +92,7 @@ impl RawDepth {
         let fits = match self.unit {
             DepthUnit::Samples(_) => is_disparity,
             // An inverse distance is so many a metre.
-            DepthUnit::Metres(_) => !is_disparity && !(is_inverse && words.unit.is_some_and(is_length)),
+            DepthUnit::Metres(_) => !(is_disparity || is_inverse && words.unit.is_some_and(is_length)),
         };
         if fits {
             return Ok(self);
@@ -160,7 +160,7 @@ impl RawDepth {
             DepthKind::InverseBetween { near_m, far_m } => {
                 let finite = self.values.iter().copied().filter(|v| v.is_finite());
                 let (low, high) = finite.fold((f32::INFINITY, f32::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)));
-                if !(high > low) {
+                if high.partial_cmp(&low) != Some(std::cmp::Ordering::Greater) {
                     return Err(unreadable(&self.file, "its numbers are all alike, expected some between two anchors"));
                 }
                 let (near, far) = (1.0 / near_m, 1.0 / far_m);

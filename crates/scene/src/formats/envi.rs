@@ -708,10 +708,11 @@ mod tests {
             let path = write(folder.path(), "a", &text, &bytes);
             let whole = read_plain(&path).unwrap();
             for wanted in [vec![450.0, 555.0, 680.0], vec![500.0, 600.0]] {
-                let grid = Some(WavelengthGrid::new(wanted).unwrap());
-                let options = ReadOptions { white_level: Some(1.0), grid: grid.clone(), ..ReadOptions::default() };
+                let grid = WavelengthGrid::new(wanted).unwrap();
+                let options =
+                    ReadOptions { white_level: Some(1.0), grid: Some(grid.clone()), ..ReadOptions::default() };
                 let (part, _) = read_with(&path, &options).unwrap();
-                assert_eq!(part, crate::resampled(&whole, &grid.unwrap()).unwrap(), "{interleave}");
+                assert_eq!(part, crate::resampled(&whole, &grid).unwrap(), "{interleave}");
             }
         }
     }

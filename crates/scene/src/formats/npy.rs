@@ -102,8 +102,11 @@ fn parse(bytes: &[u8]) -> Result<NpyArray, String> {
     Ok(NpyArray { sides, values, top })
 }
 
+/// The bytes of an element, the largest whole number of its type, and how it is read.
+type Element = (usize, Option<f64>, fn([u8; 8]) -> f64);
+
 /// Returns the bytes of an element, the largest whole number of its type, and how it is read from little-endian bytes.
-fn element(kind: &str) -> Option<(usize, Option<f64>, fn([u8; 8]) -> f64)> {
+fn element(kind: &str) -> Option<Element> {
     fn four(b: [u8; 8]) -> [u8; 4] {
         [b[0], b[1], b[2], b[3]]
     }

@@ -66,8 +66,8 @@ mod tests {
         let little: Vec<[u8; 4]> = values.iter().map(|v| v.to_le_bytes()).collect();
         let big: Vec<[u8; 4]> = values.iter().map(|v| v.to_be_bytes()).collect();
         let gray = ndarray::arr2(&[[3.0, 4.0, 5.0], [0.0, 1.0, 2.0]]);
-        assert_eq!(parse(&of("Pf\n3 2\n-1.0\n", &little)).unwrap(), [gray.clone()]);
-        assert_eq!(parse(&of("Pf\n3 2\n1\n", &big)).unwrap(), [gray.clone()]);
+        assert_eq!(parse(&of("Pf\n3 2\n-1.0\n", &little)).unwrap(), std::slice::from_ref(&gray));
+        assert_eq!(parse(&of("Pf\n3 2\n1\n", &big)).unwrap(), std::slice::from_ref(&gray));
         assert_eq!(parse(&of("Pf 3 2 -2\n", &little)).unwrap(), [2.0 * gray]);
         let color = parse(&of("PF\n1 2\n-1\n", &little)).unwrap();
         assert_eq!(color[1], ndarray::arr2(&[[4.0], [1.0]]));

@@ -415,7 +415,7 @@ impl Polar {
         }
     }
 
-    fn from_center(&self, row: usize, column: usize) -> [f64; 2] {
+    fn off_center(&self, row: usize, column: usize) -> [f64; 2] {
         [(column as f64 - self.column) / self.farthest, (row as f64 - self.row) / self.farthest]
     }
 }
@@ -429,7 +429,7 @@ fn warped(planes: &[Array2<f32>], warps: &[Warp], center: [f64; 2], place: Place
     plane_rows(&mut out).into_par_iter().enumerate().for_each(|(row, mut lines)| {
         let mut sources = vec![[0.0; 2]; planes.len()];
         for column in 0..columns {
-            let at = polar.from_center(row, column);
+            let at = polar.off_center(row, column);
             for (number, source) in sources.iter_mut().enumerate() {
                 let [x, y] = warps[number.min(warps.len() - 1)].source(at);
                 *source = [polar.column + polar.farthest * x, polar.row + polar.farthest * y];
@@ -449,7 +449,7 @@ fn even_out(planes: &mut [Array2<f32>], factors: &[f64; 5], center: [f64; 2], pl
     for plane in planes {
         plane.outer_iter_mut().into_par_iter().enumerate().for_each(|(row, mut line)| {
             for (column, value) in line.iter_mut().enumerate() {
-                let [x, y] = polar.from_center(row, column);
+                let [x, y] = polar.off_center(row, column);
                 let r2 = x * x + y * y;
                 let gain = 1.0 + r2 * factors.iter().rev().fold(0.0, |sum, factor| sum * r2 + factor);
                 *value = (*value * gain as f32).min(top.max(*value));

@@ -635,7 +635,8 @@ fn broken_opcodes_are_refused_in_a_sentence() {
         ("without pixels", opcode(8, &[wholes(&[5, 0, 5, 16, 0, 1, 1, 1]), wholes(&[0]), doubles(&[1.0])].concat())),
         ("not finite", opcode(3, &doubles(&[f64::NAN; 7]))),
     ] {
-        let reason = DngFile::from_bytes(&PLAIN.file(|d| d.set(OPCODE_LIST_3, list(&[opcodes.clone()])))).unwrap_err();
+        let reason = DngFile::from_bytes(&PLAIN.file(|d| d.set(OPCODE_LIST_3, list(std::slice::from_ref(&opcodes)))))
+            .unwrap_err();
         assert!(reason.contains(word) && !reason.contains('\n'), "{word}: {reason}");
     }
 }

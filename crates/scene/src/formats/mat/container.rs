@@ -288,12 +288,11 @@ fn peek(bytes: &[u8], is_big_endian: bool) -> Result<Option<Peeked<'_>>, String>
     Ok(Some(Peeked { own, n_bytes: n_bytes.into(), start, stream }))
 }
 
+/// What a compressed variable is, and its bytes where they were wanted.
+type Inflated = (Listed, Option<Vec<u8>>);
+
 /// Looks into a compressed element; if it is a variable that is wanted it is inflated.
-fn inflate(
-    bytes: &[u8],
-    is_big_endian: bool,
-    wanted: &dyn Fn(&Listed) -> bool,
-) -> Result<Option<(Listed, Option<Vec<u8>>)>, String> {
+fn inflate(bytes: &[u8], is_big_endian: bool, wanted: &dyn Fn(&Listed) -> bool) -> Result<Option<Inflated>, String> {
     let Some(Peeked { own, n_bytes, mut start, stream }) = peek(bytes, is_big_endian)? else { return Ok(None) };
     if !wanted(&own) {
         return Ok(Some((own, None)));

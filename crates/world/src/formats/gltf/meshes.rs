@@ -208,8 +208,7 @@ fn skinned(mesh: &mut TriangleMesh, joints: &[DAffine3], (of, by): (&[Rows], &[R
             }
         }
         let moved = if total > 0.0 { DAffine3::from_mat4(moved * (1.0 / total)) } else { continue };
-        let place = |p: Vec3| moved.transform_point3(p.as_dvec3()).as_vec3();
-        mesh.positions[vertex] = place(mesh.positions[vertex]);
+        mesh.positions[vertex] = moved.transform_point3(mesh.positions[vertex].as_dvec3()).as_vec3();
         if let Some(normal) = mesh.normals.get_mut(vertex) {
             let by = crate::mesh::normal_matrix(&moved);
             *normal = (by * normal.as_dvec3()).normalize_or(DVec3::ZERO).as_vec3();
