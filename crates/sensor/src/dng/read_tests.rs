@@ -623,12 +623,17 @@ fn what_is_asked_for_and_not_done_is_noted() {
     assert!(DngFile::from_bytes(&nothing).unwrap().notes.is_empty());
 }
 
+/// The parameters of a gain map of so many points each way, without its factors.
+fn map_head(points: u32) -> Vec<u8> {
+    [wholes(&ALL), wholes(&[points, points]), doubles(&[0.1, 0.1, 0.0, 0.0]), wholes(&[1])].concat()
+}
+
 #[test]
 fn broken_opcodes_are_refused_in_a_sentence() {
     for (word, opcodes) in [
         ("list with 4 entries", opcode(1, &wholes(&[1]))[..18].to_vec()),
         ("cut short", opcode(3, &[1, 2, 3])),
-        ("more than its bytes hold", opcode(9, &[wholes(&ALL), wholes(&[1 << 30, 1 << 30])].concat())),
+        ("as many as its bytes hold", opcode(9, &[map_head(1 << 30), singles(&[1.0])].concat())),
         ("WarpRectilinear with 7 entries", opcode(1, &wholes(&[7]))),
         ("of no plane", opcode(2, &[wholes(&[0]), doubles(&[0.5, 0.5])].concat())),
         ("degree 9", opcode(8, &[wholes(&ALL), wholes(&[9])].concat())),
@@ -704,7 +709,7 @@ fn files_that_are_no_such_frames_are_refused_in_a_sentence() {
     refused("NoiseProfile", &|d| d.set(NOISE_PROFILE, Value::Double(vec![1.0; 4])));
     // Neither the samples of so many pixels nor their number may be taken on trust.
     refused("strips or tiles", &|d| d.set(IMAGE_LENGTH, Value::Long(vec![4_000_000_000])));
-    refused("can hold", &|d| {
+    refused("would take", &|d| {
         d.set(IMAGE_LENGTH, Value::Long(vec![4_000_000_000]));
         d.set(ROWS_PER_STRIP, Value::Long(vec![4_000_000_000]));
     });
