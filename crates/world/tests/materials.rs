@@ -224,7 +224,8 @@ fn metal_and_rough_are_those_of_gltf() {
     });
 }
 
-/// A base of 0.5 with the usual layer gives back 0.50 to 0.52 of the light, and not 0.3.
+/// A base of 0.5 with the usual layer gives back about 0.5 of the light, and not 0.3; of the roughest layer, which is the default, a little less,
+/// for what its small mirrors hide from each other.
 #[test]
 fn plain_plastics_of_gltf_are_as_bright_as_their_color() {
     let world = gltf(r#""pbrMetallicRoughness":{"baseColorFactor":[0.5,0.5,0.5,1],"metallicFactor":0}"#);
@@ -240,7 +241,7 @@ fn plain_plastics_of_gltf_are_as_bright_as_their_color() {
         })
         .map(|sample| f64::from(sample.weight[0]) / f64::from(n))
         .sum();
-    assert!((0.495..0.525).contains(&sum), "{sum}");
+    assert!((0.485..0.525).contains(&sum), "{sum}");
 }
 
 /// Blend and mask pass rays in the share that is open, glow and volume follow their words.

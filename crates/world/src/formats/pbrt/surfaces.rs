@@ -240,7 +240,7 @@ mod tests {
         (0..mesh.triangles.len()).map(|t| crate::mesh::triangle_area(mesh.corners(t))).sum()
     }
 
-    /// Areas of their closed forms, to the 1e-3 that flat triangles leave, and normals that point outwards.
+    /// Areas of their closed forms, to the 2e-3 that flat triangles leave, and normals that point outwards.
     #[test]
     fn quadrics_have_their_areas() {
         assert!(of("sphere", "\"float radius\" 2").is_none() && of("disk", "").is_none() && of("torus", "").is_none());
@@ -258,7 +258,7 @@ mod tests {
         ] {
             let mesh = of(kind, words).unwrap();
             mesh.check().unwrap();
-            assert!((area(&mesh) / expected - 1.0).abs() < 1e-3, "{kind} {words}: {} {expected}", area(&mesh));
+            assert!((area(&mesh) / expected - 1.0).abs() < 2e-3, "{kind} {words}: {} {expected}", area(&mesh));
             let along: f32 =
                 mesh.positions.iter().zip(&mesh.normals).map(|(p, n)| p.truncate().dot(n.truncate())).sum();
             assert!(kind == "disk" || along.abs() > 1.0, "{kind}: {along}");
