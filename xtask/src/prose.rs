@@ -23,7 +23,6 @@ const TO_DO: &[&str] = &[
     "docs/PERFORMANCE.md",
     "docs/backward.md",
     "docs/diffraction.md",
-    "docs/forward.md",
     "docs/lightfield.md",
     "docs/mirrors.md",
     "docs/pupils.md",

@@ -123,6 +123,8 @@ impl Camera {
     ///     Strength of HURB.
     /// blur : {"layered", "pointwise", "views:N"}
     ///     Layers of depth; each sample on its own, as in the paper; layers through N parts of the pupil.
+    /// border : {"hold", "mirror", "black"}
+    ///     What the lens sees beyond the ends of the scene: the samples at its border, the scene mirrored, or nothing.
     /// scene : Scene or path
     /// fov_deg, depth_m, width_mm, distance_mm, fill_depth, hidden, white_level, quantity, unit, scale, scene_wavelengths_nm, variable,
     /// axes, no_data, depth, depth_unit, depth_kind, view
