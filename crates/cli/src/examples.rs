@@ -45,6 +45,8 @@ const EXAMPLES: &[(&str, &[&str])] = &[
             "dioptric render world.glb --frame --sky day --pixels 640x480 --noise 0.02",
         ],
     ),
+    ("scene info", &["dioptric scene info cube.mat --axes yxb"]),
+    ("scene convert", &["dioptric scene convert photo.png scene.exr --depth depth.png --depth-unit mm"]),
     ("world info", &["dioptric world info world.glb"]),
     ("compare", &["dioptric compare camera.ron --samples 64 --out both/"]),
     ("lightfield", &["dioptric lightfield camera.ron --refocus-m 0.5,1 --out light/"]),

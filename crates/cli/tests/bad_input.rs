@@ -210,7 +210,7 @@ fn an_analysis_that_cannot_be_leaves_nothing() {
     let check = |more: &[&str], words: &[&str]| {
         check_error(folder.path(), &[&["lens", "analyze", "dgauss-50mm", "--out", "plots"], more].concat(), words);
     };
-    check(&["--fields-deg", "0,90"], &["fields_deg is 90", "below 90 degrees"]);
+    check(&["--fields-deg", "0,130"], &["fields_deg is 130", "up to 120 degrees", "below 90 degrees"]);
     check(&["--fields-deg", "0,x"], &["--fields-deg", "'x'"]);
     check(&["--fields-deg", "0,5/y"], &["--fields-deg", "'5/y'"]);
     check(&["--fields-mm", "0,5"], &["a finite one for fields in mm"]);
