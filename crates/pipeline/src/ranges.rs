@@ -105,7 +105,7 @@ const RANGES: &[(Range, &[&str])] = &[
     (of(1.0, 65_536.0, "rows"), &["interleaved_rows"]),
     (of(0.0, 1e9, "µs"), &["row_time_us"]),
     (of(1e-6, 1e6, "per second"), &["frames_per_s", "fps"]),
-    (of(1.0, 100_000.0, "frames"), &["frames"]),
+    (of(1.0, 100_000.0, "frames"), &["frames", "video_frames"]),
     (of(-1e5, 1e5, "degrees per second"), &["pan_deg_per_s", "tilt_deg_per_s", "roll_deg_per_s"]),
     (of(0.0, 90.0, "degrees"), &["shake_deg"]),
     (of(1e-6, 1e5, "Hz"), &["shake_hz"]),
