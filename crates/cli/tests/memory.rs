@@ -153,7 +153,7 @@ fn pictures_that_fill_the_memory_are_refused() {
     for arguments in [
         &["measure", "mtf", "large.png"][..],
         &["measure", "spot", "large.png"],
-        &["show", "large.png", "--distance-mm", "600", "-o", "shown.exr"],
+        &["show", "large.png", "--distance-m", "0.6", "-o", "shown.exr"],
         &["render", "world.pbrt", "--samples", "1", "-o", "rendered"],
         &["run", "camera.ron", "--scene", "bands", "--depth-m", "2", "--fov-deg", "14", "--out", "run"],
         // The film has as many pixels as the scene.

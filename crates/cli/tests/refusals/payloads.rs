@@ -116,8 +116,8 @@ pub(crate) fn pictures() -> Vec<(Vec<u8>, &'static str)> {
     let words = |text: &[u8]| text.to_vec();
     vec![
         (sized(0, 4), "Invalid image dimensions"),
-        (sized(0x7fff_ffff, 0x7fff_ffff), "exceeds limit"),
-        (sized(u32::MAX, 2), "exceeds limit"),
+        (sized(0x7fff_ffff, 0x7fff_ffff), "limit exceeded"),
+        (sized(u32::MAX, 2), "limit exceeded"),
         (sized(60_000, 60_000), "limit exceeded"),
         (of(&|png| png.depth = 3), "Invalid bit depth 3"),
         (of(&|png| png.color_type = 9), "Invalid color type 9"),
