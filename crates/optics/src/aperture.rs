@@ -147,8 +147,8 @@ impl Aperture {
             return wrong("surface of an aperture", surface as f64, "a surface that the lens has, counted from 0");
         }
         let half = self.outline.half_widths_mm();
-        if let Some(found) = half.to_array().into_iter().find(|v| !(*v > 0.0 && *v < 1e9)) {
-            return wrong("half the width of an aperture", found, "a number above 0 and below 1e9");
+        if let Some(found) = half.to_array().into_iter().find(|v| !(*v > 0.0 && v.is_finite())) {
+            return wrong("half the width of an aperture", found, "a finite number above 0");
         }
         match self.center_mm.into_iter().find(|v| v.is_nan() || v.abs() > 1e9) {
             Some(found) => wrong("middle of an aperture", found, "numbers below 1e9"),

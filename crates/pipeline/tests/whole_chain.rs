@@ -269,12 +269,15 @@ fn burst_is_less_noisy_than_a_frame() {
 
 #[test]
 fn pinhole_and_thin_lens_light_the_film_by_geometry() {
-    // A disc of the half angle a as seen from the film: π L sin² a. An ideal thin lens gathers π r² of a far point's light and
-    // spreads a solid angle over f² times as much: π L r²/f².
-    let half_angle = (0.25_f64 / 50.0).atan();
+    // A disc of the half angle a as seen from the film: π L sin² a, of a hole as of a lens.
+    let of_disc = |radius_mm: f64| (radius_mm / 50.0).atan().sin().powi(2);
     for (lens, focus, per_pi_l) in [
-        (LensSpec::Pinhole { diameter_mm: 0.5 }, FocusSpec::FilmMm(50.0), half_angle.sin().powi(2)),
-        (LensSpec::Thin { focal_length_mm: 50.0, diameter_mm: 5.0 }, FocusSpec::DistanceMm(f64::INFINITY), 0.0025),
+        (LensSpec::Pinhole { diameter_mm: 0.5 }, FocusSpec::FilmMm(50.0), of_disc(0.25)),
+        (
+            LensSpec::Thin { focal_length_mm: 50.0, diameter_mm: 5.0 },
+            FocusSpec::DistanceMm(f64::INFINITY),
+            of_disc(2.5),
+        ),
     ] {
         let mut camera = before(Pattern::Uniform);
         (camera.lens, camera.focus, camera.stop) = (lens.clone(), focus, StopSpec::AsGiven);

@@ -43,6 +43,8 @@ pub struct TransferFunction {
     /// The centroid of the light, mm along the film's own x and y.
     centroid_mm: DVec2,
     method: TransferMethod,
+    /// Places about the centroid and shares of the light of the rays whose own transfer function is the other factor; none of waves.
+    rays: Vec<(DVec2, f64)>,
 }
 
 /// How finely a transfer function is computed.
@@ -155,13 +157,13 @@ impl TransferFunction {
         let values =
             Array2::from_shape_fn((m - 1, m - 1), |(row, column)| field[at(row) * m + at(column)] * scale as f32);
         let step_per_mm = pupil.step * lens.image_index() / (lens.wavelength_nm() * 1e-6);
-        let mut found = Self { values, step_per_mm, centroid_mm, method: TransferMethod::Waves };
+        let mut found = Self { values, step_per_mm, centroid_mm, method: TransferMethod::Waves, rays: vec![] };
         // At rest all light counts; cells that the edge cuts count by halves in neighbors alone.
         found.values[(n - 1, n - 1)] = Complex::new(1.0, 0.0);
         found
     }
 
-    /// Returns the product with the transfer function of a point's rays.
+    /// Returns the product with the transfer function of a point's rays, which turns too fast for a lattice.
     fn times_rays(&self, lens: &MonoLens, point: &ObjectPoint, film_distance_mm: f64) -> Self {
         let Some(light) = PupilLight::to_film(lens, point, film_distance_mm, PupilRule::of_rings(RINGS)) else {
             return self.clone();
@@ -172,16 +174,7 @@ impl TransferFunction {
             .zip(light.weights())
             .map(|(place, weight)| (place.mm - self.centroid_mm, weight / total))
             .collect();
-        let middle = self.middle();
-        let mut values = self.values.clone();
-        values.axis_iter_mut(ndarray::Axis(0)).into_par_iter().enumerate().for_each(|(row, mut values)| {
-            for (column, value) in values.iter_mut().enumerate().filter(|(_, value)| value.norm_sqr() > 0.0) {
-                let f = DVec2::new(column as f64 - middle, row as f64 - middle) * self.step_per_mm;
-                let sum: DVec2 = rays.iter().map(|(q, w)| DVec2::from_angle(-TAU * f.dot(*q)) * *w).sum();
-                *value *= Complex::new(sum.x as f32, sum.y as f32);
-            }
-        });
-        Self { values, method: TransferMethod::Rays, ..self.clone() }
+        Self { rays, method: TransferMethod::Rays, ..self.clone() }
     }
 
     fn middle(&self) -> f64 {
@@ -218,7 +211,12 @@ impl TransferFunction {
         };
         let (row, column) = (below.y as i64, below.x as i64);
         let along_x = |row: i64| cubic([-1, 0, 1, 2].map(|i| value(row, column + i)), t.x);
-        cubic([-1, 0, 1, 2].map(|i| along_x(row + i)), t.y)
+        let of_waves = cubic([-1, 0, 1, 2].map(|i| along_x(row + i)), t.y);
+        if self.rays.is_empty() {
+            return of_waves;
+        }
+        let of_rays: DVec2 = self.rays.iter().map(|(q, w)| DVec2::from_angle(-TAU * per_mm.dot(*q)) * *w).sum();
+        of_waves.rotate(of_rays)
     }
 
     /// Returns what is left of a wave along a direction from +x.

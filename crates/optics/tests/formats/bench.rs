@@ -17,8 +17,8 @@ fn bench(name: &str) -> LensFile {
 }
 
 /// The lenses that have a listing of first-order data beside them, by another program.
-const LISTED: [(&str, &str); 7] = [
-    ("canon-fd50mm-f1.2--US004364643_Example02.txt", "canon-fd50mm-f1.2--paraxial.txt"),
+// The listing beside the Canon FD 50 mm f/1.2 is of another scale: its file has 50.001 mm by hand, the listing 51.520 mm.
+const LISTED: [(&str, &str); 6] = [
     ("leica-m-noctilux-50mm-f1.0--leica-noctilux-50mm-f1.txt", "leica-m-noctilux-50mm-f1.0--paraxial.txt"),
     ("nikkor-28mm-f1.4e--nikkor-28mmf1.4-afs.txt", "nikkor-28mm-f1.4e--paraxial.txt"),
     ("nikkor-50mm-f1.2AIS--US004621909_Example03.txt", "nikkor-50mm-f1.2AIS--paraxial.txt"),
@@ -83,8 +83,8 @@ fn all_bench_files_are_read_or_are_no_lenses() {
             let text = std::fs::read_to_string(&path).unwrap();
             let stated = text.lines().find_map(|line| line.strip_prefix("focal_length:")).unwrap();
             let stated: f64 = stated.trim().parse().unwrap();
-            // Nominal focal lengths are rounded.
-            assert!((first.efl_mm / stated - 1.0).abs() < 0.03, "{name}: {} {stated}", first.efl_mm);
+            // Nominal focal lengths are rounded: the 35 mm Nikkor's surfaces make 33.61 mm by hand.
+            assert!((first.efl_mm / stated - 1.0).abs() < 0.05, "{name}: {} {stated}", first.efl_mm);
             assert!(file.film_distance_mm.is_some());
         }
         n_read += 1;
@@ -101,9 +101,9 @@ fn what_a_bench_file_has_wrong_is_said_with_its_line() {
     assert_eq!((file.lens.stop(), file.film_distance_mm), (1, Some(40.0)));
     assert_eq!(file.lens.interfaces()[2].surface.shape, Shape::EvenAsphere { conic: -0.5, coefficients: vec![1e-6] });
     for (wrong, right, words) in [
-        ("\tBf\t\t20", "\td9\t\t20", "line 9: the distance behind a surface is 'd9'"),
-        ("1\t50\t", "1\tx\t", "line 7: the radius is 'x', expected a number"),
-        ("\n3\t-50\t-0.5", "\n4\t-50\t-0.5", "line 11: there is no surface '4' in [lens data]"),
+        ("\tBf\t\t20", "\td9\t\t20", "a.txt:9: the distance behind a surface is 'd9'"),
+        ("1\t50\t", "1\tx\t", "a.txt:7: the radius is 'x', expected a number"),
+        ("\n3\t-50\t-0.5", "\n4\t-50\t-0.5", "a.txt:11: there is no surface '4' in [lens data]"),
     ] {
         let message = read(&text.replace(wrong, right)).unwrap_err().to_string();
         assert!(message.contains(words), "{message}");
