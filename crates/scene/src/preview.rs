@@ -68,6 +68,6 @@ mod tests {
         let back = dioptric_pictures::read(&path, dioptric_pictures::Limits::no_limits()).unwrap().into_rgb8();
         // sRGB 1.055 × 0.5^(1/2.4) − 0.055 = 0.7354.
         assert_eq!((back.get_pixel(4, 0).0, back.get_pixel(0, 0).0), ([255; 3], [188; 3]));
-        assert!(write_preview_png(&folder.path().join("no/a.png"), &scene.radiance, white).is_err());
+        assert!(write_preview_png(&path.join("no/a.png"), &scene.radiance, white).is_err());
     }
 }

@@ -326,7 +326,10 @@ fn what_cannot_be_written_says_why_and_leaves_nothing() {
     let (sensor, raw) = raw_of("imx363");
     let message = |result: Result<(), dioptric_sensor::SensorError>| result.unwrap_err().to_string();
     assert!(message(raw.write(&folder.path().join("raw.jpg"))).contains("png, tif or tiff"));
+    // Folders are made, but not below a file.
+    std::fs::write(folder.path().join("no"), b"").unwrap();
     assert!(message(raw.write(&folder.path().join("no/such/raw.png"))).contains("no/such"));
+    std::fs::remove_file(folder.path().join("no")).unwrap();
     let (ideal, planes) = raw_of("ideal");
     assert!(
         message(ideal.write_dng(&planes, &DngDetails::of_light(Illuminant::D65), &folder.path().join("a.dng")))

@@ -9,7 +9,6 @@ use dioptric_optics::{
 use rayon::prelude::*;
 
 use super::{
-    page_data::ends_of,
     request::Field,
     rows::{FieldPlace, LensAnalysis},
 };
@@ -208,6 +207,13 @@ fn chart(title: &str, (x_label, x_range): (&str, (f64, f64)), y_label: &str, ser
         legend: Corner::TopRight,
         scale: Scale::Linear,
     }
+}
+
+/// Returns the shortest and the longest of several wavelengths, nm: those between which color is counted.
+pub fn ends_of(wavelengths_nm: &[f64]) -> Option<[f64; 2]> {
+    let ends = |[first, last]: [f64; 2], nm: &f64| [first.min(*nm), last.max(*nm)];
+    let [first_nm, last_nm] = wavelengths_nm.iter().fold([f64::INFINITY, 0.0], ends);
+    (first_nm < last_nm).then_some([first_nm, last_nm])
 }
 
 #[cfg(test)]

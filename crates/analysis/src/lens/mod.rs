@@ -16,12 +16,12 @@ mod trace_table;
 
 pub use compute::GRID_LINES;
 pub use convert::{ConvertedLens, convert_lens};
-pub use curves::LensCurves;
+pub use curves::{LensCurves, ends_of};
 pub use defaults::LensDefaults;
 pub use film::{AnalysisFilm, FilmPlace, FilmUse};
 pub use glass_table::{GlassData, GlassRow, glass_data, glass_rows};
 pub use modulation::LensModulation;
-pub use page_data::{LensPageData, ends_of};
+pub use page_data::LensPageData;
 pub use request::{AnalysisFields, AnalysisRequest};
 pub use rows::{
     AxialColorRow, FanRow, FieldPlace, FieldRow, FocusData, GridRow, LensAnalysis, OpdMap, PupilRow, SpotRow,

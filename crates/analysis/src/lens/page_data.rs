@@ -2,6 +2,7 @@
 
 use dioptric_optics::Lens;
 
+use super::curves::ends_of;
 use crate::{AnalysisRequest, LensAnalysis, LensCurves, LensData, LensDefaults, LensInfoRequest, LensModulation};
 use dioptric_pipeline::PipelineError;
 
@@ -23,13 +24,6 @@ pub struct LensPageData {
     pub curves: LensCurves,
     /// The modulation, or why there is none.
     pub modulation: Result<LensModulation, String>,
-}
-
-/// Returns the shortest and the longest of several wavelengths, nm: those between which color is counted.
-pub fn ends_of(wavelengths_nm: &[f64]) -> Option<[f64; 2]> {
-    let ends = |[first, last]: [f64; 2], nm: &f64| [first.min(*nm), last.max(*nm)];
-    let [first_nm, last_nm] = wavelengths_nm.iter().fold([f64::INFINITY, 0.0], ends);
-    (first_nm < last_nm).then_some([first_nm, last_nm])
 }
 
 impl LensPageData {

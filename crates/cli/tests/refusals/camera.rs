@@ -205,7 +205,7 @@ pub(crate) const ADDED: &[(&str, &str)] = &[
     ("diffraction: Hurb(gamma: -1.0)", "gamma is -1, expected a finite number above 0"),
     ("diffraction: Hurb(gamma: NaN)", "gamma is NaN, expected a finite number above 0"),
     ("diffraction: Waves", "Unexpected variant named `Waves` in enum `Diffraction`"),
-    ("movements: (tilt_deg: 90.0)", "no light of the scene reaches the middle of the film"),
+    ("movements: (tilt_deg: 90.0)", "tilt_deg is 90, expected -89 to 89 degrees"),
     ("movements: (tilt_deg: NaN)", "tilt_deg is NaN, expected "),
     ("movements: (rise_mm: inf)", "rise_mm is inf, expected "),
     ("movements: (rise_mm: 1e6)", "the automatic exposure finds no light to meter, and"),

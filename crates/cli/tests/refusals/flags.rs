@@ -53,7 +53,7 @@ pub(crate) const LINES: &[(&str, &str)] = &[
     ("run camera.ron --seed -1", "unexpected argument '-1' found"),
     ("run camera.ron --seed 1.5", "invalid value '1.5' for '--seed <N>': invalid digit"),
     ("run camera.ron --tilt-deg 400", "--tilt-deg is 400, expected "),
-    ("run camera.ron --scene note.txt --fov-deg 10 --depth-m 2", "expected a .exr, .hdr (ENVI), .mat (ISETCam), .png"),
+    ("run camera.ron --scene note.txt --fov-deg 10 --depth-m 2", "expected a .exr, .hdr (ENVI or Radiance), .mat, .npy"),
     ("run camera.ron --scene . --fov-deg 10 --depth-m 2", ".: no spectral band found: expected PNG or TIFF"),
     (
         "run camera.ron --scene absent.png --fov-deg 10 --depth-m 2",

@@ -410,6 +410,8 @@ fn a_truncated_or_absent_or_foreign_file_is_refused() {
     assert!(matches!(read_spectral_exr(&file.path), Err(SceneError::Unreadable { .. })));
     fs::remove_file(&file.path).unwrap();
     assert!(matches!(read_spectral_exr(&file.path), Err(SceneError::Unreadable { .. })));
+    // Folders are made, but not below a file.
+    fs::write(&file.path, b"").unwrap();
     let nowhere = file.path.join("no/folder.exr");
     assert!(matches!(write_scene_exr(&nowhere, &scene, ExrSamples::Uncompressed), Err(SceneError::Unwritable { .. })));
 }

@@ -165,6 +165,15 @@ const PANELS: &[(&str, &[&str])] = &[
 
 /// Keys that the text of the camera file alone has, and why. A type stands for all its keys.
 const TEXT: &[(&str, &str)] = &[
+    ("Camera.border", "a detail of blurs at the rim, written in the text of the camera file"),
+    ("Camera.chip_seed", "which chip of a make it is, written in the text of the camera file"),
+    ("Metering.EachFilter", "a share for each filter, written in the text of the camera file"),
+    ("WorldSpec.view", "places and directions in the world's own units, written in the text of the camera file"),
+    ("WorldSpec.sky", "as above"),
+    ("WorldSpec.lamps", "as above"),
+    ("WorldView", "as above"),
+    ("WorldSky", "as above"),
+    ("WorldLamp", "as above"),
     ("Camera.light_field", "a light field is decoded by `dioptric lightfield`; the window shows its raw picture"),
     ("LightFieldSpec", "as above"),
     ("MicroArray", "as above"),
