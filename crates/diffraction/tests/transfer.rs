@@ -59,7 +59,11 @@ fn perfect_lens_has_the_modulation_of_its_pupil() {
         let encircled = transfer.encircled();
         for radius in [0.3, 0.6, 1.0, 1.22, 2.0, 5.0] {
             let (found, expected) = (encircled.share(radius * unit_mm), airy::encircled_energy(radius));
-            assert!((found - expected).abs() < 1e-3, "f/{f_number} {radius}: {found} {expected}");
+            // At f/4 the edge of the pupil is 3 % brighter than its middle, which Airy's is not.
+            assert!(
+                (found - expected).abs() < if f_number < 16.0 { 3e-3 } else { 1e-3 },
+                "f/{f_number} {radius}: {found} {expected}"
+            );
         }
         let spread = transfer.line_spread(0.3);
         assert!((spread.full_width_at_half_maximum_mm() / unit_mm - 1.0017).abs() < 2e-3);
@@ -77,8 +81,9 @@ fn defocus_has_hopkins_modulation() {
     let unit_mm = airy_unit_mm(f_number);
     let shift_mm = 2.0 * waves * 550e-6 / (0.5f64 / f_number).atan().sin().powi(2);
     let (transfer, _) = TransferFunction::trace(&thin(f_number), &FAR, 50.0 + shift_mm, TransferQuality::Fine).unwrap();
-    // The film sees the pupil from 50 mm + shift, so that waves part by r²/2 (1/50 − 1/(50 + shift)).
-    let waves = waves / (1.0 + shift_mm / 50.0);
+    // The film sees the pupil from 50 mm + shift: waves part by r²/2 (1/50 − 1/(50 + shift)), and the cut-off is as much lower.
+    let farther = 1.0 + shift_mm / 50.0;
+    let (waves, unit_mm) = (waves / farther, unit_mm * farther);
     for s in [0.05f64, 0.1, 0.2, 0.35, 0.5, 0.8] {
         let steps = 20_000_i32;
         let reach = (1.0 - s * s).sqrt();
@@ -193,7 +198,7 @@ fn strehl_ratio_of_defocus_is_its_closed_form_to_a_thousandth() {
     for waves in [1.3f64, 2.5, 4.5, 8.5] {
         let shift_mm = 2.0 * waves * 550e-6 / (0.5 / f_number).atan().sin().powi(2);
         let found = PupilSamples::peak_of(&lens, &FAR, 50.0 + shift_mm).unwrap().strehl;
-        let x = std::f64::consts::PI * waves;
+        let x = std::f64::consts::PI * waves / (1.0 + shift_mm / 50.0);
         assert!(found > 0.99 * (x.sin() / x).powi(2) && found < 1.2 / (x * x), "{waves}: {found}");
     }
 }
