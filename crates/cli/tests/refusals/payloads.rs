@@ -116,7 +116,7 @@ pub(crate) fn pictures() -> Vec<(Vec<u8>, &'static str)> {
     let words = |text: &[u8]| text.to_vec();
     vec![
         (sized(0, 4), "Invalid image dimensions"),
-        (sized(0x7fff_ffff, 0x7fff_ffff), "of memory and may take"),
+        (sized(0x7fff_ffff, 0x7fff_ffff), "limit exceeded"),
         (sized(u32::MAX, 2), "of memory and may take"),
         (sized(60_000, 60_000), "of memory and may take"),
         (of(&|png| png.depth = 3), "Invalid bit depth 3"),
