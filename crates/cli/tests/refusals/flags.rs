@@ -89,7 +89,7 @@ pub(crate) const LINES: &[(&str, &str)] = &[
     ("lens draw dgauss-50mm --fields-deg 125 -o x.svg --quiet", "the drawing: fields_deg is 125, expected angles"),
     ("lens convert dgauss-50mm x.step", "cannot write x.step: '.step' is no lens format that can"),
     ("lens convert dgauss-50mm note.txt/x.zmx", "cannot write note.txt/x.zmx: Not a directory (os error"),
-    ("lens analyze dgauss-50mm --fields-deg 120 --out o", "the analysis: fields_deg is 120, expected angles above"),
+    ("lens analyze dgauss-50mm --fields-deg 125 --out o", "the analysis: fields_deg is 125, expected angles"),
     ("lens analyze dgauss-50mm --wavelengths-nm 5 --out o", "--wavelengths-nm is 5, expected "),
     ("lens analyze absent --out o", "no lens is named 'absent'; built in are paper-2el"),
     ("lens analyze dgauss-50mm --distance-mm 0 --out o", "--distance-mm is 0, expected "),

@@ -118,7 +118,7 @@ pub(crate) fn pictures() -> Vec<(Vec<u8>, &'static str)> {
         (sized(0, 4), "Invalid image dimensions"),
         (sized(0x7fff_ffff, 0x7fff_ffff), "limit exceeded"),
         (sized(u32::MAX, 2), "of memory and may take"),
-        (sized(60_000, 60_000), "of memory and may take"),
+        (sized(60_000, 60_000), "does not have enough data"),
         (of(&|png| png.depth = 3), "Invalid bit depth 3"),
         (of(&|png| png.color_type = 9), "Invalid color type 9"),
         (of(&|png| png.interlace = 7), "Unknown interlace method 7"),
