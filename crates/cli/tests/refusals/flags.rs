@@ -105,7 +105,6 @@ pub(crate) const LINES: &[(&str, &str)] = &[
     ("glass show N-BK7 --wavelengths-nm nan", "--wavelengths-nm: 'nan' is neither a number nor a range"),
     ("glass list --glasses absent.agf", "unexpected argument '--glasses' found"),
     ("glass show SCHOTT:UNOBTAINIUM", "no glass is named 'SCHOTT:UNOBTAINIUM'; no name is"),
-    ("psf dgauss-50mm", "where is the film? expected --focus-mm or --film-mm"),
     ("psf dgauss-50mm --focus-mm -5", "--focus-mm is -5, expected "),
     ("psf dgauss-50mm --focus-mm 2000 --fields-deg 91", "psf: fields_deg is 91, expected angles below 89.9"),
     ("psf dgauss-50mm --focus-mm 2000 --fields-deg x", "--fields-deg: 'x' is neither a number nor a range"),
