@@ -133,7 +133,7 @@ pub(crate) const LINES: &[(&str, &str)] = &[
     ("trace absent --rays ok.csv", "no lens is named 'absent'; built in are paper-2el"),
     ("render absent.pbrt", "absent.pbrt: cannot be read: No such file or directory"),
     ("render absent.obj --lens absent", "no lens is named 'absent'; built in are paper-2el"),
-    ("render note.txt", "expected a .pbrt, .gltf, .glb, .obj or .ply file"),
+    ("render note.txt", "expected a .pbrt, .gltf, .glb, .obj, .ply or .stl file"),
     ("render absent.obj", "absent.obj: cannot be read: No such file or directory"),
     ("render bad.obj --lens dgauss-50mm", "cannot be read: face vertex index out of bounds"),
     ("render bad.ply --lens dgauss-50mm", "bad.ply: line 7: Unexpected end of file while"),
