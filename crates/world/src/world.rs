@@ -657,6 +657,11 @@ impl WorldBuilder {
         if low.cmple(high).all() { (high - low).max_element() } else { 0.0 }
     }
 
+    /// Whether nothing in it could be seen: no shape, or meshes without triangles alone.
+    pub fn is_empty(&self) -> bool {
+        self.shapes.iter().all(|shape| matches!(&shape.shape, Shape::Mesh(mesh) if mesh.triangles.is_empty()))
+    }
+
     /// Whether anything gives light.
     pub fn has_light(&self) -> bool {
         !self.lights.is_empty() || self.shapes.iter().any(|shape| shape.emission.is_some())

@@ -55,7 +55,7 @@ pub fn open_world(path: &Path, options: &ReadOptions, cancel: &Cancel) -> Result
     let scale = DAffine3::from_scale(DVec3::splat(unit));
     let name = path.file_name().map(|name| name.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
     let name = name.strip_suffix(".gz").filter(|name| name.ends_with(".pbrt")).unwrap_or(&name);
-    let builder = match name.rsplit_once('.').map(|(_, kind)| kind) {
+    let mut builder = match name.rsplit_once('.').map(|(_, kind)| kind) {
         Some("pbrt") => pbrt::read(path, unit, cancel)?,
         #[cfg(feature = "gltf")]
         Some("gltf" | "glb") => gltf::read(path, scale, cancel)?,
@@ -67,6 +67,9 @@ pub fn open_world(path: &Path, options: &ReadOptions, cancel: &Cancel) -> Result
         _ => return Err(WorldError::UnknownKind { file: path.to_owned() }),
     };
     cancel.check()?;
+    if builder.is_empty() {
+        builder.note("nothing in the file has an area: no faces and no other shapes");
+    }
     Ok(builder)
 }
 

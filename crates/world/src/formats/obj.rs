@@ -385,6 +385,8 @@ impl Library {
         let is_matte = mirrored == [0.0; 3] && !words.numbers.contains_key("pr") && !words.numbers.contains_key("pm");
         let opaque = match (words.numbers.get("d"), words.numbers.get("tr")) {
             (Some(d), _) => at(d, 0, 1.0),
+            // Meshlab and others write how opaque a material is: one of which nothing could be seen is theirs.
+            (None, Some(tr)) if at(tr, 0, 0.0) >= 1.0 => 1.0,
             (None, Some(tr)) => 1.0 - at(tr, 0, 0.0),
             (None, None) => 1.0,
         };
@@ -600,5 +602,20 @@ mod tests {
         let notes = world.notes().join("\n");
         assert!(notes.contains("gone") && notes.contains("foo"), "{notes}");
         assert_eq!(world.sources().len(), 2);
+    }
+
+    /// `Tr 1`, by which nothing could be seen, is what Meshlab writes of opaque materials.
+    #[test]
+    fn transparent_in_full_is_opaque() {
+        let folder = tempfile::tempdir().unwrap();
+        for (words, is_seen) in [("Tr 1.0", true), ("Tr 0", true), ("d 0", false)] {
+            std::fs::write(folder.path().join("m.mtl"), format!("newmtl a\nKd 1 1 1\n{words}\n")).unwrap();
+            let path = folder.path().join("a.obj");
+            std::fs::write(&path, "mtllib m.mtl\nusemtl a\nv -1 -1 0\nv 1 -1 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+            let options = crate::ReadOptions::default();
+            let world = crate::read_world(&path, &options, &dioptric_spectrum::Cancel::new()).unwrap();
+            let ray = crate::Ray { origin: Vec3::Z, direction: Vec3::NEG_Z };
+            assert_eq!(world.intersect(&ray, 9.0).is_some(), is_seen, "{words}");
+        }
     }
 }

@@ -286,7 +286,8 @@ impl Reader<'_> {
     fn picture(&mut self, of: Option<&Value>, word: &str, holds: Holds) -> Result<Option<Picture>, WorldError> {
         let Some(info) = of.and_then(|of| of.get(word)) else { return Ok(None) };
         let textures = list(self.root, "textures");
-        let number = index(info, "index").unwrap_or(usize::MAX);
+        let number = index(info, "index");
+        let number = number.ok_or_else(|| self.fault(format!("'{word}' names no texture: expected an index")))?;
         let texture = textures.get(number);
         let texture =
             texture.ok_or_else(|| self.fault(format!("texture {number}, of which there are {}", textures.len())))?;

@@ -87,6 +87,27 @@ fn strip(mode: u64, n: u32) -> Vec<[u32; 3]> {
     meshes::triangles(mode, &indices)
 }
 
+/// GLB whose JSON isn't padded to whole words, as some writers leave it, and a file of points alone, which says so.
+#[test]
+fn parts_without_padding_are_read() {
+    let json = file("3", 3).replace("\"emissiveFactor\"", "\"extras\":{},\"emissiveFactor\"");
+    for padding in ["", " ", "  ", "   "] {
+        let json = format!("{json}{padding}");
+        let mut glb = b"glTF\x02\0\0\0".to_vec();
+        glb.extend((20 + json.len() as u32 + 8 + 2).to_le_bytes());
+        glb.extend((json.len() as u32).to_le_bytes());
+        glb.extend(b"JSON");
+        glb.extend(json.as_bytes());
+        glb.extend([2, 0, 0, 0]);
+        glb.extend(b"BIN\0ab");
+        let (text, binary) = parts(&glb).unwrap();
+        assert_eq!((text.len(), binary), (json.len(), Some(&b"ab"[..])));
+    }
+    let points = file("3", 3).replace("\"material\":0}", "\"material\":0,\"mode\":0}");
+    let notes = read_text(&points).unwrap().notes().join("\n");
+    assert!(notes.contains("no area") && notes.contains("nothing in the file"), "{notes}");
+}
+
 #[test]
 fn strips_and_fans_are_triangles() {
     assert_eq!(strip(5, 5), [[0, 1, 2], [2, 1, 3], [2, 3, 4]]);
