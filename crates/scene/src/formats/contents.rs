@@ -13,7 +13,7 @@ use super::{
     light_unit::LightUnit,
     no_data::mend,
     read_scene::ReadOptions,
-    reading::{FileQuantity, Frame, light_unit},
+    reading::{FileQuantity, Frame, Place, light_unit},
     unusable::unreadable,
 };
 use crate::{SceneError, SceneLight};
@@ -61,6 +61,28 @@ pub(super) enum Heeds {
     Unit,
     /// All of them: a cube of plain numbers.
     Cube,
+}
+
+impl Image {
+    /// Puts the samples into a larger picture.
+    pub(super) fn pad(&mut self, place: Place) -> Result<(), SceneError> {
+        match self {
+            Self::Spectral(image) => pad_spectral(image, place),
+            Self::Linear { planes, .. } => {
+                planes.iter_mut().for_each(|plane| *plane = place.pad(plane));
+                Ok(())
+            }
+            // Only EXR files have frames.
+            Self::Codes(_) => Ok(()),
+        }
+    }
+}
+
+/// Puts the samples of an image into a larger picture.
+pub(super) fn pad_spectral(image: &mut SpectralImage, place: Place) -> Result<(), SceneError> {
+    let planes = image.planes().iter().map(|plane| place.pad(plane)).collect();
+    *image = SpectralImage::new(image.quantity(), image.grid().clone(), planes)?;
+    Ok(())
 }
 
 impl Contents {

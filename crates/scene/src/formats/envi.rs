@@ -421,8 +421,7 @@ impl EnviFile {
             Ok(bytes)
         };
         let floats = |bytes: &[u8]| -> Vec<f32> {
-            let (kind, is_big) = (self.header.data_type, self.header.is_big_endian);
-            bytes.chunks_exact(size).map(|number_bytes| number(number_bytes, kind, is_big)).collect()
+            numbers(bytes, (0, size), bytes.len() / size, self.header.data_type, self.header.is_big_endian)
         };
         let line_bytes = columns * size;
         match self.header.interleave {
@@ -464,9 +463,7 @@ impl EnviFile {
                     }
                 }
                 let (kind, is_big) = (self.header.data_type, self.header.is_big_endian);
-                let of_band = |&band: &usize| -> Vec<f32> {
-                    (0..n).map(|at| number(&bytes[at * stride + band * size..][..size], kind, is_big)).collect()
-                };
+                let of_band = |&band: &usize| numbers(&bytes, (band * size, stride), n, kind, is_big);
                 Ok(bands.par_iter().map(of_band).collect())
             }
         }
@@ -487,24 +484,36 @@ fn data_file(header_path: &Path, notes: &mut Vec<String>) -> Result<PathBuf, Sce
     Ok(first)
 }
 
-fn number(bytes: &[u8], data_type: DataType, is_big_endian: bool) -> f32 {
-    let mut little = [0; 8];
-    little[..bytes.len()].copy_from_slice(bytes);
-    if is_big_endian {
-        little[..bytes.len()].reverse();
+/// Returns `n` numbers, the first at a place of the bytes and each so many bytes behind the one before.
+fn numbers(bytes: &[u8], (first, stride): (usize, usize), n: usize, kind: DataType, is_big_endian: bool) -> Vec<f32> {
+    /// One loop a type and order, so that it holds no other choice.
+    fn all<const N: usize>(bytes: &[u8], at: (usize, usize), n: usize, of: impl Fn([u8; N]) -> f32) -> Vec<f32> {
+        let number = |i: usize| {
+            let from = at.0 + i * at.1;
+            of(bytes[from..from + N].try_into().expect("a slice of N bytes"))
+        };
+        (0..n).map(number).collect()
     }
-    let four = [little[0], little[1], little[2], little[3]];
-    let two = [little[0], little[1]];
-    match data_type {
-        DataType::U8 => f32::from(little[0]),
-        DataType::I16 => f32::from(i16::from_le_bytes(two)),
-        DataType::U16 => f32::from(u16::from_le_bytes(two)),
-        DataType::I32 => i32::from_le_bytes(four) as f32,
-        DataType::U32 => u32::from_le_bytes(four) as f32,
-        DataType::F32 => f32::from_le_bytes(four),
-        DataType::F64 => f64::from_le_bytes(little) as f32,
-        DataType::I64 => i64::from_le_bytes(little) as f32,
-        DataType::U64 => u64::from_le_bytes(little) as f32,
+    let at = (first, stride);
+    macro_rules! of {
+        ($type:ty, $to:expr) => {
+            if is_big_endian {
+                all(bytes, at, n, |b| $to(<$type>::from_be_bytes(b)))
+            } else {
+                all(bytes, at, n, |b| $to(<$type>::from_le_bytes(b)))
+            }
+        };
+    }
+    match kind {
+        DataType::U8 => of!(u8, f32::from),
+        DataType::I16 => of!(i16, f32::from),
+        DataType::U16 => of!(u16, f32::from),
+        DataType::I32 => of!(i32, |v| v as f32),
+        DataType::U32 => of!(u32, |v| v as f32),
+        DataType::F32 => of!(f32, |v| v),
+        DataType::F64 => of!(f64, |v| v as f32),
+        DataType::I64 => of!(i64, |v| v as f32),
+        DataType::U64 => of!(u64, |v| v as f32),
     }
 }
 

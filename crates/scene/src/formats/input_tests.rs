@@ -76,13 +76,23 @@ fn depth_scale_and_distortion_of_a_camera_file_count() {
 #[test]
 fn part_of_a_frame_lies_where_it_was() {
     let Some(path) = input("crop.exr") else { return };
-    let view = read(&path, &ReadOptions::default()).require_view().unwrap();
-    // The camera file: 96 × 72, 120 px, its axis at 47.5, 35.5; the part starts at column 64.
-    assert_eq!((view.focal_px, view.center_x_px, view.center_y_px), (120.0, 47.5 - 64.0, 35.5));
+    let scene = read(&path, &ReadOptions::default());
+    let view = scene.require_view().unwrap();
+    // The camera file: 96 × 72, 120 px, its axis at 47.5, 35.5; the part of 32 × 24 starts at column 64.
+    assert_eq!((scene.rows(), scene.columns()), (72, 96));
+    assert_eq!((view.focal_px, view.center_x_px, view.center_y_px), (120.0, 47.5, 35.5));
+    let own = super::read_planes_exr(&path).unwrap();
+    for plane in scene.radiance.planes() {
+        let is_lit = |row: usize, column: usize| plane[(row, column)] > 0.0;
+        for ((row, column), value) in own.iter().find(|(name, _)| name == "G").unwrap().1.indexed_iter() {
+            assert!(*value <= 0.0 || is_lit(row, column + 64), "row {row}, column {column}");
+        }
+        assert!(!(0..64).any(|column| (0..72).any(|row| is_lit(row, column))) && !(24..72).any(|row| is_lit(row, 80)));
+    }
     // A field of view is that of the whole frame.
     let view = read(&path, &usual()).require_view().unwrap();
     assert_abs_diff_eq!(view.focal_px, 48.0 / 10.0_f64.to_radians().tan(), epsilon = 1e-9);
-    assert_abs_diff_eq!(view.center_x_px, 47.5 - 64.0, epsilon = 1e-9);
+    assert_abs_diff_eq!(view.center_x_px, 47.5, epsilon = 1e-9);
 }
 
 #[dioptric_golden::needs_shared]

@@ -14,7 +14,7 @@ use ndarray::Array2;
 use super::{
     band_folder::band_folder,
     camera::CameraData,
-    contents::{Contents, Cube, Heeds, Image, straightened, straightened_depth},
+    contents::{Contents, Cube, Heeds, Image, pad_spectral, straightened, straightened_depth},
     depth::{DepthWords, RawDepth, depth_beside, files_beside, likely_beside, read_depth},
     envi::{contents_of_envi, header_of},
     mat::{MatScene, read_mat},
@@ -310,10 +310,6 @@ fn of_mat(path: &Path, options: &ReadOptions) -> Result<Contents, SceneError> {
         (None, None) => None,
     };
     let mut notes = scene.notes;
-    if scene.n_clipped > 0 {
-        let n_samples = rows * columns * scene.image.grid().len();
-        notes.push(format!("{} of {n_samples} samples of all bands were below 0 and are 0", scene.n_clipped));
-    }
     let view = view.transpose().map_err(|error| unreadable(path, error))?.map(|view| CameraData::of_view(path, view));
     let choice = options.reading.no_data.unwrap_or_default();
     let grid = scene.image.grid().clone();
@@ -456,7 +452,7 @@ fn raw_depth(
 fn finish(path: &Path, name: String, mut contents: Contents, options: &ReadOptions) -> Result<Scene, SceneError> {
     let (rows, columns) = contents.size();
     let frame = contents.frame.unwrap_or_else(|| Frame::whole(rows, columns));
-    let camera = camera_of(path, &mut contents, frame, options)?;
+    let mut camera = camera_of(path, &mut contents, frame, options)?;
     let mut depth = raw_depth(path, &mut contents, frame, options)?;
     let mut sources = Sources { what: contents.what.clone(), ..Sources::default() };
     if !frame.is_whole(rows, columns) {
@@ -470,6 +466,21 @@ fn finish(path: &Path, name: String, mut contents: Contents, options: &ReadOptio
             frame.rows
         );
     }
+    // Of a picture that is larger than its samples the rest is black.
+    if let Some(place) = frame.place_of(rows, columns) {
+        let is_black = format!("{}: what it has no samples of is black", name_of(path));
+        contents.notes.push(is_black);
+        contents.image.pad(place)?;
+        if let Some((image, z_m)) = &mut contents.hidden {
+            pad_spectral(image, place)?;
+            *z_m = place.pad_depth(z_m);
+        }
+        if let Some(depth) = &mut depth {
+            depth.values = place.pad_depth(&depth.values);
+        }
+        camera = camera.map(|(data, from)| (data.shifted(-(place.left as i64), -(place.top as i64)), from));
+    }
+    let (rows, columns) = contents.size();
     sources.view = camera.as_ref().and_then(|(_, from)| from.clone());
     if camera.is_none() && (frame.aspect - 1.0).abs() > 1e-6 {
         let what = "times as wide as high, which counts with a field of view or camera data alone";
@@ -622,8 +633,8 @@ fn lit(
         }
     };
     let image = match &options.grid {
-        Some(grid) => resampled(&image, grid)?,
-        None => image,
+        Some(grid) if grid != image.grid() => resampled(&image, grid)?,
+        _ => image,
     };
     if image.quantity() != Quantity::Reflectance {
         return Ok((image, contents.light));

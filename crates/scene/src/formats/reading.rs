@@ -3,6 +3,7 @@
 use std::{path::PathBuf, str::FromStr};
 
 use dioptric_spectrum::Quantity;
+use ndarray::{Array2, s};
 use serde::{Deserialize, Serialize};
 
 use super::light_unit::LightUnit;
@@ -282,9 +283,53 @@ impl Frame {
         Self { columns, rows, x0: 0, y0: 0, aspect: 1.0 }
     }
 
+    /// Returns where so many samples lie in the smallest picture that holds them and the frame; `None` where that has no others.
+    pub(super) fn place_of(self, rows: usize, columns: usize) -> Option<Place> {
+        let before = |start: i64| start.max(0) as usize;
+        let whole = |start: i64, n: usize, side: usize| {
+            let last = (start + n as i64).max(side as i64);
+            (last - start.min(0)) as usize
+        };
+        let place = Place {
+            top: before(self.y0),
+            left: before(self.x0),
+            rows: whole(self.y0, rows, self.rows),
+            columns: whole(self.x0, columns, self.columns),
+        };
+        ((place.rows, place.columns) != (rows, columns)).then_some(place)
+    }
+
     /// Returns whether the scene has just the samples of the frame.
     pub(super) fn is_whole(self, rows: usize, columns: usize) -> bool {
         (self.x0, self.y0, self.columns, self.rows) == (0, 0, columns, rows)
+    }
+}
+
+/// Where samples lie in a larger picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Place {
+    pub(super) top: usize,
+    pub(super) left: usize,
+    pub(super) rows: usize,
+    pub(super) columns: usize,
+}
+
+impl Place {
+    /// Returns a plane in the larger picture, which is 0 elsewhere.
+    pub(super) fn pad(self, plane: &Array2<f32>) -> Array2<f32> {
+        let (rows, columns) = plane.dim();
+        let mut padded = Array2::zeros((self.rows, self.columns));
+        padded.slice_mut(s![self.top..self.top + rows, self.left..self.left + columns]).assign(plane);
+        padded
+    }
+
+    /// Returns depths in the larger picture, elsewhere those of the nearest sample.
+    pub(super) fn pad_depth(self, plane: &Array2<f32>) -> Array2<f32> {
+        let (rows, columns) = plane.dim();
+        Array2::from_shape_fn((self.rows, self.columns), |(row, column)| {
+            let row = row.saturating_sub(self.top).min(rows - 1);
+            plane[(row, column.saturating_sub(self.left).min(columns - 1))]
+        })
     }
 }
 
@@ -323,6 +368,19 @@ mod tests {
         assert_eq!(DepthUnit::parse("mm"), Ok(DepthUnit::Metres(1e-3)));
         assert_eq!(DepthUnit::parse("256/px"), Ok(DepthUnit::Samples(1.0 / 256.0)));
         assert_eq!(axis_order("bxy"), Ok([2, 1, 0]));
+    }
+
+    #[test]
+    fn samples_lie_where_their_frame_has_them() {
+        let frame = Frame { columns: 6, rows: 4, x0: 4, y0: -1, aspect: 1.0 };
+        // Columns 4 and 5 of 6, and a row above the frame.
+        let place = frame.place_of(3, 2).unwrap();
+        assert_eq!(place, Place { top: 0, left: 4, rows: 5, columns: 6 });
+        let plane = place.pad(&Array2::from_elem((3, 2), 1.0));
+        assert_eq!((plane.sum(), plane[(0, 4)], plane[(2, 5)], plane[(3, 5)]), (6.0, 1.0, 1.0, 0.0));
+        assert_eq!(place.pad_depth(&ndarray::arr2(&[[1.0, 2.0]; 3])).row(4).to_vec(), [1.0, 1.0, 1.0, 1.0, 1.0, 2.0]);
+        // More samples than the frame has need no others.
+        assert_eq!(Frame { columns: 6, rows: 4, x0: -2, y0: -1, aspect: 1.0 }.place_of(8, 10), None);
     }
 
     #[test]

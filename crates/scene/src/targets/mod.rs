@@ -171,10 +171,30 @@ impl Target {
             TargetLight::Illuminant(light) => light.clone(),
         };
         // White is a perfect diffuser.
+        let notes = self.beyond_measured(grid, &illuminant);
         let light = Some(SceneLight::new(illuminant, std::f64::consts::PI * self.luminance_cd_m2));
-        Scene { light, ..Scene::new(self.name(), radiance) }
+        Scene { light, notes, ..Scene::new(self.name(), radiance) }
             .or_flat_depth_m(self.distance_m)?
             .or_horizontal_fov_deg(self.horizontal_fov_deg)
+    }
+
+    /// Returns what is said of bands beyond those in which the chart, or a light that is a table, was measured.
+    fn beyond_measured(&self, grid: &WavelengthGrid, light: &Illuminant) -> Vec<String> {
+        let chart = match self.pattern {
+            Pattern::ColorChart => color_checker_reflectances().first().map(|(_, patch)| patch.range_nm()),
+            _ => None,
+        };
+        let table = match (&self.light, light) {
+            (TargetLight::Illuminant(_), Illuminant::Spectrum(table)) => Some(table.range_nm()),
+            _ => None,
+        };
+        let (first, last) = grid.range_nm();
+        let known = [("reflectances of the chart", chart), ("values of its light", table)];
+        let beyond = known.into_iter().filter_map(|(what, range)| {
+            let (from, to) = range.filter(|(from, to)| first < *from || last > *to)?;
+            Some(format!("the {what} are known from {from} to {to} nm; beyond, their end values are held"))
+        });
+        beyond.collect()
     }
 
     /// Returns what each sample of a gray pattern reflects, as a share of white.
@@ -379,6 +399,14 @@ mod tests {
         assert!(one == by(2));
         let white = target.white_radiance(&grid()).unwrap()[15] as f32;
         assert!(one.planes()[15].iter().all(|v| (0.25 * 0.9999..=0.75 * 1.0001).contains(&(v / white))));
+    }
+
+    #[test]
+    fn bands_beyond_the_measured_chart_are_named() {
+        let chart = of(Pattern::ColorChart);
+        let notes = |last_nm: f64| chart.scene(&WavelengthGrid::uniform(400.0, last_nm, 50.0).unwrap()).unwrap().notes;
+        assert!(notes(700.0).is_empty());
+        assert!(notes(900.0)[0].contains("380 to 730 nm"), "{:?}", notes(900.0));
     }
 
     #[test]

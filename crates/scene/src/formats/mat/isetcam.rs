@@ -86,8 +86,6 @@ pub(in super::super) struct IsetScene {
     pub(in super::super) horizontal_fov_deg: Option<f64>,
     /// The light on it, where it is the same everywhere.
     pub(in super::super) light: Option<SceneLight>,
-    /// Samples that were negative and are 0, as a linear model may leave them.
-    pub(in super::super) n_clipped: usize,
     /// What of the file is not used.
     pub(in super::super) notes: Vec<String>,
 }
@@ -190,8 +188,7 @@ fn cube_of(path: &Path, file: &MatFile, name: &str, reading: &FileReading) -> Re
 /// Reads a scene of `ISETCam`.
 fn of_iset(path: &Path, file: &MatFile) -> Result<IsetScene, SceneError> {
     let wrong = |reason: String| unreadable(path, reason);
-    let Raw { planes, wave_nm, light, depth_m, distance_m, horizontal_fov_deg, n_clipped } =
-        Raw::of(file).map_err(wrong)?;
+    let Raw { planes, wave_nm, light, depth_m, distance_m, horizontal_fov_deg } = Raw::of(file).map_err(wrong)?;
     let values = |reason| SceneError::Values { file: path.to_owned(), reason };
     let order = ascending(&wave_nm);
     let grid = WavelengthGrid::new(order.iter().map(|&band| wave_nm[band]).collect()).map_err(values)?;
@@ -200,7 +197,7 @@ fn of_iset(path: &Path, file: &MatFile) -> Result<IsetScene, SceneError> {
     let image = SpectralImage::new(Quantity::Radiance, grid, planes).map_err(values)?;
     let light = light.map(|spectrum| light_of(&spectrum)).transpose().map_err(wrong)?;
     let notes = unused_of(path, file).map_err(wrong)?;
-    Ok(IsetScene { image, depth_m, distance_m, horizontal_fov_deg, light, n_clipped, notes })
+    Ok(IsetScene { image, depth_m, distance_m, horizontal_fov_deg, light, notes })
 }
 
 /// Returns notes of the variables and the fields of a scene that are not used.
@@ -246,7 +243,6 @@ struct Raw {
     depth_m: Option<Array2<f32>>,
     distance_m: Option<f64>,
     horizontal_fov_deg: Option<f64>,
-    n_clipped: usize,
 }
 
 impl Raw {
@@ -264,7 +260,7 @@ impl Raw {
         };
         let number = |name: &str| Ok::<_, String>(file.array(name)?.and_then(|array| array.number()));
         let (coefficients, basis) = (file.array("mcCOEF")?, file.array("basis")?);
-        let (mut cube, wave_nm) = if let Some(coefficients) = coefficients {
+        let (cube, wave_nm) = if let Some(coefficients) = coefficients {
             let basis = basis.ok_or("it has coefficients 'mcCOEF' but no 'basis'")?;
             let wave_nm = basis.field("wave").and_then(MatArray::list).ok_or("its 'basis' has no list 'wave'")?;
             let functions = basis.field("basis").ok_or("its 'basis' has no field 'basis'")?;
@@ -280,13 +276,11 @@ impl Raw {
             (Cube::of(&photons, "photons", None, wave_nm.len())?, wave_nm)
         };
         let light = file.array("illuminant")?.and_then(|array| white_of(&array, &wave_nm));
-        let n_clipped = cube.clip();
         Ok(Self {
             light,
             depth_m: file.array("depthMap")?.map(|map| plane_of(&map, cube.size())).transpose()?,
             distance_m: number("dist")?,
             horizontal_fov_deg: number("fov")?,
-            n_clipped,
             planes: cube.into_watts(&wave_nm)?,
             wave_nm,
         })
@@ -300,14 +294,12 @@ impl Raw {
         let wave_nm = wave_nm.ok_or("its 'scene' has no list 'spectrum.wave' of bands, nm")?;
         let number = |name: &str| scene.field(name).and_then(MatArray::number);
         let range = |low: &str, high: &str| Some([data.field(low)?.number()?, data.field(high)?.number()?]);
-        let mut cube = Cube::of(photons, "scene.data.photons", range("dmin", "dmax"), wave_nm.len())?;
-        let n_clipped = cube.clip();
+        let cube = Cube::of(photons, "scene.data.photons", range("dmin", "dmax"), wave_nm.len())?;
         Ok(Self {
             light: scene.field("illuminant").and_then(|array| white_of(array, &wave_nm)),
             depth_m: scene.field("depthMap").map(|map| plane_of(map, cube.size())).transpose()?,
             distance_m: number("distance"),
             horizontal_fov_deg: number("wAngular"),
-            n_clipped,
             planes: cube.into_watts(&wave_nm)?,
             wave_nm,
         })
@@ -346,16 +338,6 @@ impl Cube {
 
     fn size(&self) -> (usize, usize) {
         self.0[0].dim()
-    }
-
-    /// Makes negative photons none, and returns how many there were.
-    fn clip(&mut self) -> usize {
-        let mut n_clipped = 0;
-        for sample in self.0.iter_mut().flat_map(|plane| plane.iter_mut()).filter(|sample| **sample < 0.0) {
-            *sample = 0.0;
-            n_clipped += 1;
-        }
-        n_clipped
     }
 
     /// Returns the energy of the photons.

@@ -52,7 +52,7 @@ fn a_scene_structure_is_read() {
     for name in ["iset_scene.mat", "iset_plain.mat"] {
         let scene = read(name);
         check_photons(&scene, SINGLE);
-        assert_eq!((scene.horizontal_fov_deg, scene.distance_m, scene.n_clipped), (Some(30.0), Some(1.2), 0));
+        assert_eq!((scene.horizontal_fov_deg, scene.distance_m), (Some(30.0), Some(1.2)));
         let depth_m = scene.depth_m.unwrap();
         assert_eq!((depth_m.dim(), depth_m[(0, 0)], depth_m[(3, 1)]), ((4, 6), 2.0, 5.5));
         // The radiance of a white under it: equal photons.
