@@ -2,7 +2,6 @@
 
 mod corners;
 mod edge;
-mod film_cone;
 mod front;
 mod holes;
 mod light;
@@ -12,8 +11,9 @@ mod strips;
 
 use glam::{DVec2, DVec3};
 
-use self::{edge::EdgeSearch, front::Front};
-pub use self::{film_cone::FilmCone, plane::PupilPlane, region::PupilRegion};
+pub(crate) use self::edge::EdgeSearch;
+use self::front::Front;
+pub use self::{plane::PupilPlane, region::PupilRegion};
 use crate::{
     MonoLens, ObjectPoint, RayBatch, Vignetting,
     trace::{self, Plan},
@@ -89,7 +89,7 @@ impl PupilBoundary {
         0.5 * std::f64::consts::TAU / self.rho_mm.len() as f64 * self.rho_mm.iter().map(|r| r * r).sum::<f64>()
     }
 
-    fn azimuths(n: usize) -> impl Iterator<Item = DVec2> {
+    pub(crate) fn azimuths(n: usize) -> impl Iterator<Item = DVec2> {
         (0..n).map(move |i| DVec2::from_angle(std::f64::consts::TAU * i as f64 / n as f64))
     }
 
@@ -238,7 +238,7 @@ const SEES_ENOUGH: f64 = 0.98;
 /// Places beyond an edge that are looked at for light that it hides.
 const HIDDEN_PLACES: usize = 12;
 /// Clearance at which a ray is held to graze its rim, mm.
-const EDGE_MM: f64 = 1e-11;
+pub(crate) const EDGE_MM: f64 = 1e-11;
 
 impl MonoLens {
     /// How far inside the rim and the openings of a surface a point of it lies, mm; the point is of the lens frame.

@@ -1,9 +1,9 @@
 //! First-order optics of a lens at one wavelength: pupils, f-numbers, images.
 
-use glam::{DVec2, DVec3};
+use glam::DVec2;
 
 use crate::{
-    Aperture, AxialBeam, Conjugate, FirstOrder, MonoLens, ObjectPoint, OpticsError, PupilRegion,
+    Aperture, AxialBeam, Conjugate, FirstOrder, MonoLens, OpticsError,
     paraxial::{self, MarginalRay, Matrix},
     trace::{Kind, Step},
 };
@@ -11,8 +11,6 @@ use crate::{
 /// How far an entrance pupil may be for counting from its center, over the first rim's radius: then counts are good to
 /// 1e-12 of the rim.
 const FARTHEST_PUPIL: f64 = 1e4;
-/// Azimuths of the outline of a pupil whose area is wanted: a multiple of 8, so that corners of squares are among them.
-const AREA_AZIMUTHS: usize = 192;
 
 impl MonoLens {
     /// Focal lengths, principal planes and pupils.
@@ -73,20 +71,6 @@ impl MonoLens {
     /// Whether a far point on the axis has an image and its light a width before the lens.
     fn has_far_pupil(&self) -> bool {
         self.first_order.entrance_pupil_diameter_mm.is_finite() && self.first_order.power_per_mm != 0.0
-    }
-
-    /// The f-number for a far object of the round beam with as much light as gets through on the axis, what obscurations stop left
-    /// out: the focal length over 2 √(A/π) of the pupil's area A. `None` where no light does, or the lens has no power.
-    ///
-    /// Of a lens with round rims alone it is [`real_f_number`](Self::real_f_number); a rectangular stop, or one with a hole, has
-    /// the light, and so the exposure, of this f-number.
-    pub fn f_number_of_light(&self) -> Option<f64> {
-        let point = ObjectPoint::Infinite(DVec3::Z);
-        let area_mm2 = self.over_clear_pupil(&|lens: &Self| {
-            PupilRegion::find(lens, &point, AREA_AZIMUTHS).map_or(0.0, |region| region.area_mm2())
-        });
-        let f_number = self.first_order.efl_mm.abs() / (2.0 * (area_mm2 / std::f64::consts::PI).sqrt());
-        (area_mm2 > 0.0 && f_number.is_finite()).then_some(f_number)
     }
 
     /// Returns a sentence on what limits the light of the point on the axis at this distance before the first vertex, mm (infinite

@@ -18,7 +18,7 @@ const GAP_ROUNDS: usize = 4;
 const EDGE_ROUNDS: usize = 100;
 
 /// A plane of places, each with the clearance of the ray through it: above 0 where light passes.
-pub(super) trait EdgeSearch {
+pub(crate) trait EdgeSearch {
     /// Returns the clearance at each place; −∞ where no ray gets through, whatever the rims.
     fn clearances(&self, places: &[DVec2]) -> Vec<f64>;
 
@@ -110,7 +110,7 @@ pub(super) trait EdgeSearch {
 
 /// The edge of the pupil in one direction from a place inside, between a radius inside and one outside.
 #[derive(Clone, Copy)]
-pub(super) struct Edge {
+pub(crate) struct Edge {
     pub(super) center_mm: DVec2,
     pub(super) direction: DVec2,
     pub(super) at_center: f64,

@@ -1,6 +1,12 @@
 //! Sums over pupils with holes.
 
-use crate::MonoLens;
+use glam::DVec3;
+
+use super::PupilRegion;
+use crate::{MonoLens, ObjectPoint};
+
+/// Azimuths of the outline of a pupil whose area is wanted: a multiple of 8, so that corners of squares are among them.
+const AREA_AZIMUTHS: usize = 192;
 
 impl MonoLens {
     /// Hands the lens as a sum of lenses without obscurations, each with its sign: the lens without them, less that of each
@@ -37,6 +43,20 @@ impl MonoLens {
             here != 0.0
         });
         sum
+    }
+
+    /// The f-number for a far object of the round beam with as much light as gets through on the axis, what obscurations stop left
+    /// out: the focal length over 2 √(A/π) of the pupil's area A. `None` where no light does, or the lens has no power.
+    ///
+    /// Of a lens with round rims alone it is [`real_f_number`](Self::real_f_number); a rectangular stop, or one with a hole, has
+    /// the light, and so the exposure, of this f-number.
+    pub fn f_number_of_light(&self) -> Option<f64> {
+        let point = ObjectPoint::Infinite(DVec3::Z);
+        let area_mm2 = self.over_clear_pupil(&|lens: &Self| {
+            PupilRegion::find(lens, &point, AREA_AZIMUTHS).map_or(0.0, |region| region.area_mm2())
+        });
+        let f_number = self.first_order_of_stop().efl_mm.abs() / (2.0 * (area_mm2 / std::f64::consts::PI).sqrt());
+        (area_mm2 > 0.0 && f_number.is_finite()).then_some(f_number)
     }
 }
 

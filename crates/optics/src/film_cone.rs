@@ -2,8 +2,8 @@
 
 use glam::{DMat3, DQuat, DVec2, DVec3};
 
-use super::{EDGE_MM, PupilBoundary, edge::EdgeSearch};
-use crate::{Placement, RayBatch, ReversedLens};
+use crate::pupil::{EDGE_MM, EdgeSearch};
+use crate::{Placement, PupilBoundary, RayBatch, ReversedLens};
 
 /// Directions across in a first look, and in a second where that finds no light.
 const LOOKS: [usize; 2] = [32, 96];
