@@ -3,6 +3,9 @@
 use dioptric_psf::LensImage;
 use glam::DVec2;
 
+/// A change of blur radius between neighbors that counts as an edge of depth, pixels.
+pub(crate) const DEPTH_EDGE_PX: f32 = 3.0;
+
 /// The depths at which the scene is blurred, nearest first.
 ///
 /// The blur of a point is proportional to the difference of its dioptres from those of the focus, so layers evenly

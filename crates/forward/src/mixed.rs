@@ -9,7 +9,10 @@ use dioptric_spectrum::{Cancel, Cancelled};
 use ndarray::Array2;
 use rayon::prelude::*;
 
-use crate::{layers::Layers, occluded::Distances, scene_layers::DEPTH_EDGE_PX};
+use crate::{
+    layers::{DEPTH_EDGE_PX, Layers},
+    occluded::Distances,
+};
 
 /// Samples beside an edge of depth, and the samples around by which they are judged.
 #[derive(Default)]

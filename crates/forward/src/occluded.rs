@@ -8,8 +8,7 @@ use ndarray::Array2;
 use crate::{
     SceneGeometry,
     hidden::{EdgeRule, Fill, reach_of_edges},
-    layers::Layers,
-    scene_layers::DEPTH_EDGE_PX,
+    layers::{DEPTH_EDGE_PX, Layers},
     surface::LayerCoordinates,
     work::plane_of,
 };

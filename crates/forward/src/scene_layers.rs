@@ -8,7 +8,7 @@ use glam::DVec2;
 
 use crate::{
     BlurMode, Film, ForwardError, ImagingSpec, SceneGeometry,
-    layers::{Blurs, Layers},
+    layers::{Blurs, DEPTH_EDGE_PX, Layers},
     mixed::MixedSamples,
     narrow::NarrowRule,
     occluded::{Distances, OccludedSamples},
@@ -16,8 +16,8 @@ use crate::{
     work::plane_of,
 };
 
-/// A change of blur radius between neighbors that counts as an edge of depth, pixels.
-pub(crate) const DEPTH_EDGE_PX: f32 = 3.0;
+/// How far the film is surveyed at first, over half its diagonal: most blurs take light from no farther.
+const SURVEYED: f64 = 1.12;
 
 /// A scene laid in layers of depth by the blur of a lens.
 pub(crate) struct SceneLayers {
@@ -47,6 +47,8 @@ impl SceneLayers {
         film.check()?;
         settings.check()?;
         scene.check()?;
+        // What is asked of the lens is asked of one survey of its film, a little wider than the picture.
+        let map = lens.film_map(grid.centers_nm()[grid.len() / 2], SURVEYED * film.half_diagonal_mm());
         let (near_m, far_m) = scene.depth.range_m();
         let (pitch_mm, places_mm) = (1e-3 * film.pitch_um, places_over(lens, film));
         let blurs = Blurs { lens, pitch_mm, places_mm: &places_mm, wavelengths_nm: grid.centers_nm() };
@@ -62,7 +64,6 @@ impl SceneLayers {
             return Ok(Arc::new(layers));
         }
         // How fine the scene is in the film's middle.
-        let map = lens.film_map(grid.centers_nm()[grid.len() / 2], film.half_diagonal_mm());
         let tan = |x_mm: f64| map.field_tan(DVec2::X * x_mm).unwrap_or_default();
         let scene_per_film = scene.view.focal_px * (tan(0.5 * pitch_mm) - tan(-0.5 * pitch_mm)).length();
         let distances = Distances::of(scene, &layers, cancel)?;

@@ -3,11 +3,13 @@
 //! The derivation is in `docs/hurb.md`, which comments name by its equations.
 
 use dioptric_diffraction::{CircularStop, Covariance, Hurb};
+use dioptric_optics::MonoLens;
 use dioptric_optics::StopPoint;
 use glam::DVec2;
 use multiversion::multiversion;
 
 use crate::{
+    Diffraction,
     blurred_edge::LANES,
     mesh::Mesh,
     raster::Raster,
@@ -38,6 +40,12 @@ const FAN: f64 = 1.5;
 pub(crate) struct StopHurb {
     pub(crate) model: Hurb,
     pub(crate) edge: CircularStop,
+}
+
+/// Returns what bends rays at the stop.
+pub(crate) fn bending(lens: &MonoLens, diffraction: Diffraction) -> Option<StopHurb> {
+    let edge = || CircularStop::new(lens.stop_semi_aperture_mm(), lens.wavelength_nm(), lens.stop_medium_index());
+    diffraction.hurb().map(|model| StopHurb { model, edge: edge() })
 }
 
 impl StopHurb {

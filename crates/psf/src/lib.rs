@@ -37,6 +37,7 @@ mod settings;
 mod splat;
 mod spots;
 mod survey;
+mod traced;
 
 pub use count::{AuthorsBending, CountingFilm, FrontGrid, mean_place_mm, trace_as_authors};
 pub use decenter::lens_on_axis;

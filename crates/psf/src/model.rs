@@ -1,34 +1,14 @@
 //! The image of a traced lens, described from the film.
 
-use std::{
-    collections::{HashMap, VecDeque},
-    sync::{Arc, Mutex, PoisonError},
-};
+use std::sync::Arc;
 
-use dioptric_diffraction::{CircularStop, WaveQuality, WaveWindow, WindowCenter, wave_psf};
-use dioptric_optics::{FilmCone, Lens, MonoLens, ObjectPoint, ReversedLens};
-use glam::{DVec2, IVec2};
-use ndarray::Array2;
+use dioptric_optics::Lens;
+use glam::DVec2;
 
 use crate::{
-    Diffraction, FilmMap, FilmQuery, ImageSettings, Kernel, LensImage, PointImage, PsfError, PupilDivision,
-    bundle::{Bundle, FilmPointJob, Frame, Moments, unobscured},
-    decenter::Decenter,
-    hurb_splatter::StopHurb,
-    part_image::PartImage,
-    pupil::Outline,
-    render::Layout,
-    survey::Survey,
+    FilmMap, FilmQuery, ImageSettings, Kernel, LensImage, PointImage, PsfError, PupilDivision, part_image::PartImage,
+    traced::Shared,
 };
-
-/// Bytes of bundles that are kept for each wavelength.
-const MOST_KEPT_BYTES: usize = 2 << 20;
-/// Steps per doubling in which the reach of a survey grows.
-const REACH_STEPS: f64 = 4.0;
-/// How far beyond the film that was surveyed kernels go by its survey, as a multiple of its reach.
-const FAR_BEYOND: f64 = 1.5;
-/// Radii, over the film's distance, at which light is looked for before anything else is done.
-const PROBED_RADII: [f64; 6] = [0.0, 0.05, 0.12, 0.25, 0.5, 1.0];
 
 /// The image that a lens forms, from rays traced back from the film.
 ///
@@ -40,114 +20,34 @@ pub struct LensImageModel {
     shared: Arc<Shared>,
 }
 
-#[derive(Debug)]
-pub(crate) struct Shared {
-    lens: Lens,
-    /// The lens as it is traced: on its axis where it has one.
-    centered: Lens,
-    is_rotational: bool,
-    decenter: Decenter,
-    settings: ImageSettings,
-    wavelengths_nm: Vec<f64>,
-    reference: MonoLens,
-    /// The depth in focus at the reference wavelength.
-    focus_dioptres: f64,
-    colors: Mutex<HashMap<u64, Arc<Color>>>,
-    /// The farthest points of the film that were asked for, mm.
-    reach_mm: Mutex<f64>,
-}
-
-/// The lens at one wavelength.
-#[derive(Debug)]
-pub(crate) struct Color {
-    pub(crate) lens: MonoLens,
-    reversed: ReversedLens,
-    unobscured: Option<ReversedLens>,
-    surveys: Mutex<Vec<Arc<Survey>>>,
-    bundles: Mutex<KeptBundles>,
-}
-
-/// Bundles by the points of the film that see them, the oldest dropped first.
-#[derive(Debug, Default)]
-struct KeptBundles {
-    by_place: HashMap<[u64; 2], Option<Arc<Bundle>>>,
-    in_order: VecDeque<[u64; 2]>,
-}
-
-/// Returns the wave-optical energies of a point on pixels of a side in µm, so many along a window, about a point of the film, mm, picture frame.
-pub(crate) fn wave_energies(
-    lens: &MonoLens,
-    point: &ObjectPoint,
-    settings: &ImageSettings,
-    center_mm: DVec2,
-    (pitch_um, side): (f64, usize),
-) -> Result<Array2<f64>, PsfError> {
-    // The picture is the film turned by 180°.
-    let window = WaveWindow { pitch_um, rows: side, columns: side, center: WindowCenter::At(-center_mm) };
-    Ok(wave_psf(lens, point, settings.film_distance_mm, &window, WaveQuality::default())?.samples)
-}
-
-/// Returns what bends rays at the stop.
-pub(crate) fn bending(lens: &MonoLens, diffraction: Diffraction) -> Option<StopHurb> {
-    let edge = || CircularStop::new(lens.stop_semi_aperture_mm(), lens.wavelength_nm(), lens.stop_medium_index());
-    diffraction.hurb().map(|model| StopHurb { model, edge: edge() })
-}
-
-fn locked<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
 impl LensImageModel {
     /// Returns the image of a lens at these wavelengths, nm.
     ///
     /// # Errors
     /// When the settings make no sense, the lens has no index at a wavelength, or no light reaches the film.
     pub fn new(lens: &Lens, wavelengths_nm: &[f64], settings: &ImageSettings) -> Result<Self, PsfError> {
-        settings.check()?;
-        let reference = lens.at(settings.reference_wavelength_nm)?;
-        let (centered, decenter) = Decenter::of(lens, settings.reference_wavelength_nm);
-        let centered = centered.into_owned();
-        let center_z_mm = reference.projection_center_z_mm();
-        let focus_mm = reference.object_distance_mm_for(settings.film_distance_mm);
-        let focus_dioptres = focus_mm.map_or(0.0, |distance_mm| 1e3 / (distance_mm + center_z_mm));
-        let shared = Shared {
-            lens: lens.clone(),
-            is_rotational: centered.is_rotational(),
-            centered,
-            decenter,
-            settings: *settings,
-            wavelengths_nm: wavelengths_nm.to_vec(),
-            reference,
-            focus_dioptres: if focus_dioptres.is_finite() { focus_dioptres } else { 0.0 },
-            colors: Mutex::default(),
-            reach_mm: Mutex::default(),
-        };
-        for &wavelength_nm in wavelengths_nm {
-            let color = shared.new_color(wavelength_nm)?;
-            shared.check_light(&color)?;
-            locked(&shared.colors).insert(wavelength_nm.to_bits(), Arc::new(color));
-        }
+        let shared = Shared::new(lens, wavelengths_nm, settings)?;
         Ok(Self { shared: Arc::new(shared) })
     }
 
     /// The lens.
     pub fn lens(&self) -> &Lens {
-        &self.shared.lens
+        self.shared.lens()
     }
 
     /// How the lens stands and is traced.
     pub fn settings(&self) -> &ImageSettings {
-        &self.shared.settings
+        self.shared.settings()
     }
 
     /// The wavelengths that it was made for, nm; it can be asked for others.
     pub fn wavelengths_nm(&self) -> &[f64] {
-        &self.shared.wavelengths_nm
+        self.shared.wavelengths_nm()
     }
 
     /// The depth in focus at the reference wavelength, dioptres; 0 where none is.
     pub fn focus_dioptres(&self) -> f64 {
-        self.shared.focus_dioptres
+        self.shared.focus_dioptres()
     }
 
     /// Returns the image of a point of the scene, traced forward, at these tangents of field angles; `None` if none of its light reaches the
@@ -162,12 +62,7 @@ impl LensImageModel {
     /// It falls with the range of phases B over the pupil that the diffraction integral has to follow, on a scale of its
     /// logarithm: from 1 at B = 200 to 0 at B = 400, a blur of about ten waves of defocus.
     pub fn wave_fraction(&self, query: FilmQuery) -> f64 {
-        let shared = &self.shared;
-        let color = shared.color(query.wavelength_nm);
-        let Some((bundle, map, frame)) = shared.bundle(&color, query.place_mm) else { return 0.0 };
-        let spots = bundle.spots(&map, &frame, query.place_mm, query.dioptres);
-        Layout::new(&spots, bending(&color.lens, shared.settings.diffraction), query.pitch_um)
-            .wave_fraction(shared.settings.diffraction)
+        self.shared.wave_fraction(query)
     }
 
     /// Returns the images through the parts of a division of the pupil, whose irradiances add up to that of the whole: views of the scene
@@ -185,7 +80,7 @@ impl LensImageModel {
 
 impl LensImage for LensImageModel {
     fn is_symmetric(&self) -> bool {
-        self.shared.is_rotational && self.shared.decenter.is_none()
+        self.shared.is_rotational() && self.shared.decenter().is_none()
     }
 
     fn film_map(&self, wavelength_nm: f64, reach_mm: f64) -> Arc<FilmMap> {
@@ -206,207 +101,5 @@ impl LensImage for LensImageModel {
 
     fn through_parts(&self, n_parts: usize) -> Result<Vec<Arc<dyn LensImage + Send>>, PsfError> {
         self.through(PupilDivision::new(n_parts))
-    }
-}
-
-impl Shared {
-    pub(crate) fn settings(&self) -> &ImageSettings {
-        &self.settings
-    }
-
-    /// Whether the lens as it is traced has an axis of symmetry.
-    pub(crate) fn is_rotational(&self) -> bool {
-        self.is_rotational
-    }
-
-    pub(crate) fn decenter(&self) -> Decenter {
-        self.decenter
-    }
-
-    pub(crate) fn focus_dioptres(&self) -> f64 {
-        self.focus_dioptres
-    }
-
-    fn new_color(&self, wavelength_nm: f64) -> Result<Color, PsfError> {
-        let lens = self.centered.at(wavelength_nm)?;
-        Ok(Color {
-            reversed: lens.reversed(),
-            unobscured: unobscured(&lens),
-            lens,
-            surveys: Mutex::default(),
-            bundles: Mutex::default(),
-        })
-    }
-
-    /// Returns the lens at a wavelength, or at the nearest one that it was made for where it is not known.
-    pub(crate) fn color(&self, wavelength_nm: f64) -> Arc<Color> {
-        if let Some(color) = locked(&self.colors).get(&wavelength_nm.to_bits()) {
-            return color.clone();
-        }
-        let color = self.new_color(wavelength_nm).map(Arc::new).unwrap_or_else(|_| {
-            let off = |nm: &&f64| (**nm - wavelength_nm).abs();
-            let nearest = self.wavelengths_nm.iter().min_by(|a, b| off(a).total_cmp(&off(b)));
-            let nearest_nm = nearest.copied().unwrap_or(self.settings.reference_wavelength_nm);
-            locked(&self.colors)[&nearest_nm.to_bits()].clone()
-        });
-        locked(&self.colors).entry(wavelength_nm.to_bits()).or_insert(color).clone()
-    }
-
-    /// Fails if no light reaches the film about its middle.
-    fn check_light(&self, color: &Color) -> Result<(), PsfError> {
-        const N_DIRECTIONS: usize = 16;
-        let n_directions = if self.is_rotational { 1 } else { N_DIRECTIONS };
-        let directions =
-            (0..n_directions).map(|i| DVec2::from_angle(std::f64::consts::TAU * i as f64 / n_directions as f64));
-        let mut probes = directions
-            .flat_map(|direction| PROBED_RADII.map(|radius| direction * (radius * self.settings.film_distance_mm)));
-        let is_lit = |place_mm: DVec2| {
-            let cone = FilmCone::new(&color.reversed, -place_mm, self.settings.film_distance_mm);
-            cone.is_some_and(|cone| cone.is_lit())
-        };
-        match probes.any(is_lit) {
-            true => Ok(()),
-            false => Err(PsfError::Dark {
-                lens: self.lens.name().to_owned(),
-                film_distance_mm: self.settings.film_distance_mm,
-                wavelength_nm: color.lens.wavelength_nm(),
-            }),
-        }
-    }
-
-    /// Returns what traces the bundle of a point of the film of the centered lens.
-    pub(crate) fn job<'a>(&self, color: &'a Color, place_mm: DVec2) -> FilmPointJob<'a> {
-        FilmPointJob {
-            lens: &color.reversed,
-            unobscured: color.unobscured.as_ref(),
-            film_distance_mm: self.settings.film_distance_mm,
-            center_z_mm: self.reference.projection_center_z_mm(),
-            mesh: self.settings.mesh(),
-            place_mm,
-        }
-    }
-
-    /// Returns the survey of the film up to `reach_mm` from its middle, or farther; kernels of all wavelengths use one as wide from now on.
-    pub(crate) fn survey_of_film(&self, color: &Color, reach_mm: f64) -> Arc<Survey> {
-        let mut known_mm = locked(&self.reach_mm);
-        *known_mm = known_mm.max(reach_mm);
-        let reach_mm = *known_mm;
-        drop(known_mm);
-        self.survey(color, reach_mm)
-    }
-
-    /// Returns the survey that the kernel of a point goes by: that of the film, whose directions go on beyond it.
-    fn survey_about(&self, color: &Color, place_mm: DVec2) -> Arc<Survey> {
-        let known_mm = *locked(&self.reach_mm);
-        self.survey(color, known_mm.max(place_mm.length() / FAR_BEYOND))
-    }
-
-    fn survey(&self, color: &Color, reach_mm: f64) -> Arc<Survey> {
-        // Of a lens moved sideways, as far from its axis.
-        let reach_mm = reach_mm + self.decenter.mm().length();
-        let reach_mm = ((REACH_STEPS * reach_mm.max(1e-3).log2()).ceil() / REACH_STEPS).exp2();
-        let known = |surveys: &[Arc<Survey>]| surveys.iter().find(|survey| survey.reach_mm == reach_mm).cloned();
-        if let Some(survey) = known(&locked(&color.surveys)) {
-            return survey;
-        }
-        // Threads that ask at once get the same, whoever is first.
-        let survey = Arc::new(Survey::new(self, color, reach_mm));
-        let mut surveys = locked(&color.surveys);
-        known(&surveys).unwrap_or_else(|| {
-            surveys.push(survey.clone());
-            survey
-        })
-    }
-
-    /// Returns the bundle of a point of the film, the map that goes with it and the frame that it was traced in; `None` in darkness.
-    pub(crate) fn bundle(&self, color: &Color, place_mm: DVec2) -> Option<(Arc<Bundle>, Arc<FilmMap>, Frame)> {
-        let survey = self.survey_about(color, place_mm);
-        let from_axis_mm = place_mm - self.decenter.axis_mm();
-        // Of a lens with an axis, bundles are traced along +x and turned.
-        let (traced_mm, turn) = match self.is_rotational {
-            true => (DVec2::X * from_axis_mm.length(), from_axis_mm.try_normalize().unwrap_or(DVec2::X)),
-            false => (from_axis_mm, DVec2::X),
-        };
-        let frame = Frame { turn, aside_mm: self.decenter.mm() };
-        let key = traced_mm.to_array().map(f64::to_bits);
-        let known = locked(&color.bundles).by_place.get(&key).cloned();
-        let bundle = known.unwrap_or_else(|| {
-            let has_stop = self.settings.diffraction.hurb().is_some();
-            let seed: Option<&Outline> = survey.seed(traced_mm);
-            let bundle = self.job(color, traced_mm).trace(seed, has_stop).map(Arc::new);
-            locked(&color.bundles).keep(key, bundle.clone());
-            bundle
-        });
-        Some((bundle?, survey.map.clone(), frame))
-    }
-
-    /// Returns the kernel of a point of the film, of the whole pupil or of a part of it, given by its part in a division.
-    pub(crate) fn kernel(&self, query: FilmQuery, part: Option<(&PupilDivision, usize)>) -> Kernel {
-        let FilmQuery { place_mm, dioptres, wavelength_nm, pitch_um } = query;
-        let color = self.color(wavelength_nm);
-        let Some((bundle, map, frame)) = self.bundle(&color, place_mm) else { return Kernel::identity(pitch_um) };
-        let mut spots = bundle.spots(&map, &frame, place_mm, dioptres);
-        if let Some((division, number)) = part {
-            let shares = division.cell_shares(number, spots.mesh, frame.turn * bundle.pupil_sign);
-            spots.energies.iter_mut().zip(shares).for_each(|(energy, share)| *energy *= share);
-            let share: f64 = spots.energies.iter().sum();
-            if share <= 0.0 {
-                return Kernel::identity(pitch_um);
-            }
-            spots.energies.iter_mut().for_each(|energy| *energy /= share);
-        }
-        let layout = Layout::new(&spots, bending(&color.lens, self.settings.diffraction), pitch_um);
-        let waves = |side, middle_px| self.waves(&color, &map, &query, side, middle_px);
-        let (energies, _) = layout.drawn(self.settings.diffraction, waves);
-        layout.kernel(&energies, pitch_um).normalized()
-    }
-
-    /// Returns the wave-optical energies, in a window about a pixel, of the object point that the chief ray of a point of the film sees.
-    fn waves(
-        &self,
-        color: &Color,
-        map: &FilmMap,
-        query: &FilmQuery,
-        side: usize,
-        middle_px: IVec2,
-    ) -> Result<Array2<f64>, PsfError> {
-        // As the centered lens sees the point.
-        let moved = self.decenter.mm() * (1e-3 * query.dioptres);
-        let direction = map.direction(query.place_mm);
-        let field_tan = direction.truncate() / direction.z - moved;
-        let point = ObjectPoint::from_field(&self.reference, field_tan, query.dioptres);
-        let middle_mm = middle_px.as_dvec2() * DVec2::new(1e-3, -1e-3) * query.pitch_um;
-        let center_mm = query.place_mm - self.decenter.axis_mm() + middle_mm;
-        wave_energies(&color.lens, &point, &self.settings, center_mm, (query.pitch_um, side))
-    }
-
-    fn moments(&self, place_mm: DVec2, wavelength_nm: f64) -> Moments {
-        let color = self.color(wavelength_nm);
-        let survey = self.survey_about(&color, place_mm);
-        survey.moments(place_mm - self.decenter.axis_mm())
-    }
-
-    pub(crate) fn blur_radius_mm(&self, place_mm: DVec2, dioptres: f64, wavelength_nm: f64) -> f64 {
-        let moments = self.moments(place_mm, wavelength_nm);
-        moments.blur_mm + moments.blur_mm_per_dioptre * (dioptres - self.focus_dioptres)
-    }
-
-    pub(crate) fn spread_mm(&self, place_mm: DVec2, dioptres: f64, wavelength_nm: f64) -> f64 {
-        let moments = self.moments(place_mm, wavelength_nm);
-        let blur_mm = moments.blur_mm + moments.blur_mm_per_dioptre * (dioptres - self.focus_dioptres);
-        blur_mm.hypot(moments.residue_mm)
-    }
-}
-
-impl KeptBundles {
-    fn keep(&mut self, key: [u64; 2], bundle: Option<Arc<Bundle>>) {
-        let most = bundle.as_ref().map_or(usize::MAX, |bundle| MOST_KEPT_BYTES / bundle.size_bytes().max(1));
-        while self.in_order.len() > most.max(1) {
-            let Some(oldest) = self.in_order.pop_front() else { break };
-            self.by_place.remove(&oldest);
-        }
-        if self.by_place.insert(key, bundle).is_none() {
-            self.in_order.push_back(key);
-        }
     }
 }

@@ -5,8 +5,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 use glam::DVec2;
 
 use crate::{
-    Diffraction, FilmMap, FilmQuery, Kernel, LensImage, PsfError, model::Shared, pupil_division::PupilDivision,
-    survey::Survey,
+    Diffraction, FilmMap, FilmQuery, Kernel, LensImage, PsfError, pupil_division::PupilDivision, survey::Survey,
+    traced::Shared,
 };
 
 /// The image that a lens forms through a part of its pupil: a view from that part, blurred by what is left of its width.

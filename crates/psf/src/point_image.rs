@@ -8,10 +8,10 @@ use ndarray::Array2;
 use crate::{
     ImageSettings, Kernel, ModelUse, PsfError,
     bundle::RIM_OVER_RMS,
+    hurb_splatter::bending,
     mesh::polar,
-    model::{bending, wave_energies},
     pupil::Outline,
-    render::Layout,
+    render::{Layout, wave_energies},
     spots::{Node, Spots, cell_areas, clear_shares},
 };
 

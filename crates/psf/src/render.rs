@@ -1,14 +1,16 @@
 //! Kernels drawn from spots.
 
-use dioptric_diffraction::CircularStop;
+use dioptric_diffraction::{CircularStop, WaveQuality, WaveWindow, WindowCenter, wave_psf};
+use dioptric_optics::{MonoLens, ObjectPoint};
 use glam::{DVec2, IVec2};
-use ndarray::Array2;
+use ndarray::{Array2, Axis};
 use serde::Serialize;
 
 use crate::{
-    Diffraction, Kernel, PsfError,
+    Diffraction, ImageSettings, Kernel, PsfError,
     hurb_splatter::{HurbSplatter, StopHurb},
     kernel::trim,
+    mesh::Mesh,
     raster::Raster,
     spots::{Node, Spots},
 };
@@ -116,7 +118,9 @@ impl<'a> Layout<'a> {
         }
         let at: Vec<DVec2> = nodes.iter().map(|node| node.at_mm).collect();
         raster.mesh(mesh, &at, &energies);
-        raster.finish()
+        let pixels = raster.finish();
+        // Tails that the window cuts have a center of their own.
+        if self.bending.is_some() { pixels } else { moved_to(centroid(mesh, &at, &energies), pixels) }
     }
 
     /// Draws the energy of each pixel of the window, with waves in so far as the setting and the blur want them: `waves` sums them in a
@@ -146,6 +150,54 @@ impl<'a> Layout<'a> {
         let kernel = Kernel::centered(trim(energies, kept), pitch_um).faded_out(self.lambda_n_px);
         Kernel { middle_px: self.middle_px, ..kernel }
     }
+}
+
+/// Returns the centroid of energies that lie evenly on the cells of a mesh whose nodes are at these places; `None` without energy.
+fn centroid(mesh: Mesh, at: &[DVec2], energies: &[f64]) -> Option<DVec2> {
+    let of_cell = |(ring, j): (usize, usize)| {
+        let [a, b, c, d] = mesh.corners(ring, j).map(|node| at[node]);
+        let outer = mesh.outer_share(ring);
+        ((a + b + c) * outer + (a + c + d) * (1.0 - outer)) / 3.0
+    };
+    let sum: DVec2 = mesh.cells().map(of_cell).zip(energies).map(|(middle, energy)| middle * *energy).sum();
+    let middle = sum / energies.iter().sum::<f64>();
+    middle.is_finite().then_some(middle)
+}
+
+/// Returns pixels whose centroid is that of the light on them: within a pixel light counts as at its middle, which moves that of an outline
+/// that a pixel's middle cuts, as of half a disc, by 0.16 pixels over the radius. A share of each pixel moves to the next.
+fn moved_to(centroid: Option<DVec2>, mut pixels: Array2<f64>) -> Array2<f64> {
+    let total = pixels.sum();
+    let of_pixel = |((row, column), energy): ((usize, usize), &f64)| DVec2::new(column as f64, row as f64) * *energy;
+    let found = pixels.indexed_iter().map(of_pixel).sum::<DVec2>() / total + 0.5;
+    let Some(by) = centroid.map(|centroid| centroid - found) else { return pixels };
+    // Beyond half a pixel the window has cut the light.
+    for (axis, by) in [(Axis(1), by.x), (Axis(0), by.y)].into_iter().filter(|(_, by)| by.abs() < 0.5) {
+        for mut lane in pixels.lanes_mut(axis) {
+            let n = lane.len();
+            let mut carried = 0.0;
+            for i in 0..n {
+                let i = if by > 0.0 { i } else { n - 1 - i };
+                let moves = if (by > 0.0 && i + 1 == n) || (by < 0.0 && i == 0) { 0.0 } else { by.abs() * lane[i] };
+                lane[i] += carried - moves;
+                carried = moves;
+            }
+        }
+    }
+    pixels
+}
+
+/// Returns the wave-optical energies of a point on pixels of a side in µm, so many along a window, about a point of the film, mm, picture frame.
+pub(crate) fn wave_energies(
+    lens: &MonoLens,
+    point: &ObjectPoint,
+    settings: &ImageSettings,
+    center_mm: DVec2,
+    (pitch_um, side): (f64, usize),
+) -> Result<Array2<f64>, PsfError> {
+    // The picture is the film turned by 180°.
+    let window = WaveWindow { pitch_um, rows: side, columns: side, center: WindowCenter::At(-center_mm) };
+    Ok(wave_psf(lens, point, settings.film_distance_mm, &window, WaveQuality::default())?.samples)
 }
 
 /// Returns pixels per mm: columns to the right, rows down.

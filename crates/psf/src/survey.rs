@@ -7,10 +7,10 @@ use rayon::prelude::*;
 
 use crate::{
     FilmMap,
-    bundle::{Bundle, Frame, Moments},
+    bundle::{Bundle, FilmPointJob, Frame, Moments},
+    decenter::Decenter,
     film_map::{PlaneMap, RadialMap, ShareMap},
     mesh::Mesh,
-    model::{Color, Shared},
     pupil::Outline,
     pupil_division::PupilDivision,
 };
@@ -37,10 +37,33 @@ const RIM: f64 = 0.1;
 const N_SHARE_RADII: usize = 65;
 const N_SHARE_AZIMUTHS: usize = 32;
 
+/// A lens, centered, whose film is surveyed at one wavelength.
+#[derive(Clone, Copy)]
+pub(crate) struct SurveyedLens<'a> {
+    /// Of any point of the film.
+    pub(crate) job: FilmPointJob<'a>,
+    pub(crate) is_rotational: bool,
+    /// How it stands aside from where it is surveyed.
+    pub(crate) decenter: Decenter,
+    pub(crate) focus_dioptres: f64,
+}
+
+impl SurveyedLens<'_> {
+    /// Looks out from a point of the film, seeded by the outline of another.
+    fn station(&self, place_mm: DVec2, seed: Option<&Outline>) -> Station {
+        let bundle = FilmPointJob { place_mm, ..self.job }.trace(seed, false);
+        Station::new(place_mm, bundle, self.focus_dioptres)
+    }
+}
+
 /// A point of the film and what it sees.
 #[derive(Clone, Debug)]
 pub(crate) struct Station {
     place_mm: DVec2,
+    /// Tangents of half the angle of the chief ray.
+    half_tan: Option<DVec2>,
+    irradiance_sr: f64,
+    /// None in darkness, and where a grid foresaw what is seen.
     bundle: Option<Arc<Bundle>>,
 }
 
@@ -55,20 +78,20 @@ pub(crate) struct Survey {
     n_columns: Option<usize>,
     /// Where the axis meets the film, mm from its middle.
     axis_mm: DVec2,
-    /// Of each station; of dark ones those of a lit one near by.
+    /// Of each station, or of each point of the first grid; of dark ones those of a lit one near by.
     moments: Vec<Moments>,
 }
 
 impl Station {
-    fn irradiance_sr(&self) -> f64 {
-        self.bundle.as_ref().map_or(0.0, |bundle| bundle.irradiance_sr)
-    }
-
-    /// Returns the tangents of half the angle of the chief ray.
-    fn half_tan(&self, focus_dioptres: f64) -> Option<DVec2> {
-        let chief = self.bundle.as_ref()?.chief(focus_dioptres);
-        let half_tan = chief.truncate() / (chief.z + chief.length());
-        half_tan.is_finite().then_some(half_tan)
+    /// A point whose bundle was traced; none in darkness.
+    fn new(place_mm: DVec2, bundle: Option<Bundle>, focus_dioptres: f64) -> Self {
+        let half_tan = bundle.as_ref().and_then(|bundle| {
+            let chief = bundle.chief(focus_dioptres);
+            let half_tan = chief.truncate() / (chief.z + chief.length());
+            half_tan.is_finite().then_some(half_tan)
+        });
+        let irradiance_sr = bundle.as_ref().map_or(0.0, |bundle| bundle.irradiance_sr);
+        Self { place_mm, half_tan, irradiance_sr, bundle: bundle.map(Arc::new) }
     }
 
     fn outline(&self) -> Option<&Outline> {
@@ -78,25 +101,31 @@ impl Station {
 
 impl Survey {
     /// Surveys the film up to `reach_mm` from the axis of the centered lens.
-    pub(crate) fn new(shared: &Shared, color: &Color, reach_mm: f64) -> Self {
-        let (map, stations, n_columns) = match shared.is_rotational() {
+    pub(crate) fn new(lens: &SurveyedLens<'_>, reach_mm: f64) -> Self {
+        let (map, stations, n_columns) = match lens.is_rotational {
             true => {
-                let radius = Radius::survey(shared, color, reach_mm);
+                let radius = Radius::survey(lens, reach_mm);
                 (FilmMap::from(radius.map(reach_mm)), radius.stations, None)
             }
             false => {
-                let (map, stations, n) = surveyed_grid(shared, color, reach_mm);
+                let (map, stations, n) = surveyed_grid(lens, reach_mm);
                 (FilmMap::from(map), stations, Some(n))
             }
         };
-        let own_moments = |station: &Station| {
-            station.bundle.as_ref().map(|bundle| bundle.moments(&map, &Frame::OWN, shared.focus_dioptres()))
+        // Of a grid the first one's points say it well enough.
+        let stride = n_columns.map_or(1, |n| (n - 1) / (N_GRID - 1));
+        let is_told =
+            |i: usize| n_columns.is_none_or(|n| (i / n).is_multiple_of(stride) && (i % n).is_multiple_of(stride));
+        let told: Vec<&Station> =
+            stations.iter().enumerate().filter(|(i, _)| is_told(*i)).map(|(_, station)| station).collect();
+        let own_moments = |station: &&Station| {
+            station.bundle.as_ref().map(|bundle| bundle.moments(&map, &Frame::OWN, lens.focus_dioptres))
         };
-        let known: Vec<Option<Moments>> = stations.iter().map(own_moments).collect();
-        let moments = nearest_known(&stations, &known);
+        let known: Vec<Option<Moments>> = told.par_iter().map(own_moments).collect();
+        let moments = nearest_known(&told, &known);
         // Move it to where the lens stands.
-        let decenter = shared.decenter();
-        let axis_tan = decenter.mm() * (1e-3 * shared.focus_dioptres());
+        let decenter = lens.decenter;
+        let axis_tan = decenter.mm() * (1e-3 * lens.focus_dioptres);
         let map = Arc::new(map.about(decenter.axis_mm(), axis_tan));
         Self { reach_mm, map, stations, n_columns, axis_mm: decenter.axis_mm(), moments }
     }
@@ -113,14 +142,15 @@ impl Survey {
 
     /// Returns how blurs grow at a point, mm from the axis.
     pub(crate) fn moments(&self, from_axis_mm: DVec2) -> Moments {
-        let Some(n) = self.n_columns else {
+        if self.n_columns.is_none() {
             let radius_mm = from_axis_mm.length();
             let above = self.stations.partition_point(|station| station.place_mm.x < radius_mm);
             let above = above.clamp(1, self.stations.len() - 1);
             let [from, to] = [above - 1, above].map(|i| self.stations[i].place_mm.x);
             let fraction = ((radius_mm - from) / (to - from)).clamp(0.0, 1.0);
             return mixed([(self.moments[above - 1], 1.0 - fraction), (self.moments[above], fraction)]);
-        };
+        }
+        let n = N_GRID;
         let step_mm = 2.0 * self.reach_mm / (n - 1) as f64;
         let place = ((from_axis_mm + self.reach_mm) / step_mm).clamp(DVec2::ZERO, DVec2::splat((n - 1) as f64));
         let below = place.floor().min(DVec2::splat((n - 2) as f64));
@@ -144,8 +174,19 @@ impl Survey {
             bundle.energies.iter().zip(&cell_shares[i]).map(|(energy, share)| energy * share).sum()
         };
         if self.n_columns.is_some() {
-            let share = |station: &Station| station.bundle.as_ref().map_or(0.0, |bundle| shares_of(bundle, 0));
-            return self.map.scaled(&self.stations.iter().map(share).collect::<Vec<_>>());
+            let n = self.n_columns.unwrap_or(1);
+            let share = |i: usize| self.stations[i].bundle.as_ref().map(|bundle| shares_of(bundle, 0));
+            // Where the grid foresaw the whole, the mean of the points of the coarser grid about it.
+            let around = |i: usize| -> f64 {
+                let (row, column) = (i / n, i % n);
+                let rows = [row - row % 2, row + row % 2];
+                let columns = [column - column % 2, column + column % 2];
+                let corners = rows.into_iter().flat_map(|row| columns.map(|column| share(row * n + column)));
+                let known: Vec<f64> = corners.flatten().collect();
+                if known.is_empty() { 0.0 } else { known.iter().sum::<f64>() / known.len() as f64 }
+            };
+            let shares: Vec<f64> = (0..n * n).map(|i| share(i).unwrap_or_else(|| around(i))).collect();
+            return self.map.scaled(&shares);
         }
         let lit: Vec<(f64, &Bundle)> =
             self.stations.iter().filter_map(|station| Some((station.place_mm.x, station.bundle.as_deref()?))).collect();
@@ -174,7 +215,7 @@ fn mixed<const N: usize>(weighted: [(Moments, f64); N]) -> Moments {
 }
 
 /// Returns what is known of each station, or of the nearest one of which something is.
-fn nearest_known(stations: &[Station], known: &[Option<Moments>]) -> Vec<Moments> {
+fn nearest_known(stations: &[&Station], known: &[Option<Moments>]) -> Vec<Moments> {
     let nearest = |place_mm: DVec2| {
         let square = |i: &usize| stations[*i].place_mm.distance_squared(place_mm);
         let lit = (0..stations.len()).filter(|&i| known[i].is_some());
@@ -186,18 +227,14 @@ fn nearest_known(stations: &[Station], known: &[Option<Moments>]) -> Vec<Moments
 /// Stations along a radius, and what they say by distance from the axis.
 struct Radius {
     stations: Vec<Station>,
-    focus_dioptres: f64,
     half_tan: EvenCurve,
     irradiance_sr: MonotoneCurve,
 }
 
 impl Radius {
     /// Traces stations until what lies between them is known, on all threads.
-    fn survey(shared: &Shared, color: &Color, reach_mm: f64) -> Self {
-        let station = |radius_mm: f64, seed: Option<&Outline>| {
-            let place_mm = DVec2::X * radius_mm;
-            Station { place_mm, bundle: shared.job(color, place_mm).trace(seed, false).map(Arc::new) }
-        };
+    fn survey(lens: &SurveyedLens<'_>, reach_mm: f64) -> Self {
+        let station = |radius_mm: f64, seed: Option<&Outline>| lens.station(DVec2::X * radius_mm, seed);
         // From the axis outwards, each from the last.
         let mut stations: Vec<Station> = Vec::new();
         for i in 0..=N_RADIAL {
@@ -205,12 +242,12 @@ impl Radius {
             let seed = stations.iter().rev().find_map(Station::outline);
             stations.push(station(reach_mm * share, seed));
         }
-        let mut radius = Self::of(stations, shared.focus_dioptres());
+        let mut radius = Self::of(stations);
         // Halve the intervals that held a station which was not foreseen.
         let mut open: Vec<[f64; 2]> =
             radius.stations.windows(2).map(|pair| [0, 1].map(|i| pair[i].place_mm.x)).collect();
         for _ in 0..MOST_HALVINGS {
-            let largest_sr = radius.stations.iter().map(Station::irradiance_sr).fold(0.0, f64::max);
+            let largest_sr = radius.stations.iter().map(|station| station.irradiance_sr).fold(0.0, f64::max);
             if largest_sr == 0.0 {
                 break;
             }
@@ -228,7 +265,7 @@ impl Radius {
             let mut stations = radius.stations;
             stations.extend(found.into_iter().map(|(station, _)| station));
             stations.sort_by(|a, b| a.place_mm.x.total_cmp(&b.place_mm.x));
-            radius = Self::of(stations, shared.focus_dioptres());
+            radius = Self::of(stations);
             open = next;
             if open.is_empty() {
                 break;
@@ -237,19 +274,13 @@ impl Radius {
         radius
     }
 
-    fn of(stations: Vec<Station>, focus_dioptres: f64) -> Self {
-        let largest_sr = stations.iter().map(Station::irradiance_sr).fold(0.0, f64::max);
-        let bright = stations.iter().filter(|station| station.irradiance_sr() > DIM * largest_sr);
-        let half_tans: Vec<(f64, f64)> = bright
-            .filter_map(|station| Some((station.place_mm.x, station.half_tan(focus_dioptres)?.x / station.place_mm.x)))
-            .collect();
-        let irradiances = stations.iter().map(|station| (station.place_mm.x, station.irradiance_sr())).collect();
-        Self {
-            half_tan: EvenCurve::new(half_tans),
-            irradiance_sr: MonotoneCurve::new(irradiances),
-            stations,
-            focus_dioptres,
-        }
+    fn of(stations: Vec<Station>) -> Self {
+        let largest_sr = stations.iter().map(|station| station.irradiance_sr).fold(0.0, f64::max);
+        let bright = stations.iter().filter(|station| station.irradiance_sr > DIM * largest_sr);
+        let half_tans: Vec<(f64, f64)> =
+            bright.filter_map(|station| Some((station.place_mm.x, station.half_tan?.x / station.place_mm.x))).collect();
+        let irradiances = stations.iter().map(|station| (station.place_mm.x, station.irradiance_sr)).collect();
+        Self { half_tan: EvenCurve::new(half_tans), irradiance_sr: MonotoneCurve::new(irradiances), stations }
     }
 
     fn seed(&self, radius_mm: f64) -> Option<&Outline> {
@@ -261,9 +292,9 @@ impl Radius {
     /// Whether a station is as those about it say.
     fn foresees(&self, station: &Station, reach_mm: f64, largest_sr: f64) -> bool {
         let radius_mm = station.place_mm.x;
-        let off_sr = (self.irradiance_sr.at(radius_mm) - station.irradiance_sr()).abs();
-        let is_dim = station.irradiance_sr() <= DIM * largest_sr;
-        let direction = station.half_tan(self.focus_dioptres).filter(|_| !is_dim);
+        let off_sr = (self.irradiance_sr.at(radius_mm) - station.irradiance_sr).abs();
+        let is_dim = station.irradiance_sr <= DIM * largest_sr;
+        let direction = station.half_tan.filter(|_| !is_dim);
         let is_foreseen = direction.is_none_or(|half_tan| {
             let per_mm = self.half_tan.at(radius_mm);
             (per_mm * radius_mm - half_tan.x).abs() <= MOST_OFF * reach_mm * per_mm.abs()
@@ -380,55 +411,92 @@ impl MonotoneCurve {
     }
 }
 
-/// Surveys a square of film, with ever finer grids until what lies between their points is known; returns the number of columns too.
-fn surveyed_grid(shared: &Shared, color: &Color, reach_mm: f64) -> (PlaneMap, Vec<Station>, usize) {
+/// Surveys a square of film, with ever finer grids where what lies between their points was not foreseen; returns the number of columns too.
+///
+/// Beyond the circle in the square nobody asks; there, as in darkness, directions go on.
+fn surveyed_grid(lens: &SurveyedLens<'_>, reach_mm: f64) -> (PlaneMap, Vec<Station>, usize) {
+    let focus_dioptres = lens.focus_dioptres;
     let place_mm =
         |n: usize, i: usize| DVec2::new((i % n) as f64, (i / n) as f64) * (2.0 * reach_mm / (n - 1) as f64) - reach_mm;
-    let station = |place_mm: DVec2, seed: Option<&Outline>| {
-        let bundle = shared.job(color, place_mm).trace(seed, false).map(Arc::new);
-        Station { place_mm, bundle }
+    let asked_mm = reach_mm * (1.0 + 2.0 * 2f64.sqrt() / (N_GRID - 1) as f64);
+    let traced = |place_mm: DVec2, seed: Option<&Outline>| match place_mm.length() <= asked_mm {
+        true => lens.station(place_mm, seed),
+        false => Station::new(place_mm, None, focus_dioptres),
     };
     let map_of = |stations: &[Station], n: usize| {
-        let lit = stations.iter().map(|station| station.half_tan(shared.focus_dioptres())).collect();
+        let lit = stations.iter().map(|station| station.half_tan).collect();
         // Where nothing is seen far and wide, as through a hole in place of the lens.
-        let through_hole = |station: &Station| station.place_mm / (2.0 * shared.settings().film_distance_mm);
+        let through_hole = |station: &Station| station.place_mm / (2.0 * lens.job.film_distance_mm);
         let half_tans = straight_on(lit, n).unwrap_or_else(|| stations.iter().map(through_hole).collect());
-        let nodes: Vec<(DVec2, f64)> = half_tans
-            .into_iter()
-            .zip(stations)
-            .map(|(half_tan, station)| (half_tan, station.irradiance_sr()))
-            .collect();
+        let nodes: Vec<(DVec2, f64)> =
+            half_tans.into_iter().zip(stations).map(|(half_tan, station)| (half_tan, station.irradiance_sr)).collect();
         PlaneMap::new(reach_mm, n, &nodes)
     };
     let mut n = N_GRID;
-    let mut stations: Vec<Station> = (0..n * n).into_par_iter().map(|i| station(place_mm(n, i), None)).collect();
+    let middle = traced(DVec2::ZERO, None);
+    let mut stations: Vec<Station> =
+        (0..n * n).into_par_iter().map(|i| traced(place_mm(n, i), middle.outline())).collect();
     let mut map = map_of(&stations, n);
+    // Whether each point was as the coarser grid says.
+    let mut are_foreseen = vec![false; n * n];
     for _ in 0..MOST_GRID_HALVINGS {
         let finer = 2 * n - 1;
-        let found: Vec<Station> = (0..finer * finer)
+        let largest_sr = stations.iter().map(|station| station.irradiance_sr).fold(0.0, f64::max);
+        let is_foreseen = |station: &Station| {
+            let off_sr = (map.irradiance_sr(station.place_mm) - station.irradiance_sr).abs();
+            let chief = station.bundle.as_ref().filter(|bundle| bundle.irradiance_sr > DIM * largest_sr);
+            let off_mm =
+                chief.map_or(0.0, |bundle| map.place_of(bundle.chief(focus_dioptres)).distance(station.place_mm));
+            off_sr <= MOST_OFF_SR_ON_GRID * largest_sr && off_mm <= MOST_OFF_ON_GRID * reach_mm
+        };
+        let found: Vec<(Station, bool)> = (0..finer * finer)
             .into_par_iter()
             .map(|i| {
                 let (row, column) = (i / finer, i % finer);
-                let near = |row: usize, column: usize| &stations[row.min(n - 1) * n + column.min(n - 1)];
-                if row % 2 == 0 && column % 2 == 0 {
-                    return near(row / 2, column / 2).clone();
+                let [rows, columns] = [row, column].map(|k| [k / 2, k.div_ceil(2)]);
+                let about = || rows.into_iter().flat_map(|row| columns.map(|column| row * n + column));
+                if about().all(|k| are_foreseen[k]) {
+                    let place_mm = place_mm(finer, i);
+                    let known = &stations[rows[0] * n + columns[0]];
+                    let is_known = row % 2 == 0 && column % 2 == 0;
+                    let between = || Station {
+                        place_mm,
+                        half_tan: Some(map.half_tan_at(place_mm)),
+                        irradiance_sr: map.irradiance_sr(place_mm),
+                        bundle: None,
+                    };
+                    return (if is_known { known.clone() } else { between() }, true);
                 }
-                let corners = [(0, 0), (0, 1), (1, 0), (1, 1)];
-                let seed = corners.iter().find_map(|(down, right)| near(row / 2 + down, column / 2 + right).outline());
-                station(place_mm(finer, i), seed)
+                if row % 2 == 0 && column % 2 == 0 {
+                    return (stations[rows[0] * n + columns[0]].clone(), are_foreseen[rows[0] * n + columns[0]]);
+                }
+                let seed = about().find_map(|k| stations[k].outline());
+                let station = traced(place_mm(finer, i), seed);
+                let is_foreseen = is_foreseen(&station);
+                (station, is_foreseen)
             })
             .collect();
-        let largest_sr = found.iter().map(Station::irradiance_sr).fold(0.0, f64::max);
-        let is_foreseen = |station: &Station| {
-            let off_sr = (map.irradiance_sr(station.place_mm) - station.irradiance_sr()).abs();
-            let chief = station.bundle.as_ref().filter(|bundle| bundle.irradiance_sr > DIM * largest_sr);
-            let off_mm = chief
-                .map_or(0.0, |bundle| map.place_of(bundle.chief(shared.focus_dioptres())).distance(station.place_mm));
-            off_sr <= MOST_OFF_SR_ON_GRID * largest_sr && off_mm <= MOST_OFF_ON_GRID * reach_mm
-        };
-        let is_done = found.par_iter().all(is_foreseen);
-        map = map_of(&found, finer);
-        (stations, n) = (found, finer);
+        let is_done = found.iter().enumerate().all(|(i, (_, is_foreseen))| {
+            let is_known = (i / finer).is_multiple_of(2) && (i % finer).is_multiple_of(2);
+            is_known || *is_foreseen
+        });
+        // A point that both grids have was foreseen where all new ones about it were.
+        let of_grid: Vec<bool> = found.iter().map(|(_, is_foreseen)| *is_foreseen).collect();
+        are_foreseen = (0..finer * finer)
+            .map(|i| {
+                let (row, column) = (i / finer, i % finer);
+                if !(row.is_multiple_of(2) && column.is_multiple_of(2)) {
+                    return of_grid[i];
+                }
+                let around = |k: usize| k.saturating_sub(1)..=(k + 1).min(finer - 1);
+                around(row).all(|r| {
+                    around(column).all(|c| (r.is_multiple_of(2) && c.is_multiple_of(2)) || of_grid[r * finer + c])
+                })
+            })
+            .collect();
+        stations = found.into_iter().map(|(station, _)| station).collect();
+        map = map_of(&stations, finer);
+        n = finer;
         if is_done {
             break;
         }

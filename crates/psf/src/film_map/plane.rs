@@ -91,6 +91,11 @@ impl PlaneMap {
         (value + by_place * (place_mm - inside_mm), by_place)
     }
 
+    /// Returns the tangents of half the angle of what a point sees.
+    pub(crate) fn half_tan_at(&self, place_mm: DVec2) -> DVec2 {
+        self.half_tan(place_mm).0
+    }
+
     #[inline]
     pub(super) fn direction(&self, place_mm: DVec2) -> DVec3 {
         let (half_tan, _) = self.half_tan(place_mm);
