@@ -18,6 +18,7 @@ mod frame_files;
 mod json;
 mod keys;
 mod light_field;
+mod lights;
 mod numbers;
 mod paintings;
 mod progress;
@@ -56,6 +57,7 @@ pub use frame_files::{FrameFile, Frames, LensFacts, Outputs, picture_png, write_
 pub use json::{write_file, write_json};
 pub use keys::{Key, PICTURE, PictureOptions, light_word, white_word};
 pub use light_field::{DepthEstimate, DepthSearch, LightField, ViewGeometry};
+pub use lights::{parse_illuminant, parse_white};
 pub use numbers::{number, parse_bytes, parse_numbers, parse_pairs};
 pub use paintings::{PaintingFolder, program_build};
 pub use progress::{Clock, ImagingTimes, Progress, Silent, Stage};
@@ -74,4 +76,4 @@ pub use stages::{
     VideoFrameFacts, WorldRender, WorldSummary, has_kept_bands, world_camera, write_seen_png,
 };
 pub use video_files::{VideoFacts, write_video_frame};
-pub use words::{parse_illuminant, parse_white, with_analog_gain, with_auto_exposure, with_exposure_s};
+pub use words::{with_analog_gain, with_auto_exposure, with_exposure_s};

@@ -170,7 +170,7 @@ fn no_photodiode_is_imaged_within_a_budget_too_small_for_another() {
     camera.stop = StopSpec::FNumber(4.0);
     camera.movements.shift_mm = 9.0;
     camera.dual_pixel = Some(DualPixelSpec { crosstalk: 0.2, ..DualPixelSpec::of(Photodiodes::LeftRight) });
-    let ends = (48_u64 << 20, 64_u64 << 20);
+    let ends = (32_u64 << 20, 256_u64 << 20);
     let (mut too_small, mut enough) = ends;
     while enough - too_small > 1 << 12 {
         let budget = u64::midpoint(too_small, enough);

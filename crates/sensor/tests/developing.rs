@@ -268,15 +268,19 @@ fn charts_keep_colors_under_every_light() {
 fn roots_count_where_matrices_miss() {
     let fitted = |name: &str, light: Illuminant, time_s: f64| {
         let sensor = Sensor::built_in(name).unwrap().with_size(16, 16);
-        let planes = vec![Array2::from_elem((16, 16), 1.0); sensor.n_planes()];
-        let image = SpectralImage::new(
-            Quantity::Irradiance,
-            WavelengthGrid::new(vec![550.0]).unwrap(),
-            planes.into_iter().take(1).collect(),
-        )
-        .unwrap();
-        let exposure = Exposure { analog_gain: 0.01 / time_s, ..Exposure::seconds(1e-9) };
-        let raw = shoot(&sensor, &image, [0.0; 2], exposure, &Noise::none());
+        // Light that fills a middle gray at this gain, whose noise is what counts.
+        let gain = 0.01 / time_s;
+        let raw = |irradiance: f32| {
+            let planes = vec![Array2::from_elem((16, 16), irradiance)];
+            let grid = WavelengthGrid::new(vec![550.0]).unwrap();
+            let image = SpectralImage::new(Quantity::Irradiance, grid, planes).unwrap();
+            let exposure = Exposure { analog_gain: gain, ..Exposure::seconds(1e-3) };
+            shoot(&sensor, &image, [0.0; 2], exposure, &Noise::none())
+        };
+        let mean = |raw: &Raw| raw.linear()[0].mean().unwrap();
+        let bright = 0.3 / gain as f32;
+        let raw = raw(bright * 0.18 / mean(&raw(bright)));
+        assert!((mean(&raw) - 0.18).abs() < 0.02, "{}", mean(&raw));
         sensor.develop_linear(&raw, &Processing::for_light(light)).unwrap().color
     };
     // A tenth of a millisecond at a gain of 100 has much noise.

@@ -3,13 +3,12 @@
 use std::{fs, path::Path, sync::Arc};
 
 use dioptric_backward::{
-    Auxiliary, BandSampling, Bands, Camera, LensCamera, LensCameraSettings, LensOrigin, LightPaths, Pinhole, PixelGrid,
-    Placement, RenderSettings, Renderer, Rendering, Subject, auxiliary, layered_depth, write_auxiliary_exr,
-    write_rendering_exr,
+    Auxiliary, Bands, Camera, LensCamera, LensCameraSettings, LensOrigin, LightPaths, Pinhole, PixelGrid, Placement,
+    RenderSettings, Renderer, Rendering, Subject, auxiliary, layered_depth, write_auxiliary_exr, write_rendering_exr,
 };
 use dioptric_optics::{Lens, glam::DVec2};
 use dioptric_scene::{HiddenLayer, Scene, SceneLight, View};
-use dioptric_spectrum::{Cancel, DepthMap, Illuminant, Quantity, SpectralImage, SpectrumError, WavelengthGrid};
+use dioptric_spectrum::{Cancel, DepthMap, Illuminant, Quantity, SpectralImage, WavelengthGrid};
 use dioptric_world::{CameraKind, Flux, Light, ReadOptions, World, WorldCamera, glam::DVec3, open_world};
 use ndarray::Array2;
 
@@ -25,8 +24,8 @@ use super::{
     world_view::{horizontal_fov_deg, placement, world_camera},
 };
 use crate::{
-    Diffraction, PipelineError, Progress, REFERENCE_WAVELENGTH_NM, RenderEffort, RenderMethod, SceneSource, Stage,
-    WorldLamp, WorldSky, WorldSpec,
+    Diffraction, PipelineError, Progress, RenderEffort, RenderMethod, SceneSource, Stage, WorldLamp, WorldSky,
+    WorldSpec,
 };
 
 /// Samples of a pass: as many as spread well, and few enough for a first picture soon.
@@ -197,10 +196,6 @@ fn hidden_layer(
         }
     }
     Ok(HiddenLayer { radiance: behind, depth: DepthMap::new(behind_m)? })
-}
-
-pub(super) fn reference_band() -> Result<Bands, SpectrumError> {
-    Ok(Bands { grid: WavelengthGrid::new(vec![REFERENCE_WAVELENGTH_NM])?, sampling: BandSampling::Center })
 }
 
 /// Progress of one stage reported as another's.

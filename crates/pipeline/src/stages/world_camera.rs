@@ -8,8 +8,7 @@ use dioptric_world::{CameraKind, World, WorldCamera};
 
 use super::{
     lit_still_life::{RadiantStillLife, picture_at},
-    world::reference_band,
-    world_view::placement,
+    world_view::{placement, reference_band},
 };
 use crate::{
     Camera as CameraFile, Diffraction, FilmSpec, FocusSpec, LensReadOptions, LensSpec, PipelineError,

@@ -1,14 +1,14 @@
 //! Which view of a world is taken: that of one of its file's cameras, of the whole, or from a place.
 
-use dioptric_backward::{Camera, Placement};
+use dioptric_backward::{BandSampling, Bands, Camera, Placement};
 use dioptric_optics::Lens;
+use dioptric_spectrum::{SpectrumError, WavelengthGrid};
 use dioptric_world::{
     CameraKind, World, WorldCamera,
     glam::{DAffine3, DMat3, DVec2, DVec3},
 };
 
-use super::world::reference_band;
-use crate::{PipelineError, WorldSpec, WorldView};
+use crate::{PipelineError, REFERENCE_WAVELENGTH_NM, WorldSpec, WorldView};
 
 /// Columns and rows of views that no file gives a size.
 const SIZE: (usize, usize) = (720, 480);
@@ -19,6 +19,11 @@ const MARGIN: f64 = 1.05;
 /// From where the whole is seen: so far round from its front, and above the horizon, degrees.
 const AROUND_DEG: f64 = 35.0;
 const ABOVE_DEG: f64 = 20.0;
+
+/// The one band at which rays of cameras are looked at.
+pub(super) fn reference_band() -> Result<Bands, SpectrumError> {
+    Ok(Bands { grid: WavelengthGrid::new(vec![REFERENCE_WAVELENGTH_NM])?, sampling: BandSampling::Center })
+}
 
 /// Returns the camera of a world that is asked for; of a view that is none of the file's, with this angle across its width.
 ///
