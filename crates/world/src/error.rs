@@ -87,4 +87,12 @@ impl WorldError {
     pub(crate) fn mesh(reason: String) -> Self {
         Self::Mesh { reason }
     }
+
+    /// Returns the name of a picture that could not be read, and why.
+    pub(crate) fn of_picture(&self, name: &str) -> String {
+        match self {
+            Self::Unreadable { reason, .. } => format!("{name} ({reason})"),
+            other => format!("{name} ({other})"),
+        }
+    }
 }

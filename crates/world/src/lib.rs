@@ -40,6 +40,7 @@ mod texture;
 mod tree;
 mod triangle;
 mod upsample;
+mod uv;
 mod world;
 
 pub use bsdf::{Bsdf, BsdfSample};
@@ -58,5 +59,6 @@ pub use pattern::{NoiseKind, Pattern};
 pub use ray::{Hit, Ray, Receiver};
 pub use shape::Shape;
 pub use sky::{SkyImage, SkyMapping};
-pub use texture::{Coordinates, RoughnessLaw, Texture, UvMapping};
+pub use texture::{RoughnessLaw, Texture};
+pub use uv::{Coordinates, UvMapping};
 pub use world::{World, WorldBuilder};

@@ -8,7 +8,8 @@ use crate::{
     fresnel,
     microfacet::Ggx,
     sampling::Frame,
-    texture::{TexturePoint, Textures},
+    texture::Textures,
+    uv::TexturePoint,
 };
 use dioptric_optics::Glass;
 use dioptric_spectrum::Spectrum;

@@ -3,7 +3,7 @@
 
 use glam::{Affine3A, Vec2, Vec3};
 
-use crate::{TextureId, UvMapping, texture::TexturePoint};
+use crate::{TextureId, UvMapping, uv::TexturePoint};
 
 /// A number or color over a surface or through space by formula.
 #[derive(Clone, Debug, PartialEq)]

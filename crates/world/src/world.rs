@@ -14,7 +14,8 @@ use crate::{
     notes::Notes,
     placed::{PlacedKind, PlacedShape},
     shape::Quadric,
-    texture::{MAX_DEPTH, TexturePoint, Textures},
+    texture::{MAX_DEPTH, Textures},
+    uv::TexturePoint,
 };
 
 /// Geometry, materials, lights and cameras, checked and ready to be asked.

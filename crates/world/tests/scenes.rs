@@ -66,7 +66,7 @@ fn small_world_is_what_it_says() {
 #[test]
 fn words_of_films_and_cameras_are_reported() {
     let notes = |film: &str, camera: &str| {
-        let text = format!("Film \"rgb\" {film}\nCamera \"perspective\" {camera}\nWorldBegin\n");
+        let text = format!("Film \"rgb\" {film}\nCamera \"perspective\" {camera}\nWorldBegin\nShape \"sphere\"\n");
         read_text(&text).unwrap().notes().to_vec()
     };
     let film = "\"integer xresolution\" 30 \"integer yresolution\" 20 \"string filename\" \"a.exr\"";

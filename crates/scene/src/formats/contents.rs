@@ -9,10 +9,10 @@ use rayon::prelude::*;
 
 use super::{
     camera::{CameraData, Straightened},
-    depth::RawDepth,
     light_unit::LightUnit,
     no_data::mend,
-    read_scene::ReadOptions,
+    raw_depth::RawDepth,
+    read_options::ReadOptions,
     reading::{FileQuantity, Frame, Place, light_unit},
     unusable::unreadable,
 };

@@ -16,7 +16,7 @@ use super::{
     envi_header::{self, DataType, EnviHeader, Interleave},
     light_unit::LightUnit,
     no_data::mend,
-    read_scene::ReadOptions,
+    read_options::ReadOptions,
     reading::{FileQuantity, light_unit},
     stated::{name_of, note_of, short},
     unusable::{check_made, unreadable},

@@ -15,13 +15,15 @@ use super::{
     band_folder::band_folder,
     camera::CameraData,
     contents::{Contents, Cube, Heeds, Image, pad_spectral, straightened, straightened_depth},
-    depth::{DepthWords, RawDepth, depth_beside, files_beside, likely_beside, read_depth},
+    depth::{depth_beside, files_beside, likely_beside, read_depth},
     envi::{contents_of_envi, header_of},
     mat::{MatScene, read_mat},
     no_data::mend,
     npy::read_npy,
     pfm::read_pfm,
     picture::{lifted, lifted_codes, oriented, picture_size_of},
+    raw_depth::{DepthWords, RawDepth},
+    read_options::ReadOptions,
     reading::{DepthKind, FileQuantity, FileReading, Frame, light_unit},
     spectral_exr::{RawFile, RawImage, read_raw_exr},
     stated::{name_of, note_of},
@@ -34,31 +36,6 @@ use crate::{HiddenLayer, Scene, SceneError, SceneLight, View, resampled};
 
 /// The illuminance on reflectances, and on a white of ordinary pictures, lx.
 const USUAL_LUX: f64 = 1000.0;
-
-/// What a file may leave open.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct ReadOptions {
-    /// The bands wanted; those of the file where `None`, and 400–700 nm every 10 nm for ordinary pictures.
-    pub grid: Option<WavelengthGrid>,
-    /// The light on a file of reflectances, D65 where `None`; an ordinary picture is put under it.
-    pub light: Option<Illuminant>,
-    /// Its illuminance, and that of the white of an ordinary picture, lx; 1000 where `None`, or what the file says of its white.
-    pub illuminance_lux: Option<f64>,
-    /// The number that a perfect white has in a cube that does not tell.
-    pub white_level: Option<f64>,
-    /// One depth for all samples of a scene that has none, m.
-    pub depth_m: Option<f64>,
-    /// The horizontal field of view, in place of the file's own camera data.
-    pub horizontal_fov_deg: Option<f64>,
-    /// How far apart the samples of a picture of one depth may be, as the tangent of the angle between neighbours on the axis: a
-    /// picture that is finer is read as means of its pixels.
-    pub finest_tangent: Option<f64>,
-    /// The depth of places where none was measured; where `None`, those of a depth picture get the farther of the depths beside
-    /// them, and a file that has such places is refused.
-    pub fill_depth: Option<FillDepth>,
-    /// What else the file does not say itself.
-    pub reading: FileReading,
-}
 
 /// Reads a scene from a spectral or ordinary EXR (`.exr`), an ENVI header (`.hdr`) or its file of numbers, a MATLAB file (`.mat`), an
 /// array of `NumPy` (`.npy`), a TIFF of any kind, a folder with a picture a band, or an ordinary picture (`.png`, `.jpg`, `.webp`, `.bmp`,

@@ -12,9 +12,9 @@ use ndarray::Array2;
 
 use super::{
     band_name::{self, BandKind},
-    depth::RawDepth,
     exr_attributes::{self, Attributes},
     light_unit::LightUnit,
+    raw_depth::RawDepth,
     reading::{DepthKind, Frame},
     stated::{Stated, name_of, note_of},
     unusable::{check_memory, unreadable},

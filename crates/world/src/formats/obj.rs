@@ -473,13 +473,13 @@ impl Library {
         self.builder.add_source(path);
         match ImageTexture::read(path, encoding, Wrap::Repeat) {
             Ok(image) => Some(std::sync::Arc::new(image)),
-            Err(_) => {
-                let what = if path.is_file() {
-                    "pictures that can't be read, left out"
+            Err(error) => {
+                let name = path.file_name().unwrap_or_default().to_string_lossy();
+                if path.is_file() {
+                    self.builder.note_of("pictures that can't be read, left out", &error.of_picture(&name));
                 } else {
-                    "pictures that aren't there, left out"
-                };
-                self.builder.note_of(what, &path.file_name().unwrap_or_default().to_string_lossy());
+                    self.builder.note_of("pictures that aren't there, left out", &name);
+                }
                 None
             }
         }

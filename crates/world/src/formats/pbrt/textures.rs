@@ -175,13 +175,19 @@ impl Reader<'_> {
                 self.builder.note_of("pictures that are inverted: without color", name);
                 Ok(Texture::Blend { of: [one, zero], amount })
             }
-            Err(_) => {
-                let what = match (file.is_empty(), path.is_file()) {
-                    (true, _) => "textures that name no file, an even 0.5 in their place",
-                    (_, false) => "pictures that aren't there, an even 0.5 in their place",
-                    (_, true) => "pictures that can't be read, an even 0.5 in their place",
-                };
-                self.builder.note_of(what, if file.is_empty() { name } else { file });
+            Err(error) => {
+                match (file.is_empty(), path.is_file()) {
+                    (true, _) => {
+                        self.builder.note_of("textures that name no file, an even 0.5 in their place", name);
+                    }
+                    (_, false) => {
+                        self.builder.note_of("pictures that aren't there, an even 0.5 in their place", file);
+                    }
+                    (_, true) => {
+                        let said = error.of_picture(file);
+                        self.builder.note_of("pictures that can't be read, an even 0.5 in their place", &said);
+                    }
+                }
                 Ok(Texture::Curve(SpectralCurve::constant(0.5)))
             }
         }

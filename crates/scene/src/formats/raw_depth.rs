@@ -1,0 +1,166 @@
+//! Depth as it stands in a file, and what it comes to.
+
+use std::path::{Path, PathBuf};
+
+use ndarray::Array2;
+
+use super::{
+    reading::{DepthKind, DepthUnit},
+    stated::name_of,
+    unusable::unreadable,
+};
+use crate::{SceneError, View};
+
+/// Depths from here on are those of the sky: Blender writes 1e10.
+const SKY_M: f64 = 1e9;
+
+/// Depths as they stand in a file.
+pub(super) struct RawDepth {
+    pub(super) values: Array2<f32>,
+    pub(super) kind: DepthKind,
+    pub(super) unit: DepthUnit,
+    /// The largest code of whole numbers, which stands for none.
+    pub(super) top: Option<u16>,
+    /// Columns of the file, which a disparity is counted in.
+    pub(super) columns: usize,
+    pub(super) file: PathBuf,
+    /// Where it is in the file, for the line of what was understood.
+    pub(super) from: String,
+    /// Whether places without depth are filled without being asked: those of a picture.
+    pub(super) is_picture: bool,
+    pub(super) notes: Vec<String>,
+}
+
+/// What is said of a depth by who asks for it.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct DepthWords<'a> {
+    pub(super) kind: Option<DepthKind>,
+    pub(super) unit: Option<&'a str>,
+    /// What the camera file says.
+    pub(super) unit_m: Option<f64>,
+}
+
+impl RawDepth {
+    /// Depths in metres of a scene's own file.
+    pub(super) fn in_file(file: &Path, from: String, values: Array2<f32>, kind: DepthKind) -> Self {
+        let columns = values.ncols();
+        let (unit, file) = (DepthUnit::Metres(1.0), file.to_owned());
+        Self { values, kind, unit, top: None, columns, file, from, is_picture: false, notes: vec![] }
+    }
+
+    /// Takes what is said of the depth in place of what is usual.
+    pub(super) fn told(mut self, words: DepthWords<'_>) -> Result<Self, SceneError> {
+        self.kind = words.kind.unwrap_or(self.kind);
+        if let Some(unit) = words.unit {
+            self.unit = DepthUnit::parse(unit)?;
+        }
+        let is_disparity = matches!(self.kind, DepthKind::Disparity { .. });
+        if is_disparity && words.unit.is_none() {
+            self.unit = DepthUnit::Samples(1.0);
+        }
+        let is_inverse = matches!(self.kind, DepthKind::Inverse);
+        let is_length = |unit: &str| ["mm", "cm"].iter().any(|length| unit.ends_with(length));
+        let fits = match self.unit {
+            DepthUnit::Samples(_) => is_disparity,
+            // An inverse distance is so many a metre.
+            DepthUnit::Metres(_) => !(is_disparity || is_inverse && words.unit.is_some_and(is_length)),
+        };
+        if fits {
+            return Ok(self);
+        }
+        Err(SceneError::Setting {
+            what: "the unit of the depth",
+            value: format!("'{}'", words.unit.unwrap_or_default()),
+            expected: "px or 256/px for a disparity, m or 1000/m for an inverse distance, a length for all else"
+                .to_owned(),
+        })
+    }
+
+    /// Returns the depths on so many samples, those of the nearest of the file's: no depth is mixed of two.
+    pub(super) fn resized(mut self, rows: usize, columns: usize) -> Result<Self, SceneError> {
+        let (own_rows, own_columns) = self.values.dim();
+        if (own_rows, own_columns) == (rows, columns) {
+            return Ok(self);
+        }
+        let (across, down) = (own_columns as f64 / columns as f64, own_rows as f64 / rows as f64);
+        // Half a sample of either may be cut off.
+        if (across / down - 1.0).abs() > 1.0 / rows.min(own_rows).min(columns).min(own_columns) as f64 {
+            let reason = format!(
+                "it has {own_columns} × {own_rows} samples, but the scene {columns} × {rows}: expected as many, or a picture of \
+                 the same shape"
+            );
+            return Err(unreadable(&self.file, reason));
+        }
+        let at = |index: usize, ratio: f64, most: usize| (((index as f64 + 0.5) * ratio) as usize).min(most - 1);
+        self.notes.push(format!(
+            "{}: its {own_columns} × {own_rows} depths become {columns} × {rows}, each that of the nearest sample",
+            name_of(&self.file)
+        ));
+        self.values = Array2::from_shape_fn((rows, columns), |(row, column)| {
+            self.values[(at(row, down, own_rows), at(column, across, own_columns))]
+        });
+        Ok(self)
+    }
+
+    /// Returns the depths in metres along the axis; 0 where none was measured, infinity for the sky. `None` for what needs the
+    /// view of the samples and has none.
+    ///
+    /// # Errors
+    /// When two anchors are given and all numbers are alike.
+    pub(super) fn axial_m(&self, view: Option<View>) -> Result<Option<Array2<f32>>, SceneError> {
+        let is_code = |value: f32| self.top.is_some_and(|top| value == f32::from(top));
+        let factor = match self.unit {
+            DepthUnit::Metres(factor) | DepthUnit::Samples(factor) => factor,
+        };
+        let along = |z_m: f64| if z_m >= SKY_M { f32::INFINITY } else { z_m as f32 };
+        Ok(Some(match self.kind {
+            DepthKind::Axial => self.values.mapv(|v| if is_code(v) { 0.0 } else { along(factor * f64::from(v)) }),
+            DepthKind::Radial => {
+                let Some(view) = view else { return Ok(None) };
+                Array2::from_shape_fn(self.values.dim(), |(row, column)| {
+                    let v = self.values[(row, column)];
+                    let z_m = factor * f64::from(v) / view.distance_per_depth(row as f64, column as f64);
+                    if is_code(v) { 0.0 } else { along(z_m) }
+                })
+            }
+            // The inverse of nothing is the sky; what is no number was not measured.
+            DepthKind::Inverse => self.values.mapv(|v| {
+                let inverse = f64::from(v) * factor;
+                if v.is_finite() { along(1.0 / inverse) } else { 0.0 }
+            }),
+            DepthKind::InverseBetween { near_m, far_m } => {
+                let finite = self.values.iter().copied().filter(|v| v.is_finite());
+                let (low, high) = finite.fold((f32::INFINITY, f32::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)));
+                if high.partial_cmp(&low) != Some(std::cmp::Ordering::Greater) {
+                    return Err(unreadable(&self.file, "its numbers are all alike, expected some between two anchors"));
+                }
+                let (near, far) = (1.0 / near_m, 1.0 / far_m);
+                self.values.mapv(|v| {
+                    let share = f64::from(v - low) / f64::from(high - low);
+                    if v.is_finite() { along(1.0 / (far + share * (near - far))) } else { 0.0 }
+                })
+            }
+            DepthKind::Disparity { baseline_m, offset_px } => {
+                let Some(view) = view else { return Ok(None) };
+                // A disparity counts the file's own samples.
+                let focal_px = view.focal_px * self.columns as f64 / self.values.ncols() as f64;
+                self.values.mapv(|v| {
+                    let shift_px = factor * f64::from(v) + offset_px;
+                    let is_measured = v.is_finite() && v > 0.0 && shift_px > 0.0;
+                    if is_measured { along(focal_px * baseline_m / shift_px) } else { 0.0 }
+                })
+            }
+        }))
+    }
+
+    /// Returns the words for where the depth comes from.
+    pub(super) fn describe(&self) -> String {
+        let kind = match self.kind {
+            DepthKind::Axial => "along the axis",
+            DepthKind::Radial => "from distances from the camera",
+            DepthKind::Inverse | DepthKind::InverseBetween { .. } => "from inverse distances",
+            DepthKind::Disparity { .. } => "from disparities",
+        };
+        format!("{kind}, of {}", self.from)
+    }
+}

@@ -1,0 +1,30 @@
+//! What may be said of a scene beside its file.
+
+use dioptric_spectrum::{Illuminant, WavelengthGrid};
+
+use super::{reading::FileReading, unmeasured::FillDepth};
+
+/// What a file may leave open.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ReadOptions {
+    /// The bands wanted; those of the file where `None`, and 400–700 nm every 10 nm for ordinary pictures.
+    pub grid: Option<WavelengthGrid>,
+    /// The light on a file of reflectances, D65 where `None`; an ordinary picture is put under it.
+    pub light: Option<Illuminant>,
+    /// Its illuminance, and that of the white of an ordinary picture, lx; 1000 where `None`, or what the file says of its white.
+    pub illuminance_lux: Option<f64>,
+    /// The number that a perfect white has in a cube that does not tell.
+    pub white_level: Option<f64>,
+    /// One depth for all samples of a scene that has none, m.
+    pub depth_m: Option<f64>,
+    /// The horizontal field of view, in place of the file's own camera data.
+    pub horizontal_fov_deg: Option<f64>,
+    /// How far apart the samples of a picture of one depth may be, as the tangent of the angle between neighbours on the axis: a
+    /// picture that is finer is read as means of its pixels.
+    pub finest_tangent: Option<f64>,
+    /// The depth of places where none was measured; where `None`, those of a depth picture get the farther of the depths beside
+    /// them, and a file that has such places is refused.
+    pub fill_depth: Option<FillDepth>,
+    /// What else the file does not say itself.
+    pub reading: FileReading,
+}
