@@ -17,7 +17,7 @@ pub(crate) struct SceneFileArgs {
     #[arg(long, value_name = "UNIT")]
     pub(crate) depth_unit: Option<String>,
     /// What the depth's numbers are: axial, radial, inverse, `inverse:NEAR_M,FAR_M` (the largest and the smallest number) or
-    /// `disparity:BASELINE_M`[,`OFFSET_PX`] [default: axial]
+    /// `disparity:BASELINE_M\[,OFFSET_PX\]` [default: axial]
     #[arg(long, value_name = "KIND")]
     pub(crate) depth_kind: Option<DepthKind>,
     /// Camera data of the scene: our JSON, `Open3D`'s, nerfstudio's, COLMAP's cameras.txt or `OpenCV`'s YAML

@@ -187,8 +187,6 @@ const TEXT: &[(&str, &str)] = &[
     ("Perspective", "as above"),
     ("SceneSpec.reading", "what a file does not state itself, said once in the text of the camera file"),
     ("FileReading", "as above"),
-    ("FileQuantity", "as above"),
-    ("NoData", "as above"),
     ("DepthKind", "as above"),
     ("LensShading.Map", "as many numbers as cells and filters, from a calibration"),
     ("ShadingMap", "as above"),
