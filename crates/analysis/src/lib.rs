@@ -23,8 +23,8 @@ pub use lens::{
     AnalysisFields, AnalysisFilm, AnalysisRequest, AxialColorRow, ConfigurationData, ConvertedLens, FanRow, FieldPlace,
     FieldRow, FilmPlace, FilmUse, FocusData, GRID_LINES, GlassData, GlassRow, GridRow, ImageData, LensAnalysis,
     LensCurves, LensData, LensDefaults, LensInfoRequest, LensModulation, LensPageData, LensRow, OpdMap, PlaneData,
-    PupilRow, RayTable, SpotRow, SurfaceRow, TraceError, TraceSettings, WavefrontRow, built_in_lenses, convert_lens,
-    ends_of, glass_data, glass_rows, placement_lines, surface_rows,
+    PupilRow, RayTable, SharpDepths, SpotRow, SurfaceRow, TraceError, TraceSettings, WavefrontRow, built_in_lenses,
+    convert_lens, ends_of, glass_data, glass_rows, placement_lines, surface_rows,
 };
 pub use methods::{Fit, MethodComparison, MethodRow};
 pub use psf::{MtfRow, PolychromaticPsf, PsfRequest, PsfRow, PsfSampling, PsfSet, ThroughFocus, psf_csv};

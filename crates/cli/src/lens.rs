@@ -139,9 +139,9 @@ fn info(arguments: &LensInfoArgs, common: &Common) -> anyhow::Result<()> {
     let data: Vec<LensData> = wavelengths_nm
         .iter()
         .map(|&wavelength_nm| {
-            let LensInfoArgs { distance_mm, field_deg, .. } = *arguments;
+            let LensInfoArgs { distance_mm, field_deg, blur_um, .. } = *arguments;
             let distance_mm = distance_mm.or(Some(used.distance_mm).filter(|mm| mm.is_finite()));
-            let request = LensInfoRequest { wavelength_nm, distance_mm, field_deg, colors_nm };
+            let request = LensInfoRequest { wavelength_nm, distance_mm, field_deg, colors_nm, blur_um };
             let configurations = used.configurations(wavelength_nm)?;
             Ok::<_, PipelineError>(LensData {
                 configurations,

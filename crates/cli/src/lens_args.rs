@@ -264,6 +264,10 @@ pub(crate) struct LensInfoArgs {
     /// Half field for the third-order sums, degrees
     #[arg(long, value_name = "A", default_value_t = 10.0)]
     pub(crate) field_deg: f64,
+    /// Diameter of the blur that is taken to be sharp, µm: adds the hyperfocal distance, and between which distances an object is
+    /// sharp with --distance-mm in focus
+    #[arg(long, value_name = "C")]
+    pub(crate) blur_um: Option<f64>,
 }
 
 /// What to analyze of a lens.

@@ -55,6 +55,7 @@ const RANGES: &[(Range, &[&str])] = &[
     (or_infinite(1e-6, 1e12, "m"), &["far_m"]),
     (of(1e-6, 1e9, "mm"), &["width_mm"]),
     (or_infinite(1e-6, 1e12, "mm"), &["distance_mm", "DistanceMm", "focus_mm", "distances_mm"]),
+    (of(1e-3, 1e7, "µm"), &["blur_um"]),
     (of(1e-12, 1e12, ""), &["white_level"]),
     (of(1e-30, 1e30, ""), &["scale"]),
     (of(1.0, 65_536.0, "samples"), &["bin"]),

@@ -256,7 +256,14 @@ impl Bundle {
 
     /// Returns the places, mm, on the film whose chief rays see what the rays are at, at a depth.
     fn places_mm(&self, map: &FilmMap, frame: &Frame, dioptres: f64) -> Vec<DVec2> {
-        self.rays.iter().map(|ray| map.place_of(frame.seen(ray, dioptres))).collect()
+        let mut near_mm = None;
+        let place = |ray: &SceneRay| {
+            let seen = frame.seen(ray, dioptres);
+            let found_mm = near_mm.map_or_else(|| map.place_of(seen), |near_mm| map.place_near(seen, near_mm));
+            near_mm = Some(found_mm).filter(|place_mm| place_mm.is_finite());
+            found_mm
+        };
+        self.rays.iter().map(place).collect()
     }
 
     /// Returns the spots of a point of the film at a depth: each node at the point less where the chief ray sees what the node does.
@@ -264,14 +271,11 @@ impl Bundle {
         let at = self.places_mm(map, frame, dioptres);
         let mut nodes: Vec<Node> =
             at.iter().map(|at_mm| Node { at_mm: place_mm - *at_mm, ..Node::default() }).collect();
-        for ((node, stop), ray) in nodes.iter_mut().zip(&self.at_stop).zip(&self.rays) {
-            let seen = frame.seen(ray, dioptres);
-            let slope = |by: &SceneRay| {
-                let step = frame.seen(by, dioptres) * STOP_STEP;
-                (map.place_of(seen - step) - map.place_of(seen + step)) / (2.0 * STOP_STEP)
-            };
-            node.in_stop = stop.in_stop;
-            (node.along_l_mm, node.along_m_mm) = (slope(&stop.by_l), slope(&stop.by_m));
+        for (((node, at_mm), stop), ray) in nodes.iter_mut().zip(&at).zip(&self.at_stop).zip(&self.rays) {
+            let changes = [&stop.by_l, &stop.by_m].map(|by| frame.seen(by, dioptres));
+            let [by_l_mm, by_m_mm] = map.moves_mm(*at_mm, frame.seen(ray, dioptres), changes);
+            // A spot lies at the point of the film less where the chief ray sees what the ray does.
+            (node.in_stop, node.along_l_mm, node.along_m_mm) = (stop.in_stop, -by_l_mm, -by_m_mm);
         }
         Spots { mesh: self.mesh, nodes, energies: self.energies.clone() }
     }

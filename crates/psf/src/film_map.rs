@@ -65,6 +65,12 @@ impl From<PlaneMap> for FilmMap {
     }
 }
 
+/// Returns the tangents of half the angle of a direction of any length.
+#[inline]
+fn half_tan_of(direction: DVec3) -> DVec2 {
+    direction.truncate() / (direction.z + direction.length())
+}
+
 impl FilmMap {
     /// Tabulates a lens with an axis of symmetry, up to `reach_mm` from it.
     ///
@@ -155,6 +161,35 @@ impl FilmMap {
             Kind::Plane(map) => map.place_of(direction),
         };
         at_mm - self.from_mm
+    }
+
+    /// Returns the point that sees a direction, where another one is known that sees nearly the same.
+    #[inline]
+    pub(crate) fn place_near(&self, direction: DVec3, near_mm: DVec2) -> DVec2 {
+        let at_mm = match &self.kind {
+            Kind::Radial(map) => map.place_of(direction),
+            Kind::Plane(map) => map.place_near(direction, Some(near_mm + self.from_mm)),
+        };
+        at_mm - self.from_mm
+    }
+
+    /// Returns by how much the point that sees a direction moves, mm, over how much the direction changes, in each of two ways.
+    #[inline]
+    pub(crate) fn moves_mm(&self, place_mm: DVec2, direction: DVec3, changes: [DVec3; 2]) -> [DVec2; 2] {
+        let at_mm = place_mm + self.from_mm;
+        let (axis_tan, by_half_tan) = match &self.kind {
+            Kind::Radial(map) => (map.axis_tan(), map.by_half_tan(at_mm)),
+            Kind::Plane(map) => (DVec2::ZERO, map.by_half_tan(at_mm)),
+        };
+        let from_axis = |direction: DVec3| (direction.truncate() - axis_tan * direction.z).extend(direction.z);
+        let direction = from_axis(direction);
+        let length = direction.length();
+        let half_tan = half_tan_of(direction);
+        // q = (x, y) / (z + |d|)
+        changes.map(from_axis).map(|change| {
+            let by = change.z + direction.dot(change) / length;
+            by_half_tan * ((change.truncate() - half_tan * by) / (direction.z + length))
+        })
     }
 
     /// Returns the derivative of points by the tangents that they see, mm.

@@ -321,17 +321,21 @@ impl Lens {
     ///     are in the result too.
     /// field_deg : float
     ///     Half field of the third-order sums.
+    /// blur_um : float, optional
+    ///     The diameter of the blur that is taken to be sharp: adds ``hyperfocal_mm``, and with ``distance_mm`` in focus
+    ///     ``sharp_from_mm`` and ``sharp_to_mm``.
     ///
     /// Returns
     /// -------
     /// dict, or a list of them for a list of wavelengths, with the keys of ``dioptric lens info --json``.
-    #[pyo3(signature = (wavelengths_nm=None, *, distance_mm=None, field_deg=10.0))]
+    #[pyo3(signature = (wavelengths_nm=None, *, distance_mm=None, field_deg=10.0, blur_um=None))]
     fn info<'py>(
         &self,
         py: Python<'py>,
         wavelengths_nm: Option<&Bound<'py, PyAny>>,
         distance_mm: Option<f64>,
         field_deg: f64,
+        blur_um: Option<f64>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let list = wavelengths_nm.map(|list| numbers("wavelengths_nm", list)).transpose()?;
         let list = list.unwrap_or_else(|| vec![self.wavelength_or_usual(None)]);
@@ -339,7 +343,8 @@ impl Lens {
             let (first, last) = list.iter().fold((f64::INFINITY, 0.0), |(a, b), nm| (nm.min(a), nm.max(b)));
             let colors_nm = (first < last).then_some([first, last]);
             let data = |&wavelength_nm: &f64| {
-                LensData::new(&self.file.lens, &LensInfoRequest { wavelength_nm, distance_mm, field_deg, colors_nm })
+                let request = LensInfoRequest { wavelength_nm, distance_mm, field_deg, colors_nm, blur_um };
+                LensData::new(&self.file.lens, &request)
             };
             let rows: Vec<LensData> = list.iter().map(data).collect::<Result<_, _>>().map_err(exception)?;
             match wavelengths_nm.is_none_or(is_single) {

@@ -10,6 +10,7 @@ mod modulation;
 mod page_data;
 mod request;
 mod rows;
+mod sharp;
 mod surface_table;
 mod table;
 mod trace_table;
@@ -27,6 +28,7 @@ pub use rows::{
     AxialColorRow, FanRow, FieldPlace, FieldRow, FocusData, GridRow, LensAnalysis, OpdMap, PupilRow, SpotRow,
     WavefrontRow,
 };
+pub use sharp::SharpDepths;
 pub use surface_table::{SurfaceRow, placement_lines, surface_rows};
 pub use table::{ConfigurationData, ImageData, LensData, LensInfoRequest, LensRow, PlaneData, built_in_lenses};
 pub use trace_table::{RayTable, TraceError, TraceSettings};

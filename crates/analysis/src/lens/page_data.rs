@@ -39,8 +39,13 @@ impl LensPageData {
         let distance_mm = Some(request.distance_mm).filter(|mm| mm.is_finite());
         let ends_nm = ends_of(&request.wavelengths_nm);
         let data = |&wavelength_nm: &f64| {
-            let question =
-                LensInfoRequest { wavelength_nm, distance_mm, field_deg: sums_field_deg, colors_nm: ends_nm };
+            let question = LensInfoRequest {
+                wavelength_nm,
+                distance_mm,
+                field_deg: sums_field_deg,
+                colors_nm: ends_nm,
+                blur_um: None,
+            };
             LensData::new(&used.lens, &question)
         };
         let weights = used.weights_of(&request.wavelengths_nm);

@@ -7,6 +7,8 @@ use serde::Serialize;
 
 use dioptric_pipeline::PipelineError;
 
+use super::sharp::SharpDepths;
+
 /// One of the configurations of a lens file that has several: a position of a zoom lens, say.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ConfigurationData {
@@ -91,6 +93,9 @@ pub struct LensData {
     /// The image of an object at the distance asked for.
     #[serde(flatten)]
     pub image: Option<ImageData>,
+    /// Between which distances an object is sharp enough, where a blur is named.
+    #[serde(flatten)]
+    pub sharp: Option<SharpDepths>,
     /// The two wavelengths between which the third-order sums count color, nm; `None` where their color is unknown.
     pub seidel_colors_nm: Option<[f64; 2]>,
     /// The third-order sums of the whole lens, mm. Only a rotationally symmetric lens has them.
@@ -127,6 +132,8 @@ pub struct LensInfoRequest {
     /// The two wavelengths, the shorter first, between which those sums count color; the F and C lines where none are named or
     /// the lens is not known at them. A lens that is not known there either has sums without color.
     pub colors_nm: Option<[f64; 2]>,
+    /// The diameter of the blur that is taken to be sharp, µm, of which the depth of field is wanted.
+    pub blur_um: Option<f64>,
 }
 
 impl LensInfoRequest {
@@ -215,6 +222,10 @@ impl LensData {
             last_light_field_deg,
             film_distance_mm: None,
             image: distance_mm.map(|distance_mm| image_of(&mono, distance_mm)).transpose()?,
+            sharp: match question.blur_um {
+                Some(blur_um) => SharpDepths::of(&mono, blur_um, distance_mm)?,
+                None => None,
+            },
             seidel_colors_nm: colors_nm,
             seidel: seidel.as_ref().map(|seidel| seidel.total),
             seidel_surfaces: seidel.map(|seidel| seidel.per_surface).unwrap_or_default(),
@@ -295,7 +306,7 @@ mod tests {
     use approx::assert_relative_eq;
 
     fn question(distance_mm: Option<f64>) -> LensInfoRequest {
-        LensInfoRequest { wavelength_nm: 550.0, distance_mm, field_deg: 10.0, colors_nm: None }
+        LensInfoRequest { wavelength_nm: 550.0, distance_mm, field_deg: 10.0, colors_nm: None, blur_um: None }
     }
 
     #[test]

@@ -190,6 +190,7 @@ pub(super) fn lens_data(capture: &Capture, corner_tan: f64) -> Result<LensData, 
         distance_mm: capture.place.focus_distance_mm,
         field_deg: corner_tan.atan().to_degrees(),
         colors_nm: None,
+        blur_um: None,
     };
     LensData::new(&capture.lens.lens, &question)
 }

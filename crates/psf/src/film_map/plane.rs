@@ -2,8 +2,12 @@
 
 use glam::{DMat2, DVec2, DVec3};
 
+use super::half_tan_of;
+
 /// Newton's steps to the point that sees a direction, at most.
 const MOST_STEPS: usize = 30;
+/// A step of Newton's, over half the side, after which there is none.
+const LAST_STEP: f64 = 1e-7;
 
 /// A grid of points over a square of film, with the directions that they see and their irradiances; bicubic between them.
 ///
@@ -108,22 +112,33 @@ impl PlaneMap {
     }
 
     pub(crate) fn place_of(&self, direction: DVec3) -> DVec2 {
-        let half_tan = direction.truncate() / (direction.z + direction.length());
+        self.place_near(direction, None)
+    }
+
+    /// Returns the point that sees a direction, looked for from a point near by or from about where it is.
+    pub(super) fn place_near(&self, direction: DVec3, near_mm: Option<DVec2>) -> DVec2 {
+        let half_tan = half_tan_of(direction);
         let (middle_mm, middle_tan, by_half_tan) = self.middle;
-        let mut place_mm = middle_mm + by_half_tan * (half_tan - middle_tan);
-        let most_mm = self.half_mm;
+        let mut place_mm = near_mm.unwrap_or_else(|| middle_mm + by_half_tan * (half_tan - middle_tan));
         for _ in 0..MOST_STEPS {
             let (here, by_place) = self.half_tan(place_mm);
-            let step_mm = (by_place.inverse() * (half_tan - here)).clamp_length_max(most_mm);
+            let step_mm = (by_place.inverse() * (half_tan - here)).clamp_length_max(self.half_mm);
             if !step_mm.is_finite() {
                 break;
             }
             place_mm += step_mm;
-            if step_mm.length_squared() < (1e-12 * self.half_mm).powi(2) {
+            // The next step would be about the square of this one.
+            if step_mm.length_squared() < (LAST_STEP * self.half_mm).powi(2) {
                 break;
             }
         }
         place_mm
+    }
+
+    /// Returns the derivative of points by the tangents of half the angle that they see, mm.
+    #[inline]
+    pub(super) fn by_half_tan(&self, place_mm: DVec2) -> DMat2 {
+        self.half_tan(place_mm).1.inverse()
     }
 
     pub(super) fn jacobian_mm(&self, place_mm: DVec2) -> DMat2 {
@@ -156,6 +171,18 @@ fn cubic(u: f64) -> [(f64, f64); 4] {
 mod tests {
     use super::{super::FilmMap, *};
 
+    /// Changes of a direction of any length, along it and across.
+    fn check_moves(map: &FilmMap, at_mm: DVec2) {
+        let direction = 1.7 * map.direction(at_mm);
+        let changes = [DVec3::new(0.3, 0.1, -0.2), DVec3::new(0.0, 1.0, 0.5)];
+        let moves = map.moves_mm(at_mm, direction, changes);
+        for (found, change) in moves.into_iter().zip(changes) {
+            let place = |by: f64| map.place_near(direction + by * change, at_mm);
+            let expected = (place(1e-5) - place(-1e-5)) / 2e-5;
+            assert!((found - expected).length() < 1e-4 * expected.length(), "{at_mm}: {found} {expected}");
+        }
+    }
+
     /// A lens of 50 mm with distortion of its own along x and y, whose picture is turned and moved.
     #[test]
     fn points_and_directions_are_each_others_inverse() {
@@ -182,6 +209,9 @@ mod tests {
             };
             let jacobian = map.jacobian_mm(at_mm);
             // Beyond the square the slope is that at its edge.
+            if at_mm.x < half_mm {
+                check_moves(&map, at_mm);
+            }
             for way in [DVec2::X, DVec2::Y].into_iter().filter(|_| at_mm.x < half_mm) {
                 assert!((jacobian * way - slope(way)).length() < 1e-4 * 50.0, "{at_mm}");
             }

@@ -235,6 +235,22 @@ impl RadialMap {
         self.axis_mm + half_tan * self.mm_per_half_tan.at(magnitude * self.entries_per_half_tan)
     }
 
+    /// Returns the tangent of the axis.
+    pub(super) fn axis_tan(&self) -> DVec2 {
+        self.axis_tan
+    }
+
+    /// Returns the derivative of points by the tangents of half the angle to the axis that they see, mm.
+    #[inline]
+    pub(super) fn by_half_tan(&self, place_mm: DVec2) -> DMat2 {
+        let from_axis_mm = place_mm - self.axis_mm;
+        let radius_mm = from_axis_mm.length();
+        let (across, along) = (1.0 / self.per_mm(radius_mm), 1.0 / self.half_tan_slope(radius_mm));
+        let radial = from_axis_mm.try_normalize().unwrap_or(DVec2::X);
+        let outer = DMat2::from_cols(radial * radial.x, radial * radial.y);
+        outer * (along - across) + DMat2::IDENTITY * across
+    }
+
     #[inline]
     pub(super) fn jacobian_mm(&self, place_mm: DVec2) -> DMat2 {
         let from_axis_mm = place_mm - self.axis_mm;
@@ -310,6 +326,13 @@ mod tests {
                 (map.place_mm(tan + by * way).unwrap() - map.place_mm(tan - by * way).unwrap()) / (2.0 * by)
             };
             let jacobian = map.jacobian_mm(place_mm);
+            let changes = [DVec3::new(0.3, 0.1, -0.2), DVec3::new(0.0, 1.0, 0.5)];
+            let direction = 1.7 * map.direction(place_mm);
+            for (found, change) in map.moves_mm(place_mm, direction, changes).into_iter().zip(changes) {
+                let place = |by: f64| map.place_of(direction + by * change);
+                let expected = (place(1e-5) - place(-1e-5)) / 2e-5;
+                assert!((found - expected).length() < 1e-4 * expected.length(), "{r}: {found} {expected}");
+            }
             for way in [DVec2::X, DVec2::Y] {
                 assert!((jacobian * way - slope(way)).length() < 1e-4 * jacobian.determinant().abs().sqrt(), "{r}");
             }

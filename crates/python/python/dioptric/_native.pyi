@@ -308,7 +308,12 @@ class Lens:
     @property
     def f_number(self) -> float: ...
     def info(
-        self, wavelengths_nm: _Numbers | None = None, *, distance_mm: float | None = None, field_deg: float = 10.0
+        self,
+        wavelengths_nm: _Numbers | None = None,
+        *,
+        distance_mm: float | None = None,
+        field_deg: float = 10.0,
+        blur_um: float | None = None,
     ) -> Any: ...
     def surfaces(self) -> list[dict[str, Any]]: ...
     def trace(
