@@ -17,7 +17,7 @@ pub(crate) struct Gathered {
 ///
 /// Layers in a row, nearest first, belong to one surface, which covers a pixel no more than once ("saturating coverage"): a continuous surface that spans many layers
 /// shows no seams. Where a layer has nothing between two that have, another surface begins behind the first. Beside the edge of the first, where the chief ray passes
-/// it, what is blurred to the same side of the focus is seen through the part of the pupil that the first leaves: it may cover all of that. Elsewhere, which part of the
+/// it, what lies beyond the focus as the first does is seen through the part of the pupil that the first leaves: it may cover all of that. Elsewhere, which part of the
 /// pupil the first covers says nothing about which part the second does: as much of it is seen as the first leaves (docs/forward.md 3).
 pub(crate) struct Composite {
     light: Array2<f32>,
@@ -54,10 +54,10 @@ pub(crate) struct Sees<'a> {
 }
 
 impl Sees<'_> {
-    /// Whether the chief ray passes a nearer layer on its way to one on the same side of the focus.
+    /// Whether the chief ray passes a nearer layer on its way to one, both beyond the focus: the nearer is the less blurred.
     #[inline(always)]
     fn beside(self, nearer: u16, layer: u16) -> bool {
-        self.first + 1 >= layer && self.is_beyond_focus[usize::from(nearer)] == self.is_beyond_focus[usize::from(layer)]
+        self.first + 1 >= layer && self.is_beyond_focus[usize::from(nearer)] && self.is_beyond_focus[usize::from(layer)]
     }
 }
 

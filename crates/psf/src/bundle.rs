@@ -94,10 +94,25 @@ pub(crate) struct FilmPointJob<'a> {
 impl FilmPointJob<'_> {
     /// Finds where light comes from, near to a known outline or from nothing, and traces the mesh; `None` in darkness.
     pub(crate) fn trace(&self, seed: Option<&Outline>, has_stop: bool) -> Option<Bundle> {
-        // The picture is the film turned by 180°.
-        let cone = FilmCone::new(self.lens, -self.place_mm, self.film_distance_mm)?;
+        let cone = self.cone()?;
         let outline = self.outline(&cone, seed)?;
+        self.traced(&cone, outline, has_stop)
+    }
 
+    /// The same from outlines of points near by alone: where none leads to light, it is dark.
+    pub(crate) fn trace_near<'a>(&self, mut seeds: impl Iterator<Item = &'a Outline>) -> Option<Bundle> {
+        let cone = self.cone()?;
+        let clearances = |cosines: &[DVec2]| cone.clearances(cosines);
+        let outline = seeds.find_map(|seed| seed.settled(&clearances))?;
+        self.traced(&cone, outline, false)
+    }
+
+    fn cone(&self) -> Option<FilmCone<'_>> {
+        // The picture is the film turned by 180°.
+        FilmCone::new(self.lens, -self.place_mm, self.film_distance_mm)
+    }
+
+    fn traced(&self, cone: &FilmCone<'_>, outline: Outline, has_stop: bool) -> Option<Bundle> {
         // Trace the nodes of the mesh; a ray that fails at the very edge of the pupil takes the place of its neighbor inside.
         let mesh = self.mesh;
         let node = |(i, (share, azimuth)): (usize, (f64, f64))| {
@@ -122,7 +137,7 @@ impl FilmPointJob<'_> {
         // Weigh cells by their projected solid angle and by what obscurations and other diffraction orders leave of it.
         let mut energies = cell_areas(mesh, &outline.rho);
         if self.unobscured.is_some() {
-            let shares = clear_shares(mesh, &outline, &|cosines, with| self.passed(&cone, cosines, with));
+            let shares = clear_shares(mesh, &outline, &|cosines, with| self.passed(cone, cosines, with));
             energies.iter_mut().zip(shares).for_each(|(e, share)| *e *= share);
         }
         let solid_angle: f64 = energies.iter().sum();

@@ -20,7 +20,7 @@ const N_RADIAL: usize = 12;
 const MOST_HALVINGS: usize = 9;
 /// Points along each side of the first grid over a film, and how often its steps are halved at most.
 const N_GRID: usize = 13;
-const MOST_GRID_HALVINGS: usize = 2;
+const MOST_GRID_HALVINGS: usize = 3;
 /// How far what lies between samples may be off: directions, by the place on the film, over the reach, and irradiances, over the largest.
 const MOST_OFF: f64 = 1e-6;
 const MOST_OFF_SR: f64 = 1e-4;
@@ -176,14 +176,22 @@ impl Survey {
         if self.n_columns.is_some() {
             let n = self.n_columns.unwrap_or(1);
             let share = |i: usize| self.stations[i].bundle.as_ref().map(|bundle| shares_of(bundle, 0));
-            // Where the grid foresaw the whole, the mean of the points of the coarser grid about it.
+            // Where the grid foresaw the whole, between the points of the finest grid about it that were traced.
             let around = |i: usize| -> f64 {
-                let (row, column) = (i / n, i % n);
-                let rows = [row - row % 2, row + row % 2];
-                let columns = [column - column % 2, column + column % 2];
-                let corners = rows.into_iter().flat_map(|row| columns.map(|column| share(row * n + column)));
-                let known: Vec<f64> = corners.flatten().collect();
-                if known.is_empty() { 0.0 } else { known.iter().sum::<f64>() / known.len() as f64 }
+                let strides = std::iter::successors(Some(2), |stride| Some(2 * stride));
+                let of_stride = |stride: usize| {
+                    let ends = |k: usize| {
+                        let (low, part) = (k - k % stride, (k % stride) as f64 / stride as f64);
+                        [(low, 1.0 - part), ((low + stride).min(n - 1), part)]
+                    };
+                    let corners = ends(i / n).into_iter().flat_map(|row| ends(i % n).map(|column| (row, column)));
+                    let known = corners
+                        .filter_map(|((row, down), (column, across))| Some((down * across, share(row * n + column)?)));
+                    let (weight, sum) =
+                        known.fold((0.0, 0.0), |(weight, sum), (w, share)| (weight + w, sum + w * share));
+                    (weight > 0.0).then(|| sum / weight)
+                };
+                strides.take_while(|stride| *stride < n).find_map(of_stride).unwrap_or(0.0)
             };
             let shares: Vec<f64> = (0..n * n).map(|i| share(i).unwrap_or_else(|| around(i))).collect();
             return self.map.scaled(&shares);
@@ -470,8 +478,17 @@ fn surveyed_grid(lens: &SurveyedLens<'_>, reach_mm: f64) -> (PlaneMap, Vec<Stati
                 if row % 2 == 0 && column % 2 == 0 {
                     return (stations[rows[0] * n + columns[0]].clone(), are_foreseen[rows[0] * n + columns[0]]);
                 }
-                let seed = about().find_map(|k| stations[k].outline());
-                let station = traced(place_mm(finer, i), seed);
+                // The first two grids look everywhere; what is left is beside light that they found.
+                let at_mm = place_mm(finer, i);
+                let seeds = about().filter_map(|k| stations[k].outline());
+                let station = match n == N_GRID {
+                    true => traced(at_mm, about().find_map(|k| stations[k].outline())),
+                    false if at_mm.length() > asked_mm => Station::new(at_mm, None, focus_dioptres),
+                    false => {
+                        let bundle = FilmPointJob { place_mm: at_mm, ..lens.job }.trace_near(seeds);
+                        Station::new(at_mm, bundle, focus_dioptres)
+                    }
+                };
                 let is_foreseen = is_foreseen(&station);
                 (station, is_foreseen)
             })

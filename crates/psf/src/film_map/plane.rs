@@ -106,9 +106,16 @@ impl PlaneMap {
         (2.0 * half_tan).extend(1.0 - half_tan.length_squared())
     }
 
+    /// Returns the irradiance at a point, sr: between those of the four nodes about it, so that there are no rings beside the edge of light.
     #[inline]
     pub(crate) fn irradiance_sr(&self, place_mm: DVec2) -> f64 {
-        self.look_up(place_mm)[0][2].max(0.0)
+        let at = ((place_mm + self.half_mm) / self.step_mm()).clamp(DVec2::ZERO, DVec2::splat((self.n - 1) as f64));
+        let below = at.floor().min(DVec2::splat((self.n - 2) as f64));
+        // One node more lies on each side of the square.
+        let first = (below.y as usize + 1) * (self.n + 2) + below.x as usize + 1;
+        let corners = [0, 1, self.n + 2, self.n + 3].map(|offset| self.nodes[first + offset][2]);
+        let (least, most) = corners.iter().fold((f64::INFINITY, 0.0_f64), |(a, b), sr| (a.min(*sr), b.max(*sr)));
+        self.look_up(place_mm)[0][2].clamp(least.max(0.0), most.max(0.0).max(least))
     }
 
     pub(crate) fn place_of(&self, direction: DVec3) -> DVec2 {

@@ -98,14 +98,15 @@ fn lateral_color_um(image: &PointImage, reference: Option<&PointImage>) -> DVec2
 
 /// Returns a point-spread function in a window that is centered on the image of the reference wavelength.
 fn window(image: &PointImage, lateral_um: DVec2, pitch_um: f64, size: usize) -> Array2<f32> {
-    let kernel = image.kernel(pitch_um).0.samples;
     let shift = (lateral_um / pitch_um).round();
     let (right, up) = (shift.x as isize, shift.y as isize);
-    let (rows, columns) = kernel.dim();
-    let offset = |n: usize| n as isize / 2 - size as isize / 2;
+    // No more than what is shown: diffraction has tails that go on far beyond it.
+    let side = size + 2 * right.unsigned_abs().max(up.unsigned_abs());
+    let picture = image.picture(pitch_um, side).0;
+    let offset = (side / 2) as isize - (size / 2) as isize;
     Array2::from_shape_fn((size, size), |(row, column)| {
-        let (r, c) = (row as isize + offset(rows) + up, column as isize + offset(columns) - right);
-        if r < 0 || c < 0 { 0.0 } else { kernel.get((r as usize, c as usize)).copied().unwrap_or(0.0) }
+        let (r, c) = (row as isize + offset + up, column as isize + offset - right);
+        if r < 0 || c < 0 { 0.0 } else { picture.get((r as usize, c as usize)).map_or(0.0, |v| *v as f32) }
     })
 }
 
