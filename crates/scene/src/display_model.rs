@@ -208,7 +208,7 @@ impl DisplayModel {
     /// # Errors
     /// When the bands do not tell the primaries apart.
     pub fn primaries_on(&self, grid: &WavelengthGrid) -> Result<[Vec<f64>; 3], SceneError> {
-        let sampled = self.primaries.each_ref().map(|primary| band_means(primary, grid));
+        let sampled = self.primaries.each_ref().map(|primary| primary.band_means(grid));
         let found = sampled.each_ref().map(|values| Observer::Cie1931.xyz(grid, values).0);
         let wanted = self.primaries_xyz();
         let inverse = inverse_of_columns(found).ok_or_else(|| SceneError::Setting {
@@ -246,16 +246,6 @@ impl DisplayModel {
 
 fn fine() -> WavelengthGrid {
     WavelengthGrid::uniform(360.0, 830.0, 1.0).expect("a valid range")
-}
-
-/// Returns the mean of a spectrum over each band.
-fn band_means(spectrum: &Spectrum, grid: &WavelengthGrid) -> Vec<f64> {
-    let mean = |(&center, &width): (&f64, &f64)| {
-        let n = (2.0 * width).ceil().max(1.0) as usize;
-        let at = |i: usize| spectrum.at_or_zero(center + width * ((i as f64 + 0.5) / n as f64 - 0.5));
-        (0..n).map(at).sum::<f64>() / n as f64
-    };
-    grid.centers_nm().iter().zip(grid.widths_nm()).map(mean).collect()
 }
 
 /// Returns primaries of these chromaticities whose sum is D65: mixtures of three narrow bands, without what would be negative.

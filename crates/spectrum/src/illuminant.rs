@@ -210,7 +210,12 @@ impl Illuminant {
         let fine = WavelengthGrid::uniform(360.0, 830.0, 1.0).expect("a valid range");
         let luminance = Observer::Cie1931.xyz(&fine, &spectrum.sample_held(&fine)).luminance_cd_m2();
         let scale = illuminance_lux / std::f64::consts::PI / luminance;
-        spectrum.sample_held(grid).iter().map(|v| v * scale).collect()
+        // Lines fall between the centers of bands.
+        let samples = match self {
+            Self::Fl2 | Self::Fl11 | Self::LedB3 => spectrum.band_means(grid),
+            _ => spectrum.sample_held(grid),
+        };
+        samples.iter().map(|v| v * scale).collect()
     }
 }
 

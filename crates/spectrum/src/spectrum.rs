@@ -83,6 +83,16 @@ impl Spectrum {
         if wavelength_nm < first || wavelength_nm > last { 0.0 } else { self.at_held(wavelength_nm) }
     }
 
+    /// Returns the mean over each band of a grid, 0 outside its range: what bands hold of a spectrum with lines.
+    pub fn band_means(&self, grid: &WavelengthGrid) -> Vec<f64> {
+        let mean = |(&center, &width): (&f64, &f64)| {
+            let n = (2.0 * width).ceil().max(1.0) as usize;
+            let at = |i: usize| self.at_or_zero(center + width * ((i as f64 + 0.5) / n as f64 - 0.5));
+            (0..n).map(at).sum::<f64>() / n as f64
+        };
+        grid.centers_nm().iter().zip(grid.widths_nm()).map(mean).collect()
+    }
+
     /// Returns [`at_held`](Self::at_held) at each band center.
     pub fn sample_held(&self, grid: &WavelengthGrid) -> Vec<f64> {
         grid.centers_nm().iter().map(|&w| self.at_held(w)).collect()
