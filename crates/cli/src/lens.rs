@@ -116,7 +116,7 @@ fn info(arguments: &LensInfoArgs, common: &Common) -> anyhow::Result<()> {
     let is_asked = asked_nm.is_some();
     let wavelengths_nm = match asked_nm {
         Some(list) => list,
-        None if used.reference_nm.is_some() => {
+        None if used.reference_nm.is_some() || !used.wavelengths_nm.is_empty() => {
             let wavelength_nm = used.wavelength_or_usual();
             tell_taken(&[format!("{wavelength_nm} nm")], common);
             vec![wavelength_nm]

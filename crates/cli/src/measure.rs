@@ -252,8 +252,18 @@ fn mtf_table(measured: &EdgeMeasurement) -> Result<String, std::fmt::Error> {
     for channel in &measured.not_measured {
         writeln!(text, "{:<12} {}", channel.channel, channel.reason)?;
     }
+    if measured.clipped_share > TOLD_CLIPPED {
+        writeln!(
+            text,
+            "\n{:.0} % of the region lies at 0 or at the highest code: an edge that is clipped there looks sharper than it is",
+            100.0 * measured.clipped_share
+        )?;
+    }
     Ok(text)
 }
+
+/// The share of a region at the ends of the codes from which on it is told.
+const TOLD_CLIPPED: f64 = 0.02;
 
 fn texture_table(measured: &TextureMeasurement) -> Result<String, std::fmt::Error> {
     let PixelRegion { column, row, columns, rows } = measured.region;

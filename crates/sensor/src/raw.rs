@@ -90,6 +90,9 @@ impl RawPlane {
     }
 }
 
+/// How far below saturation a sample counts as saturated, over the range of samples.
+const AT_SATURATION: f64 = 0.005;
+
 /// What the samples of a frame stand for.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Levels {
@@ -218,10 +221,10 @@ impl Raw {
         self.planes.iter().map(plane).collect()
     }
 
-    /// Returns the share of samples at or above saturation.
+    /// Returns the share of samples at saturation: less than half a per cent below it, where a full well ends with its noise.
     pub fn saturated_fraction(&self) -> f64 {
-        // Half a step below, because the level need not be a whole number.
-        let white = self.levels.white - if self.dn().is_some() { 0.5 } else { 1e-6 * self.levels.white };
+        let least: f64 = if self.dn().is_some() { 0.5 } else { 0.0 };
+        let white = self.levels.white - least.max(AT_SATURATION * (self.levels.white - self.levels.black));
         let count = |plane: &RawPlane| match plane {
             RawPlane::Dn(plane) => plane.par_iter().filter(|&&dn| f64::from(dn) >= white).count(),
             RawPlane::Volts(plane) | RawPlane::Evened(plane) => {

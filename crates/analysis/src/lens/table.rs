@@ -188,6 +188,14 @@ impl LensData {
     /// When a glass is not known at the wavelength, or the distance is not above 0.
     pub fn new(lens: &Lens, question: &LensInfoRequest) -> Result<Self, PipelineError> {
         let LensInfoRequest { wavelength_nm, distance_mm, field_deg, .. } = *question;
+        if field_deg.is_nan() || field_deg.abs() >= 90.0 {
+            return Err(PipelineError::Value {
+                origin: "the third-order sums".to_owned(),
+                key: "field_deg",
+                found: field_deg.to_string(),
+                expected: "an angle between -90 and 90 degrees, whose tangent they count with".to_owned(),
+            });
+        }
         let mono = lens.at(wavelength_nm)?;
         let x_plane = (!lens.is_rotational()).then(|| PlaneData::of_x(&mono));
         let colors_nm = question.colors_nm(lens);

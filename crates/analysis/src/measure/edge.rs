@@ -51,6 +51,8 @@ pub struct EdgeMeasurement {
     pub channels: Vec<EdgeChannel>,
     /// Channels in which the edge cannot be measured.
     pub not_measured: Vec<UnmeasuredChannel>,
+    /// The share of the region's samples that lie at 0 or at the highest code: an edge that is clipped there looks sharper than it is.
+    pub clipped_share: f64,
 }
 
 /// The response of one channel.
@@ -126,7 +128,7 @@ impl EdgeRequest {
         }
         match (measured.last(), not_measured.first()) {
             (Some((_, last)), _) => Ok(EdgeMeasurement {
-                picture: picture.name,
+                picture: picture.name.clone(),
                 region,
                 slant_deg: last.slant_deg,
                 pixel_um: self.pixel_um,
@@ -135,6 +137,7 @@ impl EdgeRequest {
                     .map(|(name, response)| self.channel(name, response, &viewing))
                     .collect::<Result<_, _>>()?,
                 not_measured,
+                clipped_share: clipped_share(&picture, region),
             }),
             (None, first) => {
                 let reason = first.map_or_else(|| "has no channel".to_owned(), |first| first.reason.clone());
@@ -236,6 +239,15 @@ impl EdgeRequest {
             contrast_to_noise: Some(response.contrast_to_noise).filter(|ratio| ratio.is_finite()),
         })
     }
+}
+
+/// Returns the share of samples of a region at the ends of the codes.
+fn clipped_share(picture: &MeasuredPicture, PixelRegion { row, column, rows, columns }: PixelRegion) -> f64 {
+    let of_plane = |(_, plane): &(String, Array2<f32>)| {
+        let samples = plane.slice(s![row..row + rows, column..column + columns]);
+        samples.iter().filter(|v| **v <= 0.0 || **v >= 1.0).count()
+    };
+    picture.planes.iter().map(of_plane).sum::<usize>() as f64 / (rows * columns * picture.planes.len()) as f64
 }
 
 /// The channels of a picture, each in one or more parts with a sample every `period` pixels.

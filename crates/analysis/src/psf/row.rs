@@ -56,8 +56,8 @@ pub struct PsfRow {
     pub es50_half_width_um: f64,
     /// Half the side of the square about the centroid that holds 80 % of the energy, µm.
     pub es80_half_width_um: f64,
-    /// The area of the pupil that reaches the film over that of an axial point at the same distance and wavelength
-    /// (paper mode: the share of the rays over the front rim's disc).
+    /// The area of the pupil that reaches the film over that of an axial point at the same distance and wavelength, or over that of the
+    /// paraxial entrance pupil where the axis is dark (paper mode: the share of the rays over the front rim's disc).
     pub energy: f64,
     /// The share of the point's light that lies on the picture: what the picture's metrics are of, but for the modulation, in which
     /// the rest counts as well.

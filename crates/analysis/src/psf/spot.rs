@@ -1,5 +1,7 @@
 //! Where the rays of a point land: centroid, moments and losses, without any pixels.
 
+use std::f64::consts::PI;
+
 use dioptric_diffraction::{CircularStop, Covariance, Hurb, HurbForm, SampledHurb};
 use dioptric_optics::{
     FilmPoint, MonoLens, ObjectPoint, PupilRegion, Vignetting,
@@ -33,7 +35,8 @@ pub(crate) struct Moments {
 impl Spot {
     /// Sends the light of a point through its true pupil.
     ///
-    /// `energy` is the area of that pupil over that which an axial point sees, both without what obscurations stop.
+    /// `energy` is the area of that pupil over that which an axial point sees, both without what obscurations stop; where the axis is dark,
+    /// over that of the paraxial entrance pupil.
     pub(crate) fn through_pupil(
         mono: &MonoLens,
         point: &ObjectPoint,
@@ -46,10 +49,12 @@ impl Spot {
                 PupilRegion::find(lens, point, AZIMUTHS).map_or(0.0, |region| area_of(point, &region))
             })
         };
+        // Where the axis is dark, as the light of a window beside it.
+        let stated_mm2 = || 0.25 * PI * mono.first_order_of_stop().entrance_pupil_diameter_mm.powi(2);
         Self {
             at_mm: mono.landed(light.rays(), film_distance_mm).map(FilmPoint::in_picture_mm).collect(),
             weights: light.weights().to_vec(),
-            energy: Some(area_mm2(axial)).filter(|area| *area > 0.0).map_or(f64::NAN, |area| area_mm2(point) / area),
+            energy: area_mm2(point) / Some(area_mm2(axial)).filter(|area| *area > 0.0).unwrap_or_else(stated_mm2),
         }
     }
 

@@ -80,6 +80,16 @@ impl Line<'_> {
     }
 }
 
+/// Keywords without a part in how a lens images: of windows, drawings, tolerances, polarization, ray aiming and physical optics.
+const HARMLESS: &[&str] = &[
+    "AUTH", "BLNK", "COAT", "COFN", "COTF", "EERA", "FIMP", "FLAP", "GFAC", "GLRS", "GSTD", "HIDE", "HYPR", "IWDP",
+    "LANG", "LUID", "MEMA", "MIRR", "MODE", "MOFF", "NSCD", "OMMA", "PFIL", "PICB", "POLS", "POPS", "PUSH", "PUPD",
+    "RAIM", "RAED", "RAGL", "ROPD", "RSCE", "RSCH", "RWRE", "RFLS", "SCBD", "SDMA", "SLAB", "SSID", "STUD", "TOL",
+    "TOLR", "TOLS", "UDAD", "VANN", "VDSZ", "VERS", "WAVN", "XDAT",
+];
+/// The unknown keywords that are named.
+const MOST_NAMED: usize = 6;
+
 /// What a file says, in its own units.
 #[derive(Clone, Default)]
 struct Zmx {
@@ -105,6 +115,8 @@ struct Zmx {
     /// The number that the file gives each of them.
     surface_numbers: Vec<usize>,
     notes: Vec<String>,
+    /// Keywords that are not known, each once.
+    unknown: Vec<String>,
 }
 
 impl Zmx {
@@ -173,9 +185,22 @@ impl Zmx {
                 self.stored = if line.words.len() > 1 { line.count(1)? } else { 1 };
             }
             _ if self.n_configurations > 1 => self.operands.extend(ZmxOperand::of(line)?),
-            _ => {}
+            keyword if HARMLESS.contains(&keyword) => {}
+            keyword => {
+                if !self.unknown.iter().any(|known| known == keyword) {
+                    self.unknown.push(keyword.to_owned());
+                }
+            }
         }
         Ok(())
+    }
+
+    /// Returns a sentence on the keywords that are not known, if there are any.
+    fn note_on_unknown(&self) -> Option<String> {
+        let named = self.unknown.iter().take(MOST_NAMED).cloned().collect::<Vec<_>>().join(", ");
+        let more = self.unknown.len().saturating_sub(MOST_NAMED);
+        let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+        (!self.unknown.is_empty()).then(|| format!("not known and left out: {named}{more}"))
     }
 
     /// Takes the temperature, the pressure and whether indices are to follow them.
@@ -227,6 +252,7 @@ impl Zmx {
         let mut notes = std::mem::take(&mut self.notes);
         notes.extend(self.note_on_solves());
         notes.extend(self.note_on_gaps());
+        notes.extend(self.note_on_unknown());
         let [object, .., image] = self.surfaces.as_slice() else {
             let reason = format!("the file has {} surfaces; expected an object and an image", self.surfaces.len());
             return Err(TextError { line: None, reason });

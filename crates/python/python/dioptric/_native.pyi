@@ -422,8 +422,12 @@ class Scene:
         wavelengths_nm: _Numbers,
         *,
         depth_m: ArrayLike,
-        fov_deg: float,
+        fov_deg: float | None = None,
+        intrinsics: tuple[float, float, float] | None = None,
+        quantity: Literal["radiance", "reflectance", "photons"] = "radiance",
         light: str | None = None,
+        illuminance_lux: float | None = None,
+        fill_depth: Literal["beside", "far"] | float | None = None,
         name: str = "scene",
     ) -> Scene: ...
     @staticmethod

@@ -1,6 +1,6 @@
 //! A surface of an OSLO file.
 
-use crate::{CoordinateBreak, Glass, PhaseProfile, Shape};
+use crate::{Aperture, CoordinateBreak, Glass, Outline, PhaseProfile, Shape};
 
 use super::{
     super::{
@@ -261,6 +261,14 @@ impl LenSurface {
             let reason = "PY: the distance of a solve is not stored (TH); it is worked out of the image alone, for a height of 0";
             return Err(wrong(reason.to_owned()));
         }
+        // A stop that stands alone is bounded by its checked rim, as other surfaces are.
+        let is_bounded = self.is_checked && self.curvature == 0.0;
+        let opening = self.aperture.filter(|_| is_bounded).map(|radius| Aperture {
+            surface: 0,
+            outline: Outline::Circle { radius_mm: radius * mm },
+            center_mm: [0.0; 2],
+            is_obscuration: false,
+        });
         Ok(SystemSurface {
             line: self.line,
             comment: self.comment.clone(),
@@ -272,7 +280,7 @@ impl LenSurface {
             is_mirror: self.is_mirror,
             phase,
             is_rim_fixed: self.aperture.is_some() && self.is_checked,
-            apertures: Vec::new(),
+            apertures: opening.into_iter().collect(),
         })
     }
 }
