@@ -27,9 +27,8 @@ def test_uniform_scene_has_the_camera_equation() -> None:
         lens=lens, scene=scene, focus_mm=1e6, pixels=(24, 16), pixel_um=300, wavelengths_nm="scene", diffraction="none"
     )
     middle = camera.render().irradiance[:, 7:9, 11:13]
-    # What the pupil takes in of a far plane, spread over its image f² times the solid angle: E = π L / (4 N²), at f/4. A few
-    # 1e-4 are left to the pupil's edge, a polygon of rays.
-    np.testing.assert_allclose(middle, np.pi * radiance / (4 * 4.0**2), rtol=1e-3)
+    # The film's projected solid angle of a disc seen under the tangent 1 / (2 N), at f/4: E = π L / (4 N² + 1).
+    np.testing.assert_allclose(middle, np.pi * radiance / (4 * 4.0**2 + 1), rtol=1e-4)
 
 
 def test_radiance_comes_back_as_it_was() -> None:
