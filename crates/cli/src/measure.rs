@@ -6,6 +6,7 @@ use dioptric_analysis::measure::{
     BenchRequest, ChartMeasurement, ChartRequest, CodeCurve, CompareRequest, Comparison, EdgeMeasurement, EdgeRequest,
     Measurement, NoiseData, PictureViewing, PixelRegion, PointRequest, PointSet, RegionMeasurement, RegionRequest,
     TextureCurve, TextureMeasurement, TextureNoiseRequest, TextureRequest, measure_bench, measure_frames,
+    notes_on_picture,
 };
 use dioptric_pipeline::{SensorSpec, Staged, open_display, parse_illuminant};
 
@@ -13,6 +14,7 @@ use dioptric_report::{MeasurementWords, write_measurement};
 
 use crate::{
     args::Common,
+    lens::tell,
     measure_args::{ColorArgs, CurveKind, MeasureCommand, MtfArgs, NoiseArgs, RegionArgs, SpotArgs, TextureArgs},
     terminal::{print, print_json, remark_on_png},
 };
@@ -32,6 +34,7 @@ pub(crate) fn run(command: &MeasureCommand, common: &Common) -> anyhow::Result<(
 }
 
 fn mtf(arguments: &MtfArgs, common: &Common) -> anyhow::Result<()> {
+    tell(&notes_on_picture(&arguments.picture), common);
     let request = EdgeRequest {
         region: arguments.region.as_deref().map(PixelRegion::parse).transpose()?,
         side: arguments.size,
@@ -50,6 +53,7 @@ fn mtf(arguments: &MtfArgs, common: &Common) -> anyhow::Result<()> {
 }
 
 fn texture(arguments: &TextureArgs, common: &Common) -> anyhow::Result<()> {
+    tell(&notes_on_picture(&arguments.picture), common);
     let region = |text: &Option<String>| text.as_deref().map(PixelRegion::parse).transpose();
     let request = TextureRequest {
         reference: arguments.reference.clone(),
@@ -68,6 +72,7 @@ fn texture(arguments: &TextureArgs, common: &Common) -> anyhow::Result<()> {
 }
 
 fn spot(arguments: &SpotArgs, common: &Common) -> anyhow::Result<()> {
+    tell(&notes_on_picture(&arguments.picture), common);
     let request = PointRequest {
         window: arguments.window,
         pixel_um: arguments.pixel_um,
@@ -80,6 +85,7 @@ fn spot(arguments: &SpotArgs, common: &Common) -> anyhow::Result<()> {
 }
 
 fn region(arguments: &RegionArgs, common: &Common) -> anyhow::Result<()> {
+    tell(&notes_on_picture(&arguments.picture), common);
     let parsed = |text: &Option<String>| text.as_deref().map(PixelRegion::parse).transpose();
     let request = RegionRequest {
         region: parsed(&arguments.region)?,
@@ -125,6 +131,7 @@ fn noise(arguments: &NoiseArgs, common: &Common) -> anyhow::Result<()> {
 }
 
 fn color(arguments: &ColorArgs, common: &Common) -> anyhow::Result<()> {
+    tell(&notes_on_picture(&arguments.picture), common);
     let curve = curve(arguments.picture_args.curve);
     let out = arguments.picture_args.out.as_deref();
     if let Some(against) = &arguments.against {

@@ -18,7 +18,7 @@ pub use chart::{ChartMeasurement, ChartRequest, PatchRow};
 pub use compare::{CompareRequest, Comparison, DeltaESummary, PictureViewing};
 pub use edge::{EdgeChannel, EdgeMeasurement, EdgeRequest, UnmeasuredChannel};
 pub use noise::{BenchRequest, NoiseData, NoiseDataSheet, NoisePoint, SpatialPatterns, measure_bench, measure_frames};
-pub use open::{CodeCurve, MeasuredPicture};
+pub use open::{CodeCurve, MeasuredPicture, notes_on_picture};
 pub use points::{PointRequest, PointRow, PointSet};
 pub use region::PixelRegion;
 pub use region_statistics::{BandMean, ColorDifference, RegionChannel, RegionColor, RegionMeasurement, RegionRequest};

@@ -2,7 +2,7 @@
 
 use std::{fs::File, io::Read, path::Path};
 
-use dioptric_scene::{PictureSamples, read_picture_samples};
+use dioptric_scene::{PictureSamples, notes_on_samples, read_picture_samples};
 use dioptric_sensor::{ColorSpace, DngFile, Picture, Tile};
 use dioptric_spectrum::{Xyz, srgb_decode, srgb_encode};
 use ndarray::{Array2, Array3};
@@ -44,6 +44,12 @@ pub(crate) fn read_dng(path: &Path) -> Result<Option<DngFile>, PipelineError> {
         return Ok(None);
     }
     Ok(Some(DngFile::read(path)?))
+}
+
+/// Returns what of a picture's statements is not used when it is measured, a sentence each: another color space than sRGB, and how it is
+/// turned.
+pub fn notes_on_picture(path: &Path) -> Vec<String> {
+    notes_on_samples(path)
 }
 
 impl MeasuredPicture {

@@ -45,7 +45,7 @@ pub use exr_samples::ExrSamples;
 pub use exr_stream::{SpectralHead, read_exr_light};
 pub use exr_write::{ExrParts, write_planes_exr, write_scene_exr, write_spectral_exr};
 pub use photons::joules_per_photon;
-pub use picture::{PictureSamples, read_picture, read_picture_samples};
+pub use picture::{PictureSamples, notes_on_samples, read_picture, read_picture_samples};
 pub use read_options::ReadOptions;
 pub use read_scene::{read_hidden_layer, read_scene};
 pub use reading::{DepthKind, FileQuantity, FileReading, NoData};

@@ -122,24 +122,10 @@ pub(super) fn oriented(path: &Path, size: Option<(usize, usize)>) -> Result<(Dyn
         }
         None => decode(path, CODES_BYTES)?,
     };
-    let mut notes = vec![];
-    let stated = image::ImageReader::open(path).ok().and_then(|reader| reader.with_guessed_format().ok());
-    if let Some(mut decoder) = stated.and_then(|reader| reader.into_decoder().ok()) {
-        if let Ok(orientation) = decoder.orientation()
-            && orientation != Orientation::NoTransforms
-        {
-            picture.apply_orientation(orientation);
-            notes.push(format!("{}: it is turned upright, as its orientation says", name_of(path)));
-        }
-        // The name of the usual profile stands in its text, of one byte a letter or of two.
-        let profile = decoder.icc_profile().ok().flatten();
-        let says_srgb = |profile: &Vec<u8>| {
-            [&b"sRGB"[..], b"s\0R\0G\0B"].iter().any(|name| profile.windows(name.len()).any(|at| at == *name))
-        };
-        if profile.is_some_and(|profile| !profile.is_empty() && !says_srgb(&profile)) {
-            let own = ["ICC profile".to_owned()];
-            notes.extend(note_of(path, "color space", &own).map(|note| note + ": its codes are taken as sRGB"));
-        }
+    let (orientation, mut notes) = stated_beside(path);
+    if orientation != Orientation::NoTransforms {
+        picture.apply_orientation(orientation);
+        notes.insert(0, format!("{}: it is turned upright, as its orientation says", name_of(path)));
     }
     if picture.color().has_alpha() {
         let opaque = match &picture {
@@ -154,6 +140,34 @@ pub(super) fn oriented(path: &Path, size: Option<(usize, usize)>) -> Result<(Dyn
         }
     }
     Ok((picture, notes))
+}
+
+/// Returns the orientation that a picture states, and notes of its color space.
+fn stated_beside(path: &Path) -> (Orientation, Vec<String>) {
+    let reader = image::ImageReader::open(path).ok().and_then(|reader| reader.with_guessed_format().ok());
+    let Some(mut decoder) = reader.and_then(|reader| reader.into_decoder().ok()) else {
+        return (Orientation::NoTransforms, vec![]);
+    };
+    // The name of the usual profile stands in its text, of one byte a letter or of two.
+    let profile = decoder.icc_profile().ok().flatten();
+    let says_srgb = |profile: &Vec<u8>| {
+        [&b"sRGB"[..], b"s\0R\0G\0B"].iter().any(|name| profile.windows(name.len()).any(|at| at == *name))
+    };
+    let mut notes = vec![];
+    if profile.is_some_and(|profile| !profile.is_empty() && !says_srgb(&profile)) {
+        let own = ["ICC profile".to_owned()];
+        notes.extend(note_of(path, "color space", &own).map(|note| note + ": its codes are taken as sRGB"));
+    }
+    (decoder.orientation().unwrap_or(Orientation::NoTransforms), notes)
+}
+
+/// Returns what of a picture's statements [`read_picture_samples`] does not use, a sentence each.
+pub fn notes_on_samples(path: &Path) -> Vec<String> {
+    let (orientation, mut notes) = stated_beside(path);
+    if orientation != Orientation::NoTransforms {
+        notes.push(format!("{}: its pixels are counted as stored, not turned as its orientation says", name_of(path)));
+    }
+    notes
 }
 
 /// Returns what a picture's samples are, in words.
