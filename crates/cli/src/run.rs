@@ -344,17 +344,23 @@ pub(crate) fn parse_size(text: &str) -> anyhow::Result<(usize, usize)> {
 
 pub(crate) fn summary(report: &RunReport, total_s: f64, out: &Path) -> String {
     format!(
-        "{}: {} × {} pixels of {} µm on {}, {} bands, {:.2} ms, {:.1} s\n{}\n",
+        "{}: {} × {} pixels of {} µm on {}, {} bands, {} ms, {:.1} s\n{}\n",
         report.camera.name,
         report.film.columns,
         report.film.rows,
         number(report.film.pitch_um),
         report.sensor.sensor,
         report.irradiance.wavelengths_nm.len(),
-        1e3 * report.sensor.exposure_time_s,
+        milliseconds(report.sensor.exposure_time_s),
         total_s,
         out.join("report.html").display(),
     )
+}
+
+/// Returns a time in ms as people write it: of very short and very long ones the order of magnitude.
+fn milliseconds(time_s: f64) -> String {
+    let ms = 1e3 * time_s;
+    if ms == 0.0 || (0.01..1e6).contains(&ms) { format!("{ms:.2}") } else { format!("{ms:.2e}") }
 }
 
 /// Shows progress and measures how long each stage takes.

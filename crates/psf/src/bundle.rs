@@ -99,14 +99,6 @@ impl FilmPointJob<'_> {
         self.traced(&cone, outline, has_stop)
     }
 
-    /// The same from outlines of points near by alone: where none leads to light, it is dark.
-    pub(crate) fn trace_near<'a>(&self, mut seeds: impl Iterator<Item = &'a Outline>) -> Option<Bundle> {
-        let cone = self.cone()?;
-        let clearances = |cosines: &[DVec2]| cone.clearances(cosines);
-        let outline = seeds.find_map(|seed| seed.settled(&clearances))?;
-        self.traced(&cone, outline, false)
-    }
-
     fn cone(&self) -> Option<FilmCone<'_>> {
         // The picture is the film turned by 180°.
         FilmCone::new(self.lens, -self.place_mm, self.film_distance_mm)

@@ -480,14 +480,10 @@ fn surveyed_grid(lens: &SurveyedLens<'_>, reach_mm: f64) -> (PlaneMap, Vec<Stati
                 }
                 // The first two grids look everywhere; what is left is beside light that they found.
                 let at_mm = place_mm(finer, i);
-                let seeds = about().filter_map(|k| stations[k].outline());
-                let station = match n == N_GRID {
-                    true => traced(at_mm, about().find_map(|k| stations[k].outline())),
-                    false if at_mm.length() > asked_mm => Station::new(at_mm, None, focus_dioptres),
-                    false => {
-                        let bundle = FilmPointJob { place_mm: at_mm, ..lens.job }.trace_near(seeds);
-                        Station::new(at_mm, bundle, focus_dioptres)
-                    }
+                let seed = about().find_map(|k| stations[k].outline());
+                let station = match n == N_GRID || seed.is_some() {
+                    true => traced(at_mm, seed),
+                    false => Station::new(at_mm, None, focus_dioptres),
                 };
                 let is_foreseen = is_foreseen(&station);
                 (station, is_foreseen)

@@ -17,9 +17,6 @@ use super::{
     text_error::TextError,
 };
 
-/// The shortest wavelength that a lens is of, nm; what is less was meant in micrometres.
-const SHORTEST_NM: f64 = 10.0;
-
 /// A lens as it stands in a file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -185,10 +182,6 @@ fn file_of(prescription: Prescription) -> Result<LensFile, TextError> {
     };
     for &nm in &prescription.wavelengths_nm {
         positive("a wavelength of wavelengths_nm", Some(nm))?;
-        if nm < SHORTEST_NM {
-            let reason = format!("a wavelength of wavelengths_nm is {nm}, expected nanometres, {SHORTEST_NM} or more");
-            return Err(TextError { line: None, reason });
-        }
     }
     for field in &prescription.fields {
         let (Field::Angle { x_deg: x, y_deg: y }

@@ -18,6 +18,9 @@ use super::{
     zmx,
 };
 
+/// The shortest wavelength that a lens is of, nm; what is less was meant in micrometres.
+const SHORTEST_NM: f64 = 10.0;
+
 impl Lens {
     /// Reads a lens file, by its extension: `.ron` (our own), `.dat`, `.json`, `.zmx`, `.seq`, `.len` or `.lens`.
     ///
@@ -77,8 +80,21 @@ impl LensFile {
                 return Err(OpticsError::Io { path: path.to_owned(), reason });
             }
         };
-        let read = read.and_then(|file| file.in_use(options.configuration));
+        let read = read.and_then(Self::with_wavelengths_of_light).and_then(|file| file.in_use(options.configuration));
         read.map_err(|TextError { line, reason }| OpticsError::File { path: path.to_owned(), line, reason })
+    }
+
+    /// Returns the file if its wavelengths, of all configurations, are of light.
+    fn with_wavelengths_of_light(self) -> Result<Self, TextError> {
+        let all =
+            self.states().into_iter().flat_map(|state| state.wavelengths_nm.clone()).chain(self.wavelengths_nm.clone());
+        match all.into_iter().find(|nm| *nm < SHORTEST_NM) {
+            Some(nm) => {
+                let reason = format!("a wavelength is {nm} nm, expected {SHORTEST_NM} nm or more");
+                Err(TextError { line: None, reason })
+            }
+            None => Ok(self),
+        }
     }
 
     /// Returns the file with the configuration in use that was asked for; where none was, with a note on the one that is.

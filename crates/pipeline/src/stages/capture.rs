@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use dioptric_sensor::{Developed, ElectronRate, Processing, Sensor};
+use dioptric_sensor::{Developed, ElectronRate, GainMode, Processing, Sensor};
 use dioptric_spectrum::{Bands, Illuminant, WavelengthGrid};
 
 use super::{
@@ -64,8 +64,16 @@ impl Capture {
             .notes_at(self.grid().centers_nm())
             .into_iter()
             .chain(on_angles)
+            .chain(self.note_on_gain())
             .chain(self.camera.bank.note())
             .collect()
+    }
+
+    /// Says that the sensor has no other readout than the usual one, where another was asked for.
+    fn note_on_gain(&self) -> Option<String> {
+        let is_asked = self.frames.exposure.gain_mode == GainMode::High;
+        (is_asked && self.sensor.high_gain.is_none())
+            .then(|| format!("{} has one gain: the gain mode 'high' changes nothing", self.sensor.name))
     }
 
     /// What is written of the frames.
