@@ -20,7 +20,8 @@ def check_equal(a: Path, b: Path, names: list[str]) -> None:
 def test_tiny_run_is_the_programs(tiny: dp.Camera, program: Path, tmp_path: Path) -> None:
     tiny.write(tmp_path / "camera.ron")
     run(program, tmp_path / "camera.ron", "--out", tmp_path / "program")
-    files = tiny.render().save(tmp_path / "python")
+    # Read anew: what another test asked of the same camera before, as of a wider film, changes the last digits of tables.
+    files = dp.Camera.read(tmp_path / "camera.ron").render().save(tmp_path / "python")
     assert {"picture.png", "irradiance.exr", "report.json", "camera.ron", "kept.ron"} <= set(files)
     names = ["picture.png", "irradiance.exr", "depth.exr", "volts.exr", "raw.png"]
     check_equal(tmp_path / "program", tmp_path / "python", names)

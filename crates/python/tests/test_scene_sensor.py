@@ -27,8 +27,10 @@ def test_uniform_scene_has_the_camera_equation() -> None:
         lens=lens, scene=scene, focus_mm=1e6, pixels=(24, 16), pixel_um=300, wavelengths_nm="scene", diffraction="none"
     )
     middle = camera.render().irradiance[:, 7:9, 11:13]
-    # The film's projected solid angle of a disc seen under the tangent 1 / (2 N), at f/4: E = π L / (4 N² + 1).
-    np.testing.assert_allclose(middle, np.pi * radiance / (4 * 4.0**2 + 1), rtol=1e-4)
+    # The film's projected solid angle of a disc seen under the tangent 1 / (2 N), at f/4 but for the focus at 1 km, for which the
+    # film lies 5e-5 of f farther: E = π L / (4 N² + 1).
+    f_number = 4.0 * (1 + 50 / 1e6)
+    np.testing.assert_allclose(middle, np.pi * radiance / (4 * f_number**2 + 1), rtol=5e-5)
 
 
 def test_radiance_comes_back_as_it_was() -> None:
