@@ -94,17 +94,10 @@ pub(crate) struct FilmPointJob<'a> {
 impl FilmPointJob<'_> {
     /// Finds where light comes from, near to a known outline or from nothing, and traces the mesh; `None` in darkness.
     pub(crate) fn trace(&self, seed: Option<&Outline>, has_stop: bool) -> Option<Bundle> {
-        let cone = self.cone()?;
-        let outline = self.outline(&cone, seed)?;
-        self.traced(&cone, outline, has_stop)
-    }
-
-    fn cone(&self) -> Option<FilmCone<'_>> {
         // The picture is the film turned by 180°.
-        FilmCone::new(self.lens, -self.place_mm, self.film_distance_mm)
-    }
+        let cone = FilmCone::new(self.lens, -self.place_mm, self.film_distance_mm)?;
+        let outline = self.outline(&cone, seed)?;
 
-    fn traced(&self, cone: &FilmCone<'_>, outline: Outline, has_stop: bool) -> Option<Bundle> {
         // Trace the nodes of the mesh; a ray that fails at the very edge of the pupil takes the place of its neighbor inside.
         let mesh = self.mesh;
         let node = |(i, (share, azimuth)): (usize, (f64, f64))| {
@@ -129,7 +122,7 @@ impl FilmPointJob<'_> {
         // Weigh cells by their projected solid angle and by what obscurations and other diffraction orders leave of it.
         let mut energies = cell_areas(mesh, &outline.rho);
         if self.unobscured.is_some() {
-            let shares = clear_shares(mesh, &outline, &|cosines, with| self.passed(cone, cosines, with));
+            let shares = clear_shares(mesh, &outline, &|cosines, with| self.passed(&cone, cosines, with));
             energies.iter_mut().zip(shares).for_each(|(e, share)| *e *= share);
         }
         let solid_angle: f64 = energies.iter().sum();

@@ -241,11 +241,14 @@ impl EdgeRequest {
     }
 }
 
-/// Returns the share of samples of a region at the ends of the codes.
+/// Returns the share of samples of a region at the ends of the codes: at 0 where none is below it, as of a raw frame less its black, and at 1
+/// where none is beyond it, as of light in a file of floats.
 fn clipped_share(picture: &MeasuredPicture, PixelRegion { row, column, rows, columns }: PixelRegion) -> f64 {
+    let all = || picture.planes.iter().flat_map(|(_, plane)| plane.iter());
+    let ends = [(0.0, all().all(|v| *v >= 0.0)), (1.0, all().all(|v| *v <= 1.0))];
     let of_plane = |(_, plane): &(String, Array2<f32>)| {
         let samples = plane.slice(s![row..row + rows, column..column + columns]);
-        samples.iter().filter(|v| **v <= 0.0 || **v >= 1.0).count()
+        samples.iter().filter(|v| ends.iter().any(|(end, is_code)| *is_code && **v == *end)).count()
     };
     picture.planes.iter().map(of_plane).sum::<usize>() as f64 / (rows * columns * picture.planes.len()) as f64
 }
