@@ -83,9 +83,9 @@ impl Line<'_> {
 /// Keywords without a part in how a lens images: of windows, drawings, tolerances, polarization, ray aiming and physical optics.
 const HARMLESS: &[&str] = &[
     "AUTH", "BLNK", "COAT", "COFN", "COTF", "EERA", "FIMP", "FLAP", "GFAC", "GLRS", "GSTD", "HIDE", "HYPR", "IWDP",
-    "LANG", "LUID", "MEMA", "MIRR", "MODE", "MOFF", "NSCD", "OMMA", "PFIL", "PICB", "POLS", "POPS", "PUSH", "PUPD",
-    "RAIM", "RAED", "RAGL", "ROPD", "RSCE", "RSCH", "RWRE", "RFLS", "SCBD", "SDMA", "SLAB", "SSID", "STUD", "TOL",
-    "TOLR", "TOLS", "UDAD", "VANN", "VDSZ", "VERS", "WAVN", "XDAT",
+    "LANG", "LUID", "MEMA", "MIRR", "MODE", "MOFF", "NSCD", "OMMA", "PFIL", "PICB", "POLS", "POPS", "PUSH", "RAIM",
+    "RAED", "RAGL", "ROPD", "RSCE", "RSCH", "RWRE", "RFLS", "SCBD", "SDMA", "SLAB", "SSID", "STUD", "TOL", "TOLR",
+    "TOLS", "UDAD", "VANN", "VDSZ", "VERS", "WAVN",
 ];
 /// The unknown keywords that are named.
 const MOST_NAMED: usize = 6;
