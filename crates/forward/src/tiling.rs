@@ -81,6 +81,20 @@ pub(crate) struct LayerTiles {
     known: BTreeMap<NodeAt, NodeKernel>,
 }
 
+impl LayerTiles {
+    /// Returns the tile that a pixel lies in, if anything is gathered there, and the width of its samples.
+    pub(crate) fn at(&self, (row, column): (i64, i64)) -> Option<(Tile, Level)> {
+        let has = |tile: &Tile| {
+            let within = |first: i32, at: i64| (i64::from(first)..i64::from(first + tile.size)).contains(&at);
+            within(tile.down, row) && within(tile.right, column)
+        };
+        self.groups.iter().find_map(|group| {
+            let member = group.members.iter().find(|(tile, _)| has(tile));
+            member.map(|(tile, _)| (*tile, group.level))
+        })
+    }
+}
+
 /// The tiles of every layer.
 pub(crate) struct Tiling {
     pub(crate) layers: Vec<LayerTiles>,
