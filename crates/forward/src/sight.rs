@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use crate::{
     Film,
-    layers::{DEPTH_EDGE_PX, tent},
+    layers::DEPTH_EDGE_PX,
     places::{Places, SceneRaster, UNSEEN},
     raster::{Level, Raster},
     rectangle::Rectangle,
@@ -154,11 +154,12 @@ impl Sight {
         self.near_edges[row as usize * self.at.columns + column as usize]
     }
 
-    /// Returns which part of a layer the first surface has at a place, pixels from the film's middle, and what lies behind it; beyond what is known, those at the border.
+    /// Returns the layer coordinates of the first surface at a place, pixels from the film's middle, and of what lies behind it, NaN for nothing; beyond what is known, those at the
+    /// border.
     #[inline]
-    pub(crate) fn shares_at(&self, place_px: (f32, f32), layer: usize) -> (f32, f32) {
+    pub(crate) fn coordinates_at(&self, place_px: (f32, f32)) -> (f32, f32) {
         let sample = self.sample_at(place_px);
-        (share(self.first[sample], layer), self.second.get(sample).map_or(0.0, |second| share(*second, layer)))
+        (coordinate(self.first[sample]), self.second.get(sample).map_or(f32::NAN, |second| coordinate(*second)))
     }
 
     #[inline]
@@ -173,22 +174,16 @@ impl Sight {
         row * self.at.columns * self.per_pixel + column
     }
 
-    /// Returns the part of a ray that the first surface leaves open before a layer, the one just before it left out, which may be the same surface. The ray goes from a film
-    /// point through a point so many pixels beside it in the layer to which ratios refer.
+    /// Whether the ray from a film point through a point so many pixels beside it, in the layer to which ratios refer, reaches a layer.
     #[inline]
-    pub(crate) fn open_before(&self, layer: usize, met: &[Met], from: (f32, f32), beside: (f32, f32)) -> f32 {
-        let mut open = 1.0;
-        for &Met { layer: before, ratio } in met {
-            if before + 1 >= layer {
-                break;
-            }
+    pub(crate) fn reaches(&self, layer: usize, met: &[Met], from: (f32, f32), beside: (f32, f32)) -> bool {
+        let mut ray = Ray::default();
+        for &Met { layer: before, ratio } in met.iter().take_while(|met| met.layer <= layer) {
             let sample = self.sample_at((from.0 + ratio * beside.0, from.1 + ratio * beside.1));
-            open -= share(self.first[sample], before);
-            if open <= 0.0 {
-                return 0.0;
-            }
+            ray.pass(before, coordinate(self.first[sample]));
         }
-        open
+        ray.arrive(layer);
+        ray.reaches(layer)
     }
 
     /// Returns the layers that the rays of some pixels may meet, nearest first, all with the ratio to a blur radius of 1 pixel.
@@ -266,10 +261,62 @@ impl Sight {
     }
 }
 
-/// Returns which part of a layer something at a coordinate has.
+/// Returns a layer coordinate; NaN where there is nothing.
 #[inline]
-fn share(coordinate: u16, layer: usize) -> f32 {
-    tent(f32::from(coordinate) * (1.0 / PARTS_OF_LAYER), layer as f32)
+fn coordinate(parts: u16) -> f32 {
+    if parts == NOTHING { f32::NAN } else { f32::from(parts) * (1.0 / PARTS_OF_LAYER) }
+}
+
+/// A ray on its way from the nearest layer to the farthest.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Ray {
+    /// The layer passed last, and the coordinate of the surface there.
+    last: (usize, f32),
+    /// The first of the layers that it does not reach.
+    ends: usize,
+}
+
+/// The most layers that a surface goes nearer or farther from one layer to the next, as a ray passes them: of more, it is not one surface.
+const MOST_OF_SURFACE: f32 = 2.0;
+
+impl Default for Ray {
+    fn default() -> Self {
+        Self { last: (0, f32::NAN), ends: usize::MAX }
+    }
+}
+
+impl Ray {
+    /// Passes a layer, in which the first surface lies at a coordinate where the ray is. It ends in a surface that lies behind it in one layer and before it in the next;
+    /// one that only comes to lie before it has an edge there, and the ray passes behind that.
+    #[inline]
+    pub(crate) fn pass(&mut self, layer: usize, surface: f32) {
+        let (last, last_surface) = self.last;
+        let next = (last + 1) as f32;
+        // Where no surface lies in the next layer, one can only lie in the last.
+        let crosses = match last + 1 == layer {
+            true => surface < next && (surface - last_surface).abs() <= MOST_OF_SURFACE,
+            false => last_surface < next,
+        };
+        if crosses && last_surface >= last as f32 {
+            // Both layers have a part of that surface.
+            self.ends = self.ends.min(last + 2);
+        }
+        self.last = (layer, surface);
+    }
+
+    /// Passes what lies before a layer in which its surface may be too small to have been met.
+    #[inline]
+    fn arrive(&mut self, layer: usize) {
+        if self.last.0 < layer {
+            self.pass(layer, f32::NAN);
+        }
+    }
+
+    /// Whether it reaches a layer.
+    #[inline]
+    pub(crate) fn reaches(&self, layer: usize) -> bool {
+        layer < self.ends
+    }
 }
 
 /// How much farther edges reach from a pixel, and which these are.

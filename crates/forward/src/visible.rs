@@ -9,10 +9,11 @@ use crate::{
     Film,
     blocks::BLOCK,
     coverage::Gathered,
+    layers::tent,
     node_kernels::{LayerKernels, NodeKernel},
     raster::Raster,
     rectangle::Rectangle,
-    sight::{Met, NearEdges, Sight},
+    sight::{Met, NearEdges, Ray, Sight},
     tile::film_pixels,
     tiling::LayerTiles,
 };
@@ -34,6 +35,14 @@ struct BlockParts {
     /// Of layers of which not all is seen everywhere: parts in 255ths, row by row.
     by_layer: Vec<(u16, Vec<u8>)>,
     met: Vec<Met>,
+}
+
+/// What is seen of a layer over a block.
+enum Parts<'a> {
+    All,
+    /// The layer has little there, which no ray met.
+    Unknown,
+    At(&'a [u8]),
 }
 
 /// A pixel that sees a layer through a part of its pupil.
@@ -143,7 +152,11 @@ impl Visible {
                     // In focus, layer or edge, all of the pupil sees the same.
                     let told = told_of_layer.min(told(most_px)).clamp(0.0, 1.0);
                     let told = if open <= NEGLIGIBLE_PART { 0.0 } else { told };
-                    let by_rays = parts.map_or(1.0, |parts| block.part(parts, pixel));
+                    let by_rays = match parts {
+                        Parts::All => 1.0,
+                        Parts::Unknown => open,
+                        Parts::At(parts) => block.part(parts, pixel),
+                    };
                     let part = open + told * (by_rays - open);
                     partly.push(PartlySeen { index, pixel, part, told, light: gathered.light[index] });
                 }
@@ -161,7 +174,8 @@ impl Visible {
         }
         let told = partly.iter().filter(|seen| seen.told > 0.0);
         let (sum, n) = told.fold((0.0, 0.0), |(sum, n), seen| (sum + seen.light, n + 1.0));
-        if sum > 0.0 { BRIGHT.1.max(BRIGHT.0 / kernel_most) * sum / n } else { f32::INFINITY }
+        // Where there is less light than in the mean, less stands out.
+        if sum > 0.0 { BRIGHT.1.max(0.5 * BRIGHT.0 / kernel_most) * sum / n } else { f32::INFINITY }
     }
 
     /// Corrects the light of samples from so much on: each by its own rays.
@@ -227,15 +241,14 @@ impl Visible {
         from: (f32, f32),
         ((down, across), width_px): ((f32, f32), f32),
     ) -> f32 {
-        let mut sum = 0.0;
-        for ray in 0..TO_SAMPLE * TO_SAMPLE {
+        let reach = (0..TO_SAMPLE * TO_SAMPLE).filter(|ray| {
             let within = |number: usize| width_px * ((number as f32 + 0.5) / TO_SAMPLE as f32 - 0.5);
             let (down, across) = (down + within(ray / TO_SAMPLE), across + within(ray % TO_SAMPLE));
             // What aberrations and pixels put beyond the disc came through its rim.
             let scale = (own_px.abs() / down.hypot(across).max(1e-6)).min(1.0) / own_px;
-            sum += self.sight.open_before(layer, met, from, (scale * down, scale * across));
-        }
-        sum / (TO_SAMPLE * TO_SAMPLE) as f32
+            self.sight.reaches(layer, met, from, (scale * down, scale * across))
+        });
+        reach.count() as f32 / (TO_SAMPLE * TO_SAMPLE) as f32
     }
 }
 
@@ -267,9 +280,12 @@ impl Bundle {
         }
         // A film point x gathers the sample at x − d.
         let scale = -step_px / widest.ratio;
-        let lit = squares.into_iter().filter(|[light, ..]| *light > 1e-5);
-        let rays = lit.map(|[light, down, across]| {
-            let to = [down, across].map(|sum| scale * sum / light);
+        let lit = squares.into_iter().enumerate().filter(|(_, [light, ..])| *light > 1e-5);
+        let rays = lit.map(|(square, [light, down, across])| {
+            // Not in rows and columns, which an edge along them would hide all at once (Roberts's R2 sequence).
+            let beside =
+                [0.754_877_7, 0.569_840_3].map(|step: f32| side as f32 * ((square as f32 * step).fract() - 0.5));
+            let to = [down / light + beside[0], across / light + beside[1]].map(|to| scale * to);
             let beyond = to[0].hypot(to[1]).max(1.0);
             (to.map(|to| to / beyond), light)
         });
@@ -278,10 +294,13 @@ impl Bundle {
 }
 
 impl BlockParts {
-    /// Returns the parts of a layer at the points of the block; `None` where all of it is seen.
-    fn of_layer(&self, layer: usize) -> Option<&[u8]> {
-        let found = self.by_layer.binary_search_by_key(&(layer as u16), |(layer, _)| *layer).ok()?;
-        Some(&self.by_layer[found].1)
+    /// Returns what is seen of a layer.
+    fn of_layer(&self, layer: usize) -> Parts<'_> {
+        match self.by_layer.binary_search_by_key(&(layer as u16), |(layer, _)| *layer) {
+            Ok(found) => Parts::At(&self.by_layer[found].1),
+            Err(_) if self.met.iter().any(|met| met.layer == layer) => Parts::All,
+            Err(_) => Parts::Unknown,
+        }
     }
 
     /// Returns the part at a pixel, between points.
@@ -335,22 +354,16 @@ impl Bundle {
         let total: f32 = self.rays.iter().map(|(_, weight)| weight).sum();
         for ([down, across], weight) in &self.rays {
             let weight = weight / total;
-            // Open before the layer, that before it left out; what the last layers take, which may be the same surface.
-            let mut open = 1.0_f32;
-            let mut last = [(0_usize, 0.0_f32); 2];
+            let mut ray = Ray::default();
             for (&Met { layer, ratio }, sums) in met.iter().zip(sums.iter_mut()) {
-                for (before, taken) in &mut last {
-                    if *before + 1 < layer {
-                        open = (open - *taken).max(0.0);
-                        *taken = 0.0;
-                    }
+                let (first, second) = sight.coordinates_at((place.0 + ratio * down, place.1 + ratio * across));
+                ray.pass(layer, first);
+                let share = weight * (tent(first, layer as f32) + tent(second, layer as f32));
+                sums[1] += share;
+                if ray.reaches(layer) {
+                    sums[0] += share;
+                    sums[2] += weight;
                 }
-                let (first, second) = sight.shares_at((place.0 + ratio * down, place.1 + ratio * across), layer);
-                let share = first + second;
-                sums[0] += weight * open * share;
-                sums[1] += weight * share;
-                sums[2] += weight * open;
-                last = [last[1], (layer, first)];
             }
         }
     }
