@@ -361,3 +361,41 @@ fn spread(reach: &mut [Reach], columns: usize) {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Returns the first layer that a ray does not reach past the coordinates of a surface in layers one after the other.
+    fn ends(first: usize, surface: &[f32]) -> usize {
+        let mut ray = Ray::default();
+        surface.iter().enumerate().for_each(|(i, surface)| ray.pass(first + i, *surface));
+        ray.ends
+    }
+
+    #[test]
+    fn rays_end_where_they_cross_a_surface() {
+        // A plane between layers 2 and 3, and in layer 2.
+        assert_eq!(ends(0, &[2.4; 6]), 4);
+        assert_eq!(ends(0, &[2.0; 6]), 4);
+        // A slant that goes away from the ray, and one that comes towards it.
+        assert_eq!(ends(0, &[2.0, 2.5, 3.0, 3.5, 4.0, 4.5]), 6);
+        assert_eq!(ends(0, &[6.0, 5.0, 4.0, 3.0, 2.0, 1.0]), 5);
+        // Behind the edge of something near, and on to what lies far.
+        assert_eq!(ends(0, &[9.0, 9.0, 9.0, 0.0, 0.0, 9.0, 9.0, 9.0, 9.0, 9.0, 9.0]), 11);
+        assert_eq!(ends(0, &[f32::NAN; 5]), usize::MAX);
+    }
+
+    #[test]
+    fn surfaces_lie_in_the_last_layer_before_a_gap() {
+        let mut ray = Ray::default();
+        ray.pass(1, 1.0);
+        ray.pass(7, 9.0);
+        assert!(ray.reaches(2) && !ray.reaches(3));
+        let mut ray = Ray::default();
+        ray.pass(1, 7.0);
+        ray.pass(7, 7.0);
+        ray.arrive(9);
+        assert!(ray.reaches(8) && !ray.reaches(9));
+    }
+}
