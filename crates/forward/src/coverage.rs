@@ -30,6 +30,8 @@ struct Open {
     layer: u16,
 }
 
+/// Coverage below which a layer has nothing: a sample that is blurred over a thousand pixels has more.
+const LEAST_OF_LAYER: f32 = 2e-7;
 /// A pixel with less coverage in all stays dark.
 const LEAST_COVERAGE: f32 = 1e-5;
 
@@ -63,8 +65,12 @@ impl Composite {
         for ((sums, pixels), (light, alpha)) in sums.zip(pixels).zip(layers) {
             let pixels = sums.iter_mut().zip(pixels);
             for ((sum, open), (light, alpha)) in pixels.zip(light.iter().zip(alpha)) {
-                let taken = alpha.clamp(0.0, open.part);
-                *sum += light * if taken < *alpha { taken / alpha } else { 1.0 };
+                if *alpha <= LEAST_OF_LAYER {
+                    // Nothing but rounding errors of transforms.
+                    continue;
+                }
+                let taken = alpha.min(open.part);
+                *sum += light * (taken / alpha);
                 *open = Open { part: open.part - taken, before: open.part, layer };
             }
         }

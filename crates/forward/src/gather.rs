@@ -238,8 +238,10 @@ impl GatherTask<'_> {
         let stride = raster.level.per_pixel();
         let TileKernels { at: window, terms } = if stride > 1 { kernels.over_pixels(stride) } else { kernels };
         let from = member.from;
-        let light = member.mirror.restored(&member.light.samples, (from.rows, from.columns));
-        let looked = Looked { layer, raster, from, light: &light, window, kernel: &terms[0].samples };
+        let restored = |source: &Source| member.mirror.restored(&source.samples, (from.rows, from.columns));
+        let light = restored(&member.light);
+        let alpha = if let Alpha::Partly(source) = &member.alpha { restored(source) } else { vec![] };
+        let looked = Looked { layer, raster, from, light: &light, alpha: &alpha, window, kernel: &terms[0].samples };
         past.visible.add_bright(&looked, least, &partly, gathered);
     }
 

@@ -48,6 +48,8 @@ pub(crate) struct NearEdges {
 pub(crate) struct Met {
     pub(crate) layer: usize,
     pub(crate) ratio: f32,
+    /// Whether the first surface has a part of it.
+    pub(crate) is_of_first: bool,
 }
 
 /// Parts of a layer that coordinates are told apart by; the last number is nothing seen.
@@ -178,7 +180,7 @@ impl Sight {
     #[inline]
     pub(crate) fn reaches(&self, layer: usize, met: &[Met], from: (f32, f32), beside: (f32, f32)) -> bool {
         let mut ray = Ray::default();
-        for &Met { layer: before, ratio } in met.iter().take_while(|met| met.layer <= layer) {
+        for &Met { layer: before, ratio, .. } in met.iter().take_while(|met| met.layer <= layer) {
             let sample = self.sample_at((from.0 + ratio * beside.0, from.1 + ratio * beside.1));
             ray.pass(before, coordinate(self.first[sample]));
         }
@@ -188,7 +190,7 @@ impl Sight {
 
     /// Returns the layers that the rays of some pixels may meet, nearest first, all with the ratio to a blur radius of 1 pixel.
     pub(crate) fn met_by(&self, pixels: &Rectangle) -> Vec<Met> {
-        let mut is_met = vec![false; self.radius_px.len()];
+        let mut is_met = vec![[false; 2]; self.radius_px.len()];
         let widest = self.radius_px.iter().fold(0.0_f32, |widest, radius| widest.max(radius.abs()));
         let around = pixels.grown(widest.ceil() as usize + 1);
         if let Some(around) = around.intersection(&self.at) {
@@ -197,19 +199,24 @@ impl Sight {
             let columns = column as usize * n..(column as usize + around.columns) * n;
             for line in (row as usize * n..(row as usize + around.rows) * n).step_by(n) {
                 let first = line * self.at.columns * n;
-                for surface in [&self.first, &self.second] {
+                for (number, surface) in [&self.first, &self.second].into_iter().enumerate() {
                     let line = surface.get(first + columns.start..first + columns.end).unwrap_or_default();
                     for &coordinate in line.iter().step_by(n).filter(|coordinate| **coordinate != NOTHING) {
                         let coordinate = f32::from(coordinate) / PARTS_OF_LAYER;
                         for layer in [coordinate.floor() as usize, coordinate.ceil() as usize] {
-                            is_met.get_mut(layer).into_iter().for_each(|is_met| *is_met = true);
+                            is_met.get_mut(layer).into_iter().for_each(|is_met| is_met[number] = true);
                         }
                     }
                 }
             }
         }
-        let met = is_met.iter().zip(&self.radius_px).enumerate().filter(|(_, (is_met, _))| **is_met);
-        met.map(|(layer, (_, &ratio))| Met { layer, ratio }).collect()
+        // One sample in each pixel was looked at: between two layers of a slant there may be one more.
+        for layer in 1..is_met.len().saturating_sub(1) {
+            let around = [is_met[layer - 1], is_met[layer + 1]];
+            (0..2).for_each(|of| is_met[layer][of] |= around[0][of] && around[1][of]);
+        }
+        let met = is_met.iter().zip(&self.radius_px).enumerate().filter(|(_, (is_met, _))| is_met[0] || is_met[1]);
+        met.map(|(layer, (is_met, &ratio))| Met { layer, ratio, is_of_first: is_met[0] }).collect()
     }
 
     /// The blur radius at a layer coordinate, with its sign; far behind all where nothing is seen.

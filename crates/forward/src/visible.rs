@@ -61,9 +61,10 @@ pub(crate) struct PartlySeen {
 pub(crate) struct Looked<'a> {
     pub(crate) layer: usize,
     pub(crate) raster: &'a Raster,
-    /// The samples that it is gathered from: radiance times coverage, row by row.
+    /// The samples that it is gathered from, row by row: radiance times coverage, and coverage, which is empty where it is 1.
     pub(crate) from: Rectangle,
     pub(crate) light: &'a [f32],
+    pub(crate) alpha: &'a [f32],
     /// The kernel in the middle of the tile.
     pub(crate) window: Rectangle,
     pub(crate) kernel: &'a [f32],
@@ -180,7 +181,7 @@ impl Visible {
 
     /// Corrects the light of samples from so much on: each by its own rays.
     pub(crate) fn add_bright(&self, looked: &Looked<'_>, least: f32, partly: &[PartlySeen], gathered: &mut Gathered) {
-        let Looked { layer, raster, from, light, window, kernel } = looked;
+        let Looked { layer, raster, from, light, alpha, window, kernel } = looked;
         let step_px = raster.level.step_px() as f32;
         let shift_px = 0.5 * (1.0 - step_px.min(1.0));
         let own_px = self.sight.radius_px()[*layer];
@@ -195,7 +196,7 @@ impl Visible {
         let spans: Vec<_> = spans.collect();
         let first = self.sight.place_px((at.first_row, at.first_column));
         for (index, &light) in light.iter().enumerate().filter(|(_, light)| **light > least) {
-            let sample = (index / from.columns, index % from.columns);
+            let (sample, alpha) = ((index / from.columns, index % from.columns), alpha.get(index).unwrap_or(&1.0));
             let place = (
                 raster.down_px(from.first_row + sample.0 as i64) as f32,
                 raster.across_px(from.first_column + sample.1 as i64) as f32,
@@ -220,18 +221,23 @@ impl Visible {
                     let row = in_window(beside.0, window.first_row, window.rows);
                     let column = in_window(beside.1, window.first_column, window.columns);
                     let (Some(row), Some(column)) = (row, column) else { continue };
-                    let weight = kernel[row * window.columns + column] * light;
-                    if weight <= BRIGHT.0 * seen.light {
+                    let weight = kernel[row * window.columns + column];
+                    if weight * light <= BRIGHT.0 * seen.light {
                         continue;
                     }
                     let block = (seen.pixel.0.div_euclid(BLOCK), seen.pixel.1.div_euclid(BLOCK));
                     let Some(BlockParts { met, .. }) = self.blocks.get(&block) else { continue };
                     let open = self.open_to((*layer, own_px, met), (down, across), (beside, step_px));
-                    gathered.light[seen.index] += seen.told * weight * (open - seen.part);
+                    let more = seen.told * weight * (open - seen.part);
+                    gathered.light[seen.index] += more * light;
+                    gathered.alpha[seen.index] += more * alpha;
                 }
             }
         }
-        partly.iter().for_each(|seen| gathered.light[seen.index] = gathered.light[seen.index].max(0.0));
+        for seen in partly {
+            let (light, alpha) = (&mut gathered.light[seen.index], &mut gathered.alpha[seen.index]);
+            (*light, *alpha) = (light.max(0.0), alpha.max(0.0));
+        }
     }
 
     /// Returns the part of the rays from a point to a sample beside it that reaches a layer of a blur radius.
@@ -258,9 +264,10 @@ struct Bundle {
 }
 
 impl Bundle {
-    /// Returns that of the middle of a rectangle of pixels, by the kernel of the widest of the layers that it meets.
+    /// Returns that of the middle of a rectangle of pixels, by the kernel of the widest of the first surface's layers that it meets.
     fn of(met: &[Met], at: &Rectangle, (tiles, kernels): (&[LayerTiles], &[LayerKernels])) -> Option<Self> {
-        let widest = met.iter().max_by(|a, b| a.ratio.abs().total_cmp(&b.ratio.abs()))?;
+        let firsts = met.iter().filter(|met| met.is_of_first);
+        let widest = firsts.max_by(|a, b| a.ratio.abs().total_cmp(&b.ratio.abs()))?;
         let middle = (at.first_row + at.rows as i64 / 2, at.first_column + at.columns as i64 / 2);
         let (tile, level) = tiles[widest.layer].at(middle)?;
         let corners = tile.corners().map(|node| kernels[widest.layer].at((node, level)));
@@ -355,7 +362,7 @@ impl Bundle {
         for ([down, across], weight) in &self.rays {
             let weight = weight / total;
             let mut ray = Ray::default();
-            for (&Met { layer, ratio }, sums) in met.iter().zip(sums.iter_mut()) {
+            for (&Met { layer, ratio, .. }, sums) in met.iter().zip(sums.iter_mut()) {
                 let (first, second) = sight.coordinates_at((place.0 + ratio * down, place.1 + ratio * across));
                 ray.pass(layer, first);
                 let share = weight * (tent(first, layer as f32) + tent(second, layer as f32));
