@@ -45,7 +45,7 @@ pub use preview::{srgb_preview, write_preview_png};
 pub use resample::{reflectance_under, resampled};
 pub use scene::{HiddenLayer, Scene};
 pub use still_life::{LitStillLife, StillLife, StillLifePoint};
-pub use targets::{Pattern, Target, TargetLight};
+pub use targets::{Pattern, Target, TargetLight, Wave};
 pub use view::View;
 
 #[cfg(doctest)]

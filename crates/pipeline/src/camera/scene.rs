@@ -298,7 +298,7 @@ impl SceneSpec {
                 paint(&self.still_life(*columns, *rows), &bands_or_own(wanted)?)?
             }
             SceneSource::Target { pattern, columns, rows } => Target {
-                pattern: *pattern,
+                pattern: pattern.clone(),
                 rows: *rows,
                 columns: *columns,
                 light: TargetLight::Illuminant(light),
