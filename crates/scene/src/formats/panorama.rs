@@ -146,7 +146,7 @@ impl Sphere {
             Panorama::Equirectangular { .. } if columns.abs_diff(2 * rows) > 1 || rows < 2 => {
                 return wrong("a panorama twice as wide as high");
             }
-            Panorama::Cube { .. } if !(is_cross && rows >= 3) && !is_strip => {
+            Panorama::Cube { .. } if !(is_strip || is_cross && rows >= 3) => {
                 return wrong("the six faces of a cube as a cross, 4 × 3, or side by side, 6 × 1");
             }
             _ => {}

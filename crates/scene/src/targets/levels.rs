@@ -188,16 +188,14 @@ pub(super) fn check(pattern: &Pattern) -> Result<(), SceneError> {
                 return wrong("the sweep of the target", value, "cycles above 0, a contrast of 0 to 1");
             }
         }
-        Pattern::ZonePlate { edge_cycles, contrast } => {
-            if !(*edge_cycles > 0.0 && edge_cycles.is_finite() && is_share(*contrast)) {
-                let value = format!("{edge_cycles} cycles of contrast {contrast}");
-                return wrong("the zone plate of the target", value, "cycles above 0, a contrast of 0 to 1");
-            }
+        Pattern::ZonePlate { edge_cycles, contrast }
+            if !(*edge_cycles > 0.0 && edge_cycles.is_finite() && is_share(*contrast)) =>
+        {
+            let value = format!("{edge_cycles} cycles of contrast {contrast}");
+            return wrong("the zone plate of the target", value, "cycles above 0, a contrast of 0 to 1");
         }
-        Pattern::Ramp { ratio: Some(ratio), .. } => {
-            if !(*ratio > 1.0 && ratio.is_finite()) {
-                return wrong("the ratio of the target's ramp", ratio.to_string(), "a finite number above 1");
-            }
+        Pattern::Ramp { ratio: Some(ratio), .. } if !(*ratio > 1.0 && ratio.is_finite()) => {
+            return wrong("the ratio of the target's ramp", ratio.to_string(), "a finite number above 1");
         }
         Pattern::Letters { text, height_px } => {
             let n = text.chars().count();
@@ -209,11 +207,9 @@ pub(super) fn check(pattern: &Pattern) -> Result<(), SceneError> {
                 return wrong("the height of the target's letters", height_px.to_string(), "0 to 100000 samples");
             }
         }
-        Pattern::Noise { cell_px, contrast, .. } => {
-            if *cell_px == 0 || !is_share(*contrast) {
-                let value = format!("squares of {cell_px} samples, contrast {contrast}");
-                return wrong("the noise of the target", value, "a count above 0, a contrast of 0 to 1");
-            }
+        Pattern::Noise { cell_px, contrast, .. } if *cell_px == 0 || !is_share(*contrast) => {
+            let value = format!("squares of {cell_px} samples, contrast {contrast}");
+            return wrong("the noise of the target", value, "a count above 0, a contrast of 0 to 1");
         }
         _ => {}
     }
