@@ -39,7 +39,6 @@ mod sky;
 mod texture;
 mod tree;
 mod triangle;
-mod upsample;
 mod uv;
 mod world;
 

@@ -2,12 +2,10 @@
 
 use std::sync::Arc;
 
+use dioptric_spectrum::SmoothReflectance;
 use glam::Vec2;
 
-use crate::{
-    ImageTexture, Pattern, SpectralCurve, TextureId, UvMapping, pattern::Found, upsample::SmoothReflectance,
-    uv::TexturePoint,
-};
+use crate::{ImageTexture, Pattern, SpectralCurve, TextureId, UvMapping, pattern::Found, uv::TexturePoint};
 
 /// A value over a surface: a spectrum where a color is asked for, a number where a number is.
 ///

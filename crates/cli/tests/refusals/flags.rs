@@ -55,7 +55,7 @@ pub(crate) const LINES: &[(&str, &str)] = &[
     ("run camera.ron --tilt-deg 400", "--tilt-deg is 400, expected "),
     (
         "run camera.ron --scene note.txt --fov-deg 10 --depth-m 2",
-        "expected a .exr, .hdr (ENVI or Radiance), .mat, .npy",
+        "expected a .exr, .hdr (ENVI or Radiance), .mat, .h5, .npy, .npz",
     ),
     ("run camera.ron --scene . --fov-deg 10 --depth-m 2", ".: no spectral band found: expected PNG or TIFF"),
     ("run camera.ron --scene absent.png --fov-deg 10 --depth-m 2", "absent.png: cannot be read: there is no such file"),

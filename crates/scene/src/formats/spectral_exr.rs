@@ -4,7 +4,10 @@ use std::{collections::HashMap, fs::File, io::BufReader, path::Path};
 
 use dioptric_spectrum::{DepthMap, Quantity, SpectralImage, WavelengthGrid, Xyz, adapt_bradford};
 use exr::{
-    meta::{MetaData, attribute::Chromaticities},
+    meta::{
+        MetaData,
+        attribute::{Chromaticities, EnvironmentMap},
+    },
     prelude::{AnyChannel, AnyChannels, FlatSamples, Layer, ReadChannels, ReadLayers, SampleType, read},
 };
 use glam::{DMat3, DVec3};
@@ -15,7 +18,7 @@ use super::{
     exr_attributes::{self, Attributes},
     light_unit::LightUnit,
     raw_depth::RawDepth,
-    reading::{DepthKind, Frame},
+    reading::{DepthKind, Frame, Panorama},
     stated::{Stated, name_of, note_of},
     unusable::{check_memory, unreadable},
 };
@@ -71,7 +74,10 @@ pub(super) fn axial(distance_m: &Array2<f32>, view: View) -> Array2<f32> {
 /// One sentence with the file's name when it is truncated, too large, without spectral bands, of mixed units, or holds
 /// a sample that is not finite or is negative.
 pub fn read_spectral_exr(path: &Path) -> Result<SpectralFile, SceneError> {
-    let RawFile { image, depth, view, hidden, .. } = read_raw_exr(path)?;
+    let RawFile { image, depth, view, hidden, panorama, .. } = read_raw_exr(path)?;
+    if panorama.is_some() {
+        return Err(unreadable(path, "it is an environment map, expected a picture in perspective"));
+    }
     let values = |reason| SceneError::Values { file: path.to_owned(), reason };
     let image = match image {
         RawImage::Spectral { image, .. } => image,
@@ -101,6 +107,8 @@ pub(super) struct RawFile {
     pub(super) depth: Option<RawDepth>,
     pub(super) view: Option<View>,
     pub(super) frame: Frame,
+    /// Whether it says that it is a picture of all directions.
+    pub(super) panorama: Option<Panorama>,
     pub(super) light: Option<SceneLight>,
     /// Radiance and axial depth of the layer behind.
     pub(super) hidden: Option<(SpectralImage, Array2<f32>)>,
@@ -127,9 +135,13 @@ pub(super) fn read_raw_exr(path: &Path) -> Result<RawFile, SceneError> {
     let (head, mut layers) = read_layers(path)?;
     let hidden = layers.iter().position(|layer| layer.name == HIDDEN_LAYER && layer.has_bands());
     let hidden = hidden.filter(|_| layers.len() > 1).map(|index| layers.remove(index));
-    if layers.iter().any(|layer| layer.attributes.is_environment) {
-        return Err(unreadable(path, "it is an environment map, expected a picture in perspective"));
-    }
+    let panorama = match layers.iter().find_map(|layer| layer.attributes.environment) {
+        None => None,
+        Some(EnvironmentMap::LatitudeLongitude) => Some(Panorama::Equirectangular { yaw_deg: 0.0, pitch_deg: 0.0 }),
+        Some(EnvironmentMap::Cube) => {
+            return Err(unreadable(path, "it is a cube of OpenEXR, expected a panorama by latitude and longitude"));
+        }
+    };
     let mut notes = vec![];
     let index = layers.iter().position(RawLayer::has_bands);
     let mut first = layers.remove(index.unwrap_or(0));
@@ -200,7 +212,7 @@ pub(super) fn read_raw_exr(path: &Path) -> Result<RawFile, SceneError> {
         },
         None => None,
     };
-    Ok(RawFile { image, depth, view, frame, light, hidden, notes })
+    Ok(RawFile { image, depth, view, frame, panorama, light, hidden, notes })
 }
 
 /// Takes red, green and blue: `R`, `G` and `B`, or those of a layer, Blender's `….Combined` before others; or gray, `Y`. Returns

@@ -224,7 +224,7 @@ fn cameras() -> Vec<Camera> {
     };
     let target = |pattern: Pattern| {
         with(&move |camera| {
-            camera.scene.source = SceneSource::Target { pattern, columns: 60, rows: 40 };
+            camera.scene.source = SceneSource::Target { pattern: pattern.clone(), columns: 60, rows: 40 };
             (camera.scene.depth_m, camera.scene.field_of_view_deg) = (Some(2.0), Some(36.0));
         })
     };
