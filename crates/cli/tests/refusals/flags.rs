@@ -106,7 +106,16 @@ pub(crate) const LINES: &[(&str, &str)] = &[
     ("glass list --glasses absent.agf", "unexpected argument '--glasses' found"),
     ("glass show SCHOTT:UNOBTAINIUM", "no glass is named 'SCHOTT:UNOBTAINIUM'; no name is"),
     ("psf dgauss-50mm --focus-mm -5", "--focus-mm is -5, expected "),
-    ("psf dgauss-50mm --focus-mm 2000 --fields-deg 91", "psf: fields_deg is 91, expected angles below 89.9"),
+    (
+        "psf dgauss-50mm --focus-mm 2000 --fields-deg 91",
+        "psf: fields_deg is 91, expected angles of up to 120 degrees along",
+    ),
+    (
+        "psf fisheye-12.5mm --distances-mm inf --fields-deg 121",
+        "psf: fields_deg is 121, expected angles of up to 120 deg",
+    ),
+    ("psf dgauss-50mm --distances-mm inf --mode paper --fields-deg 95", "below 90 degrees in the paper mode"),
+    ("lens info dgauss-50mm --catalog NOSUCH", "catalog is NOSUCH, expected a catalogue (.agf, .yml) or a maker: "),
     ("psf dgauss-50mm --focus-mm 2000 --fields-deg x", "--fields-deg: 'x' is neither a number nor a range"),
     ("psf dgauss-50mm --focus-mm 2000 --distances-mm 0", "--distances-mm is 0, expected "),
     ("psf dgauss-50mm --focus-mm 2000 --pixel-um 0 -o x.exr", "--pixel-um is 0, expected "),
