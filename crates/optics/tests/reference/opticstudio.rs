@@ -1,8 +1,8 @@
-//! Numbers that OpticStudio printed.
+//! Numbers that `OpticStudio` printed.
 
 use dioptric_optics::{D_LINE_NM, Glass, Interface, Lens, Surface};
 
-/// The digits that OpticStudio printed of a singlet of LAC9 with its stop on the rear surface (Optiland's issue 710).
+/// The digits that `OpticStudio` printed of a singlet of LAC9 with its stop on the rear surface (Optiland's issue 710).
 #[test]
 fn first_order_is_that_of_opticstudio() {
     let side = |radius_mm: f64, semi_aperture_mm: f64, glass: Glass, thickness_after_mm: f64| Interface {
