@@ -89,7 +89,10 @@ pub use collect::Illumination;
 pub use color::{ColorCorrection, ColorMatrix};
 pub use demosaic::{Demosaic, demosaic};
 pub use disparity::{DisparityAxis, DisparityMap, DisparitySearch};
-pub use dng::{DngColor, DngDetails, DngFile, DngLight, DngNoise, DngOpcodes, DngProfile, DngShot};
+pub use dng::{
+    DngColor, DngDetails, DngFile, DngLight, DngNoise, DngOpcodes, DngProfile, DngShot, raw_format_by_name,
+    raw_format_of,
+};
 pub use error::SensorError;
 pub use exit_pupil::ExitPupil;
 pub use exposure::{AutoExposure, Exposure, ExposureControl, GainMode, Metering};
