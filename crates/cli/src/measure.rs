@@ -136,6 +136,7 @@ fn color(arguments: &ColorArgs, common: &Common) -> anyhow::Result<()> {
     let out = arguments.picture_args.out.as_deref();
     if let Some(against) = &arguments.against {
         let request = CompareRequest {
+    tell(&data.notes, common);
             viewing: viewing(arguments)?,
             patch: arguments.patch.as_deref().map(PixelRegion::parse).transpose()?,
             curve,
@@ -407,8 +408,8 @@ fn noise_table(data: &NoiseData) -> Result<String, std::fmt::Error> {
     for (name, measured, expected, digits) in [
         ("system gain K, DN/e", Some(data.gain_dn_per_e), sheet.map(|s| s.gain_dn_per_e), 5),
         ("quantum efficiency", data.quantum_efficiency, sheet.map(|s| s.quantum_efficiency), 4),
-        (dark_noise, Some(data.dark_noise_e), sheet.map(|s| s.dark_noise_e), 3),
-        ("saturation, e", Some(data.saturation_e), sheet.map(|s| s.saturation_e), 0),
+        (dark_noise, data.dark_noise_e, sheet.map(|s| s.dark_noise_e), 3),
+        ("saturation, e", data.saturation_e, sheet.map(|s| s.saturation_e), 0),
         ("DSNU, e", data.dsnu_e, sheet.map(|s| s.dsnu_e), 3),
         ("  of rows", data.dsnu_parts_e.map(|p| p.row), None, 3),
         ("  of columns", data.dsnu_parts_e.map(|p| p.column), None, 3),
@@ -427,10 +428,12 @@ fn noise_table(data: &NoiseData) -> Result<String, std::fmt::Error> {
             sheet.map(|s| s.dark_current_e_per_s),
             3,
         ),
+        ("  ± one standard error", data.dsnu_error_e, None, 3),
         ("absolute threshold, photons", data.threshold_photons, None, 2),
-        ("largest SNR, dB", Some(data.max_snr_db), None, 2),
-        ("dynamic range, dB", Some(data.dynamic_range_db), None, 2),
-        ("dynamic range, stops", Some(data.dynamic_range_stops), None, 2),
+        ("largest SNR, dB", data.max_snr_db, None, 2),
+        ("dynamic range, dB", data.dynamic_range_db, None, 2),
+        ("dynamic range, stops", data.dynamic_range_stops, None, 2),
+        ("  ± one standard error", data.prnu_error_percent, None, 3),
         ("ISO by saturation (D55)", None, sheet.map(|s| s.iso_by_saturation), 1),
         ("ISO by noise, SNR 40", None, sheet.and_then(|s| s.iso_by_noise_40), 1),
         ("ISO by noise, SNR 10", None, sheet.and_then(|s| s.iso_by_noise_10), 1),
