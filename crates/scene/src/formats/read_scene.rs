@@ -21,7 +21,7 @@ use super::{
     no_data::mend,
     npy::read_npy,
     pfm::read_pfm,
-    picture::{lifted, lifted_codes, oriented, picture_size_of},
+    picture::{Oriented, into_srgb, lifted, lifted_codes, note_beyond, oriented, picture_size_of},
     raw_depth::{DepthWords, RawDepth},
     read_options::ReadOptions,
     reading::{DepthKind, FileQuantity, FileReading, Frame, light_unit},
@@ -134,7 +134,7 @@ fn starts_with(path: &Path, start: &[u8]) -> Result<bool, SceneError> {
 /// An ordinary picture: what a display shows, or linear colors where it has floats.
 fn of_picture(path: &Path, options: &ReadOptions, mut notes: Vec<String>) -> Result<Contents, SceneError> {
     let size = reduced_size(path, options)?;
-    let (picture, more) = oriented(path, size)?;
+    let Oriented { picture, colors, notes: more } = oriented(path, size)?;
     notes.extend(more);
     if let Some((columns, rows)) = size {
         let (own_columns, own_rows) = picture_size_of(path)?;
@@ -142,7 +142,7 @@ fn of_picture(path: &Path, options: &ReadOptions, mut notes: Vec<String>) -> Res
             "its {own_columns} × {own_rows} pixels are read as {columns} × {rows} means, finer than those of the film by far"
         ));
     }
-    let what = format!("a picture as a display shows it ({})", super::picture::kind_of(&picture));
+    let what = format!("a picture as a display shows it ({})", super::picture::kind_of(&picture, colors.as_ref()));
     let image = match picture {
         dioptric_pictures::DynamicImage::ImageRgb32F(_) | dioptric_pictures::DynamicImage::ImageRgba32F(_) => {
             let (columns, rows) = (picture.width() as usize, picture.height() as usize);
@@ -151,9 +151,13 @@ fn of_picture(path: &Path, options: &ReadOptions, mut notes: Vec<String>) -> Res
                 let values = samples.iter().skip(k).step_by(3).copied().collect();
                 Array2::from_shape_vec((rows, columns), values).expect("three samples a pixel")
             };
-            return Ok(linear([plane(0), plane(1), plane(2)], None, notes));
+            let mut planes = [plane(0), plane(1), plane(2)];
+            if let Some(colors) = &colors {
+                into_srgb(&mut planes, &colors.to_srgb);
+            }
+            return Ok(linear(planes, None, notes));
         }
-        picture => Image::Codes(picture),
+        picture => Image::Codes(picture, colors),
     };
     Ok(Contents { notes, heeds: Heeds::Nothing, ..Contents::of(image, what) })
 }
@@ -593,7 +597,11 @@ fn lit(
                 ));
             }
             let image = match colors {
-                Image::Codes(picture) => lifted_codes(path, picture, &basis, &grid)?,
+                Image::Codes(picture, colors) => {
+                    let (image, beyond_share) = lifted_codes(path, picture, colors.as_ref(), &basis, &grid)?;
+                    notes.extend(note_beyond(path, beyond_share));
+                    image
+                }
                 Image::Linear { mut planes, .. } => {
                     let scale = options.reading.scale.unwrap_or(1.0) as f32;
                     let bands = WavelengthGrid::new(vec![450.0, 550.0, 650.0])?;
