@@ -373,8 +373,15 @@ fn color_file(path: &Path, codes: [u8; 3], state: impl FnOnce(&mut png::Info<'_>
     let mut info = png::Info::with_size(64, 48);
     (info.color_type, info.bit_depth) = (png::ColorType::Rgb, png::BitDepth::Eight);
     state(&mut info);
+    let points = info.coding_independent_code_points;
     let encoder = png::Encoder::with_info(fs::File::create(path).unwrap(), info).unwrap();
-    encoder.write_header().unwrap().write_image_data(&codes.repeat(64 * 48)).unwrap();
+    let mut writer = encoder.write_header().unwrap();
+    // The encoder leaves this chunk to its user.
+    if let Some(points) = points {
+        let numbers = [points.color_primaries, points.transfer_function, 0, 1];
+        writer.write_chunk(png::chunk::cICP, &numbers).unwrap();
+    }
+    writer.write_image_data(&codes.repeat(64 * 48)).unwrap();
 }
 
 /// The chromaticity of a picture's mean, and its luminance.
