@@ -1,6 +1,7 @@
 //! Files of pictures, read and written.
 #![doc = include_str!("../README.md")]
 
+mod colors;
 mod reduced;
 mod tagged;
 
@@ -13,6 +14,7 @@ use std::{
 use dioptric_files::memory;
 use image::{ExtendedColorType, ImageDecoder, ImageReader};
 
+pub use colors::StatedColors;
 pub use image::{DynamicImage, ImageError, ImageFormat, Limits};
 pub use reduced::{Curve, read_reduced};
 pub use tagged::{CodeSpace, encode_in};

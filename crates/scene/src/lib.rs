@@ -30,6 +30,7 @@ mod targets;
 mod view;
 
 /// Planes and cubes of this crate are arrays of it.
+pub use dioptric_pictures::StatedColors;
 pub use ndarray;
 
 pub use display_model::{DisplayCurve, DisplayModel, PixelLayout};

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use dioptric_pictures::DynamicImage;
+use dioptric_pictures::{DynamicImage, StatedColors};
 use dioptric_spectrum::{Quantity, SpectralImage, SpectrumError, WavelengthGrid};
 use ndarray::Array2;
 use rayon::prelude::*;
@@ -48,8 +48,8 @@ pub(super) enum Image {
         /// The luminance of white, cd/m², where the file states it.
         white_cd_m2: Option<f64>,
     },
-    /// Codes of sRGB.
-    Codes(DynamicImage),
+    /// Codes of sRGB, or of the colors that the file states.
+    Codes(DynamicImage, Option<StatedColors>),
 }
 
 /// Which of the options that say what a file does not may be said of it.
@@ -75,7 +75,7 @@ impl Image {
                 Ok(())
             }
             // Only EXR files have frames.
-            Self::Codes(_) => Ok(()),
+            Self::Codes(..) => Ok(()),
         }
     }
 }
@@ -126,7 +126,7 @@ impl Contents {
     fn heeds_quantity(&self, quantity: Option<FileQuantity>) -> bool {
         match self.image {
             Image::Spectral(_) => matches!(self.heeds, Heeds::Unit | Heeds::Cube),
-            Image::Linear { .. } | Image::Codes(_) => quantity == Some(FileQuantity::Reflectance),
+            Image::Linear { .. } | Image::Codes(..) => quantity == Some(FileQuantity::Reflectance),
         }
     }
 
@@ -135,7 +135,7 @@ impl Contents {
         match &self.image {
             Image::Spectral(image) => (image.rows(), image.columns()),
             Image::Linear { planes, .. } => planes[0].dim(),
-            Image::Codes(picture) => (picture.height() as usize, picture.width() as usize),
+            Image::Codes(picture, _) => (picture.height() as usize, picture.width() as usize),
         }
     }
 }

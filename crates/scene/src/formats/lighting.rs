@@ -8,7 +8,7 @@ use ndarray::Array2;
 use super::{
     contents::{Contents, Image},
     no_data::mend,
-    picture::{lifted, lifted_codes},
+    picture::{lifted, lifted_codes, linear_srgb, note_beyond},
     read_options::ReadOptions,
     reading::FileQuantity,
     smooth_lift::{Colors, SmoothLift},
@@ -62,7 +62,11 @@ pub(super) fn lit(
                 ));
             }
             let image = match colors {
-                Image::Codes(picture) => lifted_codes(path, picture, &basis, &grid)?,
+                Image::Codes(picture, colors) => {
+                    let (image, beyond_share) = lifted_codes(path, picture, colors.as_ref(), &basis, &grid)?;
+                    notes.extend(note_beyond(path, beyond_share));
+                    image
+                }
                 Image::Linear { mut planes, .. } => {
                     prepare_colors(path, &mut planes, options, notes)?;
                     lifted(&planes, &basis, &grid)?
@@ -114,22 +118,23 @@ fn reflecting(
     }
     let lift = SmoothLift::new(&grid, &light.illuminant)?;
     let white = light.illuminant.white_radiance(&grid, light.illuminance_lux.unwrap_or(USUAL_LUX));
-    let image = match colors {
-        Image::Codes(picture) => lift.radiance(path, &Colors::of_codes(picture), &white, &grid)?,
-        Image::Linear { mut planes, .. } => {
-            prepare_colors(path, &mut planes, options, notes)?;
-            let is_beyond =
-                |row: usize, column: usize| planes.iter().any(|plane| !(0.0..=1.0).contains(&plane[(row, column)]));
-            let (rows, columns) = planes[0].dim();
-            let n_beyond = (0..rows * columns).filter(|i| is_beyond(i / columns, i % columns)).count();
-            if n_beyond > 0 {
-                let what = "have colors below 0, which become 0, or above 1, which reflect more than white";
-                notes.push(format!("{}: {n_beyond} of {} samples {what}", name_of(path), rows * columns));
-            }
-            lift.radiance(path, &Colors::Linear(&planes), &white, &grid)?
+    let mut planes = match colors {
+        Image::Spectral(image) => return Ok((image, Some(light))),
+        Image::Codes(picture, None) => {
+            return Ok((lift.radiance(path, &Colors::of_codes(picture), &white, &grid)?, Some(light)));
         }
-        Image::Spectral(image) => image,
+        Image::Codes(picture, colors) => linear_srgb(picture, colors.as_ref()),
+        Image::Linear { planes, .. } => planes,
     };
+    prepare_colors(path, &mut planes, options, notes)?;
+    let is_beyond = |row: usize, column: usize| planes.iter().any(|plane| !(0.0..=1.0).contains(&plane[(row, column)]));
+    let (rows, columns) = planes[0].dim();
+    let n_beyond = (0..rows * columns).filter(|i| is_beyond(i / columns, i % columns)).count();
+    if n_beyond > 0 {
+        let what = "have colors below 0, which become 0, or above 1, which reflect more than white";
+        notes.push(format!("{}: {n_beyond} of {} samples {what}", name_of(path), rows * columns));
+    }
+    let image = lift.radiance(path, &Colors::Linear(&planes), &white, &grid)?;
     Ok((image, Some(light)))
 }
 

@@ -5,12 +5,13 @@ use std::{
     path::Path,
 };
 
-use dioptric_spectrum::{SpectralImage, srgb_decode};
+use dioptric_spectrum::SpectralImage;
 use ndarray::Array2;
 use rayon::prelude::*;
 
 use super::{
     contents::{Contents, Image},
+    picture::linear_srgb,
     raw_depth::RawDepth,
     read_options::ReadOptions,
     reading::{DepthKind, Frame, Panorama},
@@ -58,7 +59,7 @@ pub(super) fn look(
     let view = View::from_horizontal_fov_deg(fov_deg, side, side)?;
     let n_planes = match &contents.image {
         Image::Spectral(image) => image.grid().len(),
-        Image::Linear { .. } | Image::Codes(_) => 3,
+        Image::Linear { .. } | Image::Codes(..) => 3,
     };
     check_made(path, (4 * n_planes as u64 + 8).saturating_mul((side * side) as u64))?;
     let places: Vec<(f32, f32)> = (0..side * side)
@@ -78,16 +79,9 @@ pub(super) fn look(
                 Image::Spectral(SpectralImage::new(image.quantity(), image.grid().clone(), planes)?)
             }
             Image::Linear { planes, white_cd_m2 } => Image::Linear { planes: planes.each_ref().map(seen), white_cd_m2 },
-            Image::Codes(picture) => {
-                let codes = picture.into_rgb16();
-                let plane = |color: usize| {
-                    let light = |(row, column): (usize, usize)| {
-                        let code = codes.get_pixel(column as u32, row as u32).0[color];
-                        srgb_decode(f64::from(code) / 65535.0) as f32
-                    };
-                    seen(&Array2::from_shape_fn((rows, columns), light))
-                };
-                Image::Linear { planes: [plane(0), plane(1), plane(2)], white_cd_m2: None }
+            Image::Codes(picture, colors) => {
+                let planes = linear_srgb(picture, colors.as_ref());
+                Image::Linear { planes: planes.each_ref().map(seen), white_cd_m2: None }
             }
         };
     if let Some(depth) = depth {

@@ -23,7 +23,7 @@ use super::{
     npz::read_npz,
     panorama::look,
     pfm::read_pfm,
-    picture::{oriented, picture_size_of},
+    picture::{Oriented, into_srgb, oriented, picture_size_of},
     raw_depth::{DepthWords, RawDepth},
     read_options::ReadOptions,
     reading::{DepthKind, FileQuantity, FileReading, Frame, light_unit},
@@ -139,10 +139,11 @@ fn of_picture(path: &Path, options: &ReadOptions, mut notes: Vec<String>) -> Res
     let (columns, rows) = picture_size_of(path)?;
     let bands = options.grid.as_ref().map_or(31, WavelengthGrid::len);
     let reduced = reduced_size(path, options, (rows, columns), 4 * bands as u64);
-    let (picture, more) = oriented(path, reduced.as_ref().map(|reduced| (reduced.columns, reduced.rows)))?;
+    let Oriented { picture, colors, notes: more } =
+        oriented(path, reduced.as_ref().map(|reduced| (reduced.columns, reduced.rows)))?;
     notes.extend(more);
     notes.extend(reduced.map(|reduced| reduced.note));
-    let what = format!("a picture as a display shows it ({})", super::picture::kind_of(&picture));
+    let what = format!("a picture as a display shows it ({})", super::picture::kind_of(&picture, colors.as_ref()));
     let image = match picture {
         dioptric_pictures::DynamicImage::ImageRgb32F(_) | dioptric_pictures::DynamicImage::ImageRgba32F(_) => {
             let (columns, rows) = (picture.width() as usize, picture.height() as usize);
@@ -151,9 +152,13 @@ fn of_picture(path: &Path, options: &ReadOptions, mut notes: Vec<String>) -> Res
                 let values = samples.iter().skip(k).step_by(3).copied().collect();
                 Array2::from_shape_vec((rows, columns), values).expect("three samples a pixel")
             };
-            return Ok(linear([plane(0), plane(1), plane(2)], None, notes));
+            let mut planes = [plane(0), plane(1), plane(2)];
+            if let Some(colors) = &colors {
+                into_srgb(&mut planes, &colors.to_srgb);
+            }
+            return Ok(linear(planes, None, notes));
         }
-        picture => Image::Codes(picture),
+        picture => Image::Codes(picture, colors),
     };
     Ok(Contents { notes, heeds: Heeds::Nothing, ..Contents::of(image, what) })
 }

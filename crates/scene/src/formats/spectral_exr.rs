@@ -17,6 +17,7 @@ use super::{
     band_name::{self, BandKind},
     exr_attributes::{self, Attributes},
     light_unit::LightUnit,
+    picture::into_srgb,
     raw_depth::RawDepth,
     reading::{DepthKind, Frame, Panorama},
     stated::{Stated, name_of, note_of},
@@ -176,7 +177,8 @@ pub(super) fn read_raw_exr(path: &Path) -> Result<RawFile, SceneError> {
     let (image, prefix) = if bands.is_empty() {
         let (prefix, mut planes) = colors_of(&mut channels).ok_or_else(|| no_bands(path))?;
         if let Some(own) = &head.chromaticities {
-            to_srgb(&mut planes, own).map_err(|reason| unreadable(path, reason))?;
+            let no_colors = || unreadable(path, "its chromaticities are no three primaries and a white");
+            into_srgb(&mut planes, &srgb_from(own).ok_or_else(no_colors)?);
             notes.push(format!("{}: its primaries become those of sRGB, its white D65", name_of(path)));
         }
         (RawImage::Rgb { planes, white_cd_m2: attributes.white_cd_m2.filter(|white| *white > 0.0) }, prefix)
@@ -292,17 +294,6 @@ pub(super) fn depth_channel(planes: Vec<(String, Array2<f32>)>) -> Option<(Strin
     Some((name, plane, others))
 }
 
-/// Makes colors of these primaries and this white linear sRGB.
-fn to_srgb(planes: &mut [Array2<f32>; 3], own: &Chromaticities) -> Result<(), String> {
-    let matrix = srgb_from(own).ok_or("its chromaticities are no three primaries and a white")?;
-    let [red, green, blue] = planes;
-    ndarray::Zip::from(red).and(green).and(blue).par_for_each(|r, g, b| {
-        let rgb = [*r, *g, *b].map(f64::from);
-        [*r, *g, *b] = matrix.map(|row| row.iter().zip(rgb).map(|(m, v)| m * v).sum::<f64>() as f32);
-    });
-    Ok(())
-}
-
 /// Returns the matrix from colors of these primaries to linear sRGB, their white adapted to D65 (Bradford).
 fn srgb_from(own: &Chromaticities) -> Option<[[f64; 3]; 3]> {
     let xyz = |p: exr::prelude::Vec2<f32>| {
@@ -330,7 +321,21 @@ fn srgb_from(own: &Chromaticities) -> Option<[[f64; 3]; 3]> {
 /// # Errors
 /// When the file is truncated, too large or no EXR.
 pub fn read_planes_exr(path: &Path) -> Result<Vec<(String, Array2<f32>)>, SceneError> {
-    Ok(read_layers(path)?.1.swap_remove(0).planes)
+    Ok(read_planes_and_primaries_exr(path)?.0)
+}
+
+/// The channels of an EXR file by name, and the matrix from its primaries to linear sRGB.
+pub(super) type PlanesAndPrimaries = (Vec<(String, Array2<f32>)>, Option<[[f64; 3]; 3]>);
+
+/// Reads the same, with the matrix from the primaries that the file states to linear sRGB; none where they are those of sRGB.
+pub(super) fn read_planes_and_primaries_exr(path: &Path) -> Result<PlanesAndPrimaries, SceneError> {
+    let (head, mut layers) = read_layers(path)?;
+    let has_colors = |planes: &[(String, Array2<f32>)]| planes.iter().any(|(name, _)| name == "R");
+    let layer = layers.swap_remove(0);
+    let own = head.chromaticities.filter(|_| has_colors(&layer.planes));
+    let no_colors = || unreadable(path, "its chromaticities are no three primaries and a white");
+    let matrix = own.map(|own| srgb_from(&own).ok_or_else(no_colors)).transpose()?;
+    Ok((layer.planes, matrix))
 }
 
 /// What a file states of all its layers.
