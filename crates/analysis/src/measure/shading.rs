@@ -114,7 +114,7 @@ impl ShadingChannel {
     fn of(name: &str, plane: &Array2<f32>, is_own: &dyn Fn((usize, usize)) -> bool) -> Option<Self> {
         let blocks = blocks(plane, is_own);
         let (brightest, &(most, ..)) = blocks.iter().enumerate().max_by(|a, b| a.1.0.total_cmp(&b.1.0))?;
-        if !(most > 0.0) {
+        if most.is_nan() || most <= 0.0 {
             return None;
         }
         let least = blocks.iter().map(|(mean, ..)| *mean).fold(f64::INFINITY, f64::min);
