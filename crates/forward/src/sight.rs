@@ -18,7 +18,7 @@ use crate::{
 
 /// The surfaces of the scene as the chief rays of a film and of what lies around it meet them.
 ///
-/// The ray from a film point x to a sample s of layer j passes layer i at q = x + (s − x) ρ_i / ρ_j, with ρ the blur radii (docs/forward.md 3).
+/// The ray from a film point x to a sample s of layer j passes layer i at q = x + (s − x) `ρ_i / ρ_j`, with ρ the blur radii (docs/forward.md 3).
 #[derive(Debug)]
 pub(crate) struct Sight {
     /// The pixels of the film and those around it.

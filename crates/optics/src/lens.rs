@@ -208,11 +208,11 @@ impl Lens {
 
     /// Checks that the wavefront errors of all surfaces are known at a wavelength.
     pub(crate) fn check_wavefronts_at(&self, wavelength_nm: f64) -> Result<(), OpticsError> {
-        let errors = self.diffractive.iter().filter_map(|phase| match &phase.profile {
+        let mut errors = self.diffractive.iter().filter_map(|phase| match &phase.profile {
             PhaseProfile::Wavefront(error) => Some(error),
             PhaseProfile::Grating { .. } | PhaseProfile::Rings { .. } => None,
         });
-        errors.map(|error| error.check_at(wavelength_nm)).collect()
+        errors.try_for_each(|error| error.check_at(wavelength_nm))
     }
 
     /// Returns the lens with a film of this shape.
