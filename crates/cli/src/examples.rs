@@ -57,6 +57,10 @@ const EXAMPLES: &[(&str, &[&str])] = &[
     ("sweep index", &["dioptric sweep index plan.ron"]),
     ("sweep pack", &["dioptric sweep pack plan.ron --webdataset pictures.tar --items-per-tar 1000"]),
     ("measure mtf", &["dioptric measure mtf edge.png --region 20,20,120,120 --out edge/"]),
+    ("measure star", &["dioptric measure star star.png --cycles 144"]),
+    ("measure grid", &["dioptric measure grid dots.png --json"]),
+    ("measure shading", &["dioptric measure shading plane.dng"]),
+    ("measure steps", &["dioptric measure steps chart.png --steps steps.csv"]),
     ("measure spot", &["dioptric measure spot stars.png --pixel-um 3.45"]),
     (
         "measure region",

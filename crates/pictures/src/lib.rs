@@ -32,7 +32,10 @@ pub fn format_of(path: &Path) -> io::Result<Option<ImageFormat>> {
 /// # Errors
 /// When the file cannot be read or is no such picture.
 pub fn size_of(path: &Path) -> Result<(usize, usize), ImageError> {
-    let (columns, rows) = ImageReader::open(path)?.with_guessed_format()?.into_decoder()?.dimensions();
+    let mut reader = ImageReader::open(path)?.with_guessed_format()?;
+    // Whoever reads its samples checks what they take.
+    reader.limits(Limits::no_limits());
+    let (columns, rows) = reader.into_decoder()?.dimensions();
     Ok((columns as usize, rows as usize))
 }
 
