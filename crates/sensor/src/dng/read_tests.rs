@@ -328,7 +328,7 @@ fn deflated_codes_and_floats_are_read() {
     let plain: Vec<u8> = light.iter().flat_map(|v| v.to_le_bytes()).collect();
     let file = DngFile::from_bytes(&deflated(&plain, 1, |d| floats(d, 32))).unwrap();
     assert!((file.raw.linear()[0][(1, 2)] - light[columns + 2]).abs() < 1e-6);
-    let half: Vec<u8> = light.iter().flat_map(|_| 0b0_01101_1000000000_u16.to_le_bytes()).collect();
+    let half: Vec<u8> = light.iter().flat_map(|_| 0b0011_0110_0000_0000_u16.to_le_bytes()).collect();
     let file = DngFile::from_bytes(&deflated(&half, 1, |d| floats(d, 16))).unwrap();
     assert!(file.raw.linear()[0].iter().all(|v| *v == 0.375));
     // Too few samples, and a predictor of whole numbers for floats.
