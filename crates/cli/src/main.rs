@@ -18,6 +18,7 @@ mod light_field;
 mod measure;
 mod measure_args;
 mod measure_charts;
+mod measure_output;
 mod memory;
 mod movement_args;
 mod paintings;

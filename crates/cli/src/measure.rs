@@ -1,23 +1,20 @@
 //! `dioptric measure`: a laboratory's measurements of pictures, frames and sensors.
 
-use std::{fmt::Write, path::Path};
+use std::fmt::Write;
 
 use dioptric_analysis::measure::{
-    BenchRequest, ChartMeasurement, ChartRequest, CodeCurve, CompareRequest, Comparison, EdgeMeasurement, EdgeRequest,
-    Measurement, NoiseData, PictureViewing, PixelRegion, PointRequest, PointSet, RegionMeasurement, RegionRequest,
-    TextureCurve, TextureMeasurement, TextureNoiseRequest, TextureRequest, measure_bench, measure_frames,
-    notes_on_picture,
+    BenchRequest, ChartMeasurement, ChartRequest, CompareRequest, Comparison, EdgeMeasurement, EdgeRequest, NoiseData,
+    PictureViewing, PixelRegion, PointRequest, PointSet, RegionMeasurement, RegionRequest, TextureCurve,
+    TextureMeasurement, TextureNoiseRequest, TextureRequest, measure_bench, measure_frames, notes_on_picture,
 };
 use dioptric_pipeline::{SensorSpec, Staged, open_display, parse_illuminant};
-
-use dioptric_report::{MeasurementWords, write_measurement};
 
 use crate::{
     args::Common,
     lens::tell,
-    measure_args::{ColorArgs, CurveKind, MeasureCommand, MtfArgs, NoiseArgs, RegionArgs, SpotArgs, TextureArgs},
+    measure_args::{ColorArgs, MeasureCommand, MtfArgs, NoiseArgs, RegionArgs, SpotArgs, TextureArgs},
     measure_charts,
-    terminal::{print, print_json, remark_on_png},
+    measure_output::{Finish, curve, file_name, or_dash},
 };
 
 /// The seed where the user gives none.
@@ -170,64 +167,6 @@ fn viewing(arguments: &ColorArgs) -> anyhow::Result<PictureViewing> {
         }
         None => PictureViewing::PixelsPerDegree(arguments.pixels_per_degree),
     })
-}
-
-pub(crate) fn curve(kind: CurveKind) -> CodeCurve {
-    match kind {
-        CurveKind::ByFile => CodeCurve::ByFile,
-        CurveKind::Linear => CodeCurve::Linear,
-        CurveKind::Srgb => CodeCurve::Srgb,
-    }
-}
-
-/// What becomes of a measurement: files in a folder, and numbers on standard output.
-pub(crate) struct Finish<'a> {
-    name: &'static str,
-    title: &'static str,
-    /// What is measured, as the user named it.
-    subject: String,
-    common: &'a Common,
-    staged: Option<Staged>,
-}
-
-impl<'a> Finish<'a> {
-    /// Tries the place before the work.
-    pub(crate) fn new(
-        (name, title): (&'static str, &'static str),
-        subject: String,
-        folder: Option<&Path>,
-        common: &'a Common,
-    ) -> anyhow::Result<Self> {
-        let staged = folder.map(Staged::folder).transpose()?;
-        Ok(Self { name, title, subject, common, staged })
-    }
-
-    pub(crate) fn with<M: Measurement>(
-        self,
-        measured: &M,
-        table: impl Fn(&M) -> Result<String, std::fmt::Error>,
-    ) -> anyhow::Result<()> {
-        let table = table(measured)?;
-        if let Some(staged) = self.staged {
-            let words = MeasurementWords { name: self.name, title: self.title, subject: &self.subject, table: &table };
-            write_measurement(measured, &words, staged.path())?;
-            staged.commit()?;
-            remark_on_png(self.common.quiet);
-        }
-        match (self.common.json, self.common.quiet) {
-            (true, _) => print_json(measured),
-            (false, true) => Ok(()),
-            (false, false) => print(&table),
-        }
-    }
-}
-
-pub(crate) fn file_name(path: &Path) -> String {
-    path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
-}
-
-pub(crate) fn or_dash(value: Option<f64>, digits: usize) -> String {
-    value.map_or_else(|| "–".to_owned(), |v| format!("{v:.digits$}"))
 }
 
 fn mtf_table(measured: &EdgeMeasurement) -> Result<String, std::fmt::Error> {

@@ -10,8 +10,8 @@ use dioptric_analysis::measure::{
 use crate::{
     args::Common,
     lens::tell,
-    measure::{Finish, curve, file_name, or_dash},
     measure_args::{GridArgs, ShadingArgs, StarArgs, StepsArgs},
+    measure_output::{Finish, curve, file_name, or_dash},
 };
 
 /// Places of a map that cannot be measured and are still named.

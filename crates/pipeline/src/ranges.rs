@@ -123,13 +123,13 @@ const RANGES: &[(Range, &[&str])] = &[
     (of(1e-3, 1e5, ""), &["pixels_per_degree"]),
     (of(0.0, 1e6, ""), &["background"]),
     (of(3.0, 65_535.0, "pixels"), &["window"]),
-    (of(8.0, 360.0, "cycles"), &["cycles"]),
-    (of(1e-3, 1.0, ""), &["modulation"]),
     (of(2.0, 4001.0, "rays"), &["rays"]),
     (of(1.0, 8192.0, "pixels"), &["size"]),
     (of(1.0, 1e9, ""), &["items_per_tar", "layers"]),
     (of(2.0, 10_000.0, "levels"), &["levels"]),
     (of(2.0, 10_000.0, "frames"), &["stack"]),
+    (of(8.0, 360.0, "cycles"), &["cycles"]),
+    (of(0.001, 1.0, "of full modulation"), &["modulation"]),
     (of(0.0, 1000.0, "samples"), &["radius_px"]),
 ];
 

@@ -33,6 +33,7 @@ mod payload_tests;
 mod pfm;
 mod photons;
 mod picture;
+mod primaries;
 mod raw_depth;
 mod read_options;
 mod read_scene;

@@ -9,6 +9,7 @@ use ndarray::Array2;
 use rayon::prelude::*;
 
 use super::{
+    primaries::into_srgb,
     stated::{name_of, note_of},
     unusable::{check_made, unreadable},
 };
@@ -244,15 +245,6 @@ pub(super) fn kind_of(picture: &DynamicImage, colors: Option<&StatedColors>) -> 
         (true, Some(_)) => "RGB",
     };
     format!("{what} of {bits} bits")
-}
-
-/// Makes linear light of other primaries that of sRGB's.
-pub(super) fn into_srgb(planes: &mut [Array2<f32>; 3], to_srgb: &[[f64; 3]; 3]) {
-    let [red, green, blue] = planes;
-    ndarray::Zip::from(red).and(green).and(blue).par_for_each(|r, g, b| {
-        let rgb = [*r, *g, *b].map(f64::from);
-        [*r, *g, *b] = to_srgb.map(|row| row.iter().zip(rgb).map(|(m, v)| m * v).sum::<f64>() as f32);
-    });
 }
 
 /// The samples of a picture as they stand in its file.

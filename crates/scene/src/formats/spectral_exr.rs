@@ -17,7 +17,7 @@ use super::{
     band_name::{self, BandKind},
     exr_attributes::{self, Attributes},
     light_unit::LightUnit,
-    picture::into_srgb,
+    primaries::into_srgb,
     raw_depth::RawDepth,
     reading::{DepthKind, Frame, Panorama},
     stated::{Stated, name_of, note_of},
