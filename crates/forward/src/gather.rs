@@ -15,18 +15,9 @@ use crate::{
     sampler::{IdealLayer, Sampler},
     stopwatch::{Part, Stopwatch},
     symmetry::Mirror,
-    tile::{Tile, film_pixels},
+    tile::{Tile, TileGroup, film_pixels},
     visible::{Looked, Visible},
 };
-
-/// Tiles that mirror each other: one set of kernels serves them all.
-#[derive(Debug)]
-pub(crate) struct TileGroup {
-    pub(crate) level: Level,
-    pub(crate) canonical: Tile,
-    /// Those with anything to gather, and what takes each to the canonical one.
-    pub(crate) members: Vec<(Tile, Mirror)>,
-}
 
 /// A layer in one band.
 pub(crate) struct GatherTask<'a> {

@@ -13,13 +13,12 @@ use rayon::prelude::*;
 use crate::{
     Film, Settings,
     blocks::{Blocks, points_of},
-    gather::TileGroup,
     layers::Layers,
     node_kernels::{LayerKernels, NodeAt, NodeKernel, edge_spread_peak},
     raster::{Level, Raster},
     stopwatch::{Part, Stopwatch},
     symmetry::{Mirror, Node, Symmetry},
-    tile::Tile,
+    tile::{Tile, TileGroup},
     work::Work,
 };
 

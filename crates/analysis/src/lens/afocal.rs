@@ -6,11 +6,8 @@ use dioptric_optics::{Lens, MonoLens, Shape, Surface};
 use dioptric_pipeline::PipelineError;
 use serde::Serialize;
 
-use super::film::{AnalysisFilm, FilmUse};
+use super::film::{AnalysisFilm, FilmUse, IDEAL_MM};
 
-/// The focal length of the ideal lens through which afocal light is looked at, mm: on its film 1 mm is 1/1000 of a tangent, and so
-/// 1 µm is 1 µrad near the axis, and 1 mm of focus is 1/1000 of a dioptre.
-pub(crate) const IDEAL_MM: f64 = 1000.0;
 /// How far away an image counts as infinitely far, over the front rim's radius.
 const PARALLEL: f64 = 1e5;
 

@@ -18,8 +18,8 @@ use dioptric_optics::{
 use rayon::prelude::*;
 
 use super::{
-    afocal::{AfocalView, IDEAL_MM},
-    film::{AnalysisFilm, DARK_AXIS, FilmUse},
+    afocal::AfocalView,
+    film::{AnalysisFilm, DARK_AXIS, FilmUse, IDEAL_MM},
     request::{AnalysisRequest, Field},
     rows::{
         AxialColorRow, FanRow, FieldRow, FocusData, GridRow, LensAnalysis, OpdMap, PupilRow, SpotRow, WavefrontRow,

@@ -8,7 +8,9 @@ use dioptric_optics::{
 
 use dioptric_pipeline::PipelineError;
 
-use super::afocal::IDEAL_MM;
+/// The focal length of the ideal lens through which afocal light is looked at, mm: on its film 1 mm is 1/1000 of a tangent, and so
+/// 1 µm is 1 µrad near the axis, and 1 mm of focus is 1/1000 of a dioptre.
+pub(crate) const IDEAL_MM: f64 = 1000.0;
 
 /// Where the film is to be.
 #[derive(Clone, Copy, Debug, PartialEq)]

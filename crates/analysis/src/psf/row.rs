@@ -7,7 +7,7 @@ use dioptric_optics::glam::DVec2;
 use dioptric_psf::Picture;
 use serde::Serialize;
 
-use super::{spot::Moments, table::WHOLE};
+use super::spot::Moments;
 use crate::field_angles::FieldAngles;
 
 /// What is measured of one point-spread function.
@@ -118,6 +118,9 @@ pub(crate) struct WaveCurves {
 
 /// Places of a curve.
 const CURVE_PLACES: usize = 160;
+
+/// The share of the light on a picture from which on its widths are those of the point.
+pub(crate) const WHOLE: f64 = 0.97;
 
 /// Which point a row is of.
 #[derive(Clone, Copy, Debug, PartialEq)]

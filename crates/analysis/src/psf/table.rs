@@ -12,15 +12,13 @@ use ndarray::Array2;
 use rayon::prelude::*;
 
 use super::request::{Item, LARGEST};
-use super::row::{PointName, place_and_size};
+use super::row::{PointName, WHOLE, place_and_size};
 use super::spot::{PaperRays, Spot};
 use super::windowed::Windowed;
 use crate::{FilmPlace, PsfRequest, PsfRow, PsfSampling};
 use dioptric_pipeline::PipelineError;
 use dioptric_psf::Diffraction;
 
-/// The share of the light on a picture from which on its widths are those of the point.
-pub(crate) const WHOLE: f64 = 0.97;
 /// Pixels along a picture that holds all of a large blur.
 const COARSE_PIXELS: f64 = 800.0;
 
