@@ -73,9 +73,9 @@ pub(crate) struct Looked<'a> {
 /// Blur radii between which rays begin to tell parts of the pupil apart, pixels: what a point in focus becomes is aberrations and pixels.
 const TELLS_APART_PX: (f32, f32) = (1.0, 3.0);
 /// Rays along the radius of a bundle.
-const ALONG_RADIUS: usize = 7;
+const ALONG_RADIUS: usize = 5;
 /// Points over the blur radius of a near side.
-const POINTS_OF_RADIUS: f32 = 8.0;
+const POINTS_OF_RADIUS: f32 = 6.0;
 /// A part of the pupil that counts as all or nothing of it.
 const NEGLIGIBLE_PART: f32 = 1e-3;
 /// Part of the rays that must meet a layer to tell what is seen of it; of less, all rays tell.
