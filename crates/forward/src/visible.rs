@@ -264,12 +264,14 @@ struct Bundle {
 }
 
 impl Bundle {
-    /// Returns that of the middle of a rectangle of pixels, by the kernel of the widest of the first surface's layers that it meets.
+    /// Returns that of the middle of a rectangle of pixels, by the kernel of the widest of the first surface's layers that it meets and that is gathered there.
     fn of(met: &[Met], at: &Rectangle, (tiles, kernels): (&[LayerTiles], &[LayerKernels])) -> Option<Self> {
-        let firsts = met.iter().filter(|met| met.is_of_first);
-        let widest = firsts.max_by(|a, b| a.ratio.abs().total_cmp(&b.ratio.abs()))?;
+        let mut firsts: Vec<&Met> = met.iter().filter(|met| met.is_of_first).collect();
+        firsts.sort_by(|a, b| b.ratio.abs().total_cmp(&a.ratio.abs()));
         let middle = (at.first_row + at.rows as i64 / 2, at.first_column + at.columns as i64 / 2);
-        let (tile, level) = tiles[widest.layer].at(middle)?;
+        // Where nothing of a layer is in reach it has no tile.
+        let with_tile = |met: &&Met| tiles[met.layer].at(middle).map(|(tile, level)| (**met, tile, level));
+        let (widest, tile, level) = firsts.iter().find_map(with_tile)?;
         let corners = tile.corners().map(|node| kernels[widest.layer].at((node, level)));
         let kernel = NodeKernel::sum_of(&corners.each_ref().map(|corner| (corner, 0.25)));
         let step_px = level.step_px() as f32;
