@@ -20,6 +20,7 @@ mod display_model;
 mod error;
 mod formats;
 mod light;
+mod point_lights;
 mod preview;
 mod reframe;
 mod resample;
@@ -42,6 +43,7 @@ pub use formats::{
     read_scene, read_spectral_exr, write_iset_scene, write_planes_exr, write_scene_exr, write_spectral_exr,
 };
 pub use light::SceneLight;
+pub use point_lights::{PointLights, PointPlace};
 pub use preview::{srgb_preview, write_preview_png};
 pub use resample::{reflectance_under, resampled};
 pub use scene::{HiddenLayer, Scene};

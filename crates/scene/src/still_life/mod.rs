@@ -139,6 +139,7 @@ impl StillLife {
             depth: Some(depth),
             view: Some(self.view()?),
             hidden: None,
+            points: None,
             light: Some(light()?),
             notes: vec![],
         })
