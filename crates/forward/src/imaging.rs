@@ -98,8 +98,7 @@ impl Imaging {
         let blocks = Blocks::find((film, margin_px), &raster, &maps, &surfaces, work.cancel())?;
 
         let coordinate_of = |depth_m: f32| layers.coordinate_of(depth_m);
-        let points =
-            Beside::all(geometry, maps[1], &raster, (&scene.coordinates, &coordinate_of, scene.hides));
+        let points = Beside::all(geometry, maps[1], &raster, (&scene.coordinates, &coordinate_of, scene.hides));
         let sight = Sight::of((lens, film, middle_nm), maps[1], &raster, &scene, work.cancel())?;
 
         // Cut the film into tiles for each of them.
@@ -143,10 +142,10 @@ impl Imaging {
             + self.kept().size_bytes
     }
 
-    /// The points that the first surface hides where they lie, and those where no film point looks.
+    /// The points that lie behind the first surface, and those where no film point looks.
     pub(crate) fn points_unseen(&self) -> (usize, usize) {
-        let hidden = self.points.iter().flatten().filter(|point| point.is_hidden()).count();
-        (hidden, self.points.iter().filter(|point| point.is_none()).count())
+        let behind = self.points.iter().flatten().filter(|point| point.is_behind()).count();
+        (behind, self.points.iter().filter(|point| point.is_none()).count())
     }
 
     /// Keeps at most so many bytes of kernels from now on.
@@ -231,7 +230,7 @@ impl Imaging {
         let front = radiance.front.band(band)?;
         let needed = radiance.occluded.filter(|_| self.scene.occluded.needs_radiance());
         let occluded = needed.map(|occluded| occluded.band(band)).transpose()?;
-        let points = radiance.points.map_or_else(Vec::new, |points| points.of_band(band));
+        let points: Vec<f32> = radiance.points.iter().map(|point| point.light.by_band()[band]).collect();
         let light = BandRadiance { front: &front, occluded: occluded.as_deref(), points: &points };
         light.check(self.size(), self.scene.occluded.needs_radiance())?;
         Ok(self.image(lens, band, light, work)?)
@@ -260,8 +259,11 @@ impl Imaging {
         });
         let film_map = (map.as_ref(), 1e-3 * self.spec.film.pitch_um);
         let lamps = self.lamps_of(&lamps, (&self.scene.coordinates, true), film_map);
-        let lamps_behind =
-            self.scene.occluded.layer_coordinates().map(|behind| self.lamps_of(&lamps_behind, (behind, false), film_map));
+        let lamps_behind = self
+            .scene
+            .occluded
+            .layer_coordinates()
+            .map(|behind| self.lamps_of(&lamps_behind, (behind, false), film_map));
         let points: Vec<Point> = lamps.into_iter().chain(lamps_behind.unwrap_or_default()).collect();
         let beside = self.points.iter().zip(light.points);
         let beside: Vec<Point> = beside.filter_map(|(point, light)| point.as_ref()?.lit(*light, film_map)).collect();
@@ -285,7 +287,8 @@ impl Imaging {
             hides: self.scene.hides,
         };
         // What points bring: those of the scene, and those beside it.
-        let mut brought = [points, beside].map(|points| (vec![0.0; if points.is_empty() { 0 } else { rows * columns }], points));
+        let mut brought =
+            [points, beside].map(|points| (vec![0.0; if points.is_empty() { 0 } else { rows * columns }], points));
         for (layer, tiles) in self.tiling.layers.iter().enumerate() {
             let task = GatherTask {
                 film: &self.spec.film,

@@ -126,7 +126,8 @@ mod tests {
 
     #[test]
     fn textures_and_windows_are_no_lamps() {
-        let board = Array2::from_shape_fn((64, 64), |(row, column)| if (row / 3 + column / 5) % 2 == 0 { 9.0 } else { 0.0 });
+        let board =
+            Array2::from_shape_fn((64, 64), |(row, column)| if (row / 3 + column / 5) % 2 == 0 { 9.0 } else { 0.0 });
         assert_eq!(split(&board), (board.clone(), vec![]));
         let window = Array2::from_shape_fn((64, 64), |at| if at.0 < 20 && at.1 < 20 { 900.0 } else { 1.0 });
         assert_eq!(split(&window), (window.clone(), vec![]));

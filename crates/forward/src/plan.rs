@@ -69,7 +69,7 @@ impl ImagingPlan {
         self.views.first().scene.narrow_fraction
     }
 
-    /// How many of the points beside the scene its first surface hides where they lie, and how many lie where no point of the film looks.
+    /// How many of the points beside the scene lie behind its first surface, and how many where no point of the film looks.
     pub fn points_unseen(&self) -> (usize, usize) {
         self.views.first().points_unseen()
     }

@@ -73,7 +73,8 @@ impl Scene {
     }
 
     fn rendered(&self) -> Vec<Array2<f32>> {
-        let source = Source { radiance: &self.radiance, depth: &self.depth, view: self.view(), occluded: None, points: &[] };
+        let source =
+            Source { radiance: &self.radiance, depth: &self.depth, view: self.view(), occluded: None, points: &[] };
         let ImagingSpec { film, settings, .. } = self.spec();
         let mut bands = vec![];
         render(&source, self.lens.as_ref(), &film, &settings, &|_| {}, &mut |_, band| {
@@ -95,7 +96,8 @@ fn planned_bands_equal_rendered_ones() {
             assert_eq!(scene.band(&plan, band), rendered[band], "band {band}");
         }
         let mut streamed = vec![];
-        let source = Source { radiance: &scene.radiance, depth: &scene.depth, view: scene.view(), occluded: None, points: &[] };
+        let source =
+            Source { radiance: &scene.radiance, depth: &scene.depth, view: scene.view(), occluded: None, points: &[] };
         plan.stream(&source.light(), &|_| {}, &Cancel::new(), &mut |band, picture| {
             assert_eq!(band, streamed.len());
             streamed.push(picture);
@@ -196,7 +198,8 @@ fn cancelled_stream_hands_on_no_more() {
     let scene = Scene::new();
     let plan = scene.plan();
     let cancel = Cancel::new();
-    let source = Source { radiance: &scene.radiance, depth: &scene.depth, view: scene.view(), occluded: None, points: &[] };
+    let source =
+        Source { radiance: &scene.radiance, depth: &scene.depth, view: scene.view(), occluded: None, points: &[] };
     let seen = Mutex::new(0.0);
     let progress = |fraction: f64| {
         *seen.lock().unwrap() = fraction;
@@ -218,7 +221,8 @@ fn cancelled_stream_hands_on_no_more() {
 fn streams_begin_anywhere() {
     let scene = Scene::new();
     let rendered = scene.rendered();
-    let source = Source { radiance: &scene.radiance, depth: &scene.depth, view: scene.view(), occluded: None, points: &[] };
+    let source =
+        Source { radiance: &scene.radiance, depth: &scene.depth, view: scene.view(), occluded: None, points: &[] };
     for plan in [scene.plan(), scene.plan().with_band_budget(1)] {
         for first in 0..=7 {
             let mut left = vec![];
@@ -275,7 +279,7 @@ fn streams_end_where_a_band_fails() {
     let stream = |panics: bool, refused: usize| {
         handed_on.lock().unwrap().clear();
         let front = Unreadable { image: &scene.radiance, panics };
-        let light = SceneRadiance { front: &front, occluded: None, points: None };
+        let light = SceneRadiance { front: &front, occluded: None, points: &[] };
         let mut sink = |band: usize, _: Array2<f32>| {
             handed_on.lock().unwrap().push(band);
             if band == refused { Err("the disk is full".into()) } else { Ok(()) }

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use dioptric_psf::{FilmMap, FilmQuery, Kernel, LensImage};
-use dioptric_scene::PointPlace;
+use dioptric_scene::{PointBrightness, PointLight, PointPlace};
 use glam::DVec2;
 use rayon::prelude::*;
 
@@ -39,9 +39,12 @@ pub(crate) struct Point {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Beside {
     field_tan: DVec2,
+    /// Radiance times the area in tangents over its brightness.
+    tan2: f64,
     dioptres: f64,
     layer: usize,
-    /// Whether the first surface hides it where it lies, in a layer that is its own.
+    /// Whether it lies behind the first surface, and whether that has its own layer: then all of it is hidden.
+    is_behind: bool,
     is_hidden: bool,
 }
 
@@ -56,38 +59,53 @@ impl Beside {
         raster: &SceneRaster,
         (coordinates, coordinate_of, hides): (&LayerCoordinates, &dyn Fn(f32) -> f32, bool),
     ) -> Vec<Option<Self>> {
-        let of = |place: &PointPlace| {
-            let field_tan = match *place {
-                PointPlace::Field { tan_x, tan_y, .. } => DVec2::new(tan_x, tan_y),
-                PointPlace::Film { x_mm, y_mm, .. } => map.field_tan(DVec2::new(x_mm, y_mm))?,
+        let of = |point: &PointLight| {
+            let field_tan = match point.place {
+                PointPlace::Field { tan_x, tan_y } => DVec2::new(tan_x, tan_y),
+                PointPlace::Film { x_mm, y_mm } => map.field_tan(DVec2::new(x_mm, y_mm))?,
             };
-            let coordinate = coordinate_of(place.depth_m() as f32);
+            let coordinate = coordinate_of(point.depth_m as f32);
             let seen_at = raster.position_of(field_tan.x, field_tan.y);
-            let is_hidden = raster.is_within(seen_at) && {
+            let (is_behind, is_hidden) = if raster.is_within(seen_at) {
                 let at = seen_at.map(|position| position.round().max(0.0) as usize);
                 let at = (at[0].min(raster.rows - 1), at[1].min(raster.columns - 1));
                 let surface = coordinates.samples()[at.0 * raster.columns + at.1];
-                let is_behind = place.depth_m() > AT_SURFACE * f64::from(scene.depth.z_m()[at]);
-                is_behind && (!hides || coordinate - surface < 1.0)
+                let is_behind = point.depth_m > AT_SURFACE * f64::from(scene.depth.z_m()[at]);
+                (is_behind, is_behind && (!hides || coordinate - surface < 1.0))
+            } else {
+                (false, false)
             };
-            Some(Self { field_tan, dioptres: 1.0 / place.depth_m(), layer: coordinate as usize, is_hidden })
+            // Radiance times tan² is the irradiance of a star over cos³, the intensity of a lamp over z² cos.
+            let per_cos = (1.0 + field_tan.length_squared()).sqrt();
+            let tan2 = match point.light {
+                PointBrightness::Irradiance(_) => per_cos.powi(3),
+                PointBrightness::Intensity(_) => per_cos / (point.depth_m * point.depth_m),
+            };
+            Some(Self {
+                field_tan,
+                tan2,
+                dioptres: 1.0 / point.depth_m,
+                layer: coordinate as usize,
+                is_behind,
+                is_hidden,
+            })
         };
         scene.points.iter().map(of).collect()
     }
 
-    pub(crate) fn is_hidden(&self) -> bool {
-        self.is_hidden
+    /// Whether it lies behind the first surface.
+    pub(crate) fn is_behind(&self) -> bool {
+        self.is_behind
     }
 
-    /// Returns it with what it brings to the projection center, W m⁻² nm⁻¹ on a surface that faces it; `None` where it cannot be seen.
-    pub(crate) fn lit(&self, irradiance: f32, (map, pitch_mm): (&FilmMap, f64)) -> Option<Point> {
-        if self.is_hidden || irradiance <= 0.0 {
+    /// Returns it with its brightness in a band; `None` where it cannot be seen.
+    pub(crate) fn lit(&self, brightness: f32, (map, pitch_mm): (&FilmMap, f64)) -> Option<Point> {
+        if self.is_hidden || brightness <= 0.0 {
             return None;
         }
         let place_mm = map.place_mm(self.field_tan)?;
-        // Radiance times tan² is irradiance over cos³.
-        let per_tan2 = f64::from(irradiance) * (1.0 + self.field_tan.length_squared()).powf(1.5);
-        let light = per_tan2 * map.jacobian_mm(place_mm).determinant().abs() / (pitch_mm * pitch_mm);
+        let light =
+            f64::from(brightness) * self.tan2 * map.jacobian_mm(place_mm).determinant().abs() / (pitch_mm * pitch_mm);
         let Self { dioptres, layer, .. } = *self;
         Some(Point { place_mm, dioptres, layer, width_mm: 0.0, light, is_of_surface: false })
     }
@@ -179,12 +197,8 @@ impl Drawing<'_> {
         let pitch_mm = self.pitch_mm();
         let spread_px = self.lens.spread_mm(place_mm, dioptres, self.wavelength_nm) / pitch_mm;
         let cell_px = 0.25 * (spread_px / QUARTER_BLUR_PX).log2().ceil().max(0.0).exp2();
-        let query = FilmQuery {
-            place_mm,
-            dioptres,
-            wavelength_nm: self.wavelength_nm,
-            pitch_um: cell_px * self.film.pitch_um,
-        };
+        let query =
+            FilmQuery { place_mm, dioptres, wavelength_nm: self.wavelength_nm, pitch_um: cell_px * self.film.pitch_um };
         let width_px = group[0].width_mm / pitch_mm;
         let kernel = Sums::of(&self.lens.kernel(query), cell_px, width_px);
         let radius_px = self.lens.blur_radius_mm(DVec2::ZERO, dioptres, self.middle_nm) / pitch_mm;
@@ -311,8 +325,10 @@ impl Sums {
             .collect();
         let corners_of = |row: i64| -> Vec<f64> {
             let (above, down) = split(pixels.down_px(at.first_row + row) - 0.5, 0, self.rows);
-            let (upper, lower) =
-                (&self.sums[above * self.columns..][..self.columns], &self.sums[(above + 1) * self.columns..][..self.columns]);
+            let (upper, lower) = (
+                &self.sums[above * self.columns..][..self.columns],
+                &self.sums[(above + 1) * self.columns..][..self.columns],
+            );
             let sum_at = |left: usize| upper[left] + down * (lower[left] - upper[left]);
             columns.iter().map(|&(left, across)| sum_at(left) + across * (sum_at(left + 1) - sum_at(left))).collect()
         };

@@ -101,12 +101,7 @@ impl Visible {
     }
 
     /// Takes from what pixels gather of a layer what they do not see of it, `open` being the part of their pupils that layers well before it leave.
-    pub(crate) fn weigh(
-        &self,
-        layer: usize,
-        open: &dyn Fn(usize, usize) -> f32,
-        gathered: &mut Gathered,
-    ) {
+    pub(crate) fn weigh(&self, layer: usize, open: &dyn Fn(usize, usize) -> f32, gathered: &mut Gathered) {
         let told_of_layer = told(self.sight.radius_px()[layer]);
         let Rectangle { first_row, first_column, rows, columns } = gathered.at;
         for row in 0..rows {

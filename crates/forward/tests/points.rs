@@ -2,7 +2,7 @@
 #![expect(clippy::unwrap_used, reason = "a helper of tests fails by panicking")]
 
 use dioptric_forward::{DiscLens, Film, Settings, Source, render};
-use dioptric_scene::{PointLights, PointPlace, View};
+use dioptric_scene::{PointBrightness, PointLight, PointPlace, View};
 use dioptric_spectrum::{DepthMap, Quantity, SpectralImage, WavelengthGrid};
 use ndarray::{Array2, s};
 
@@ -15,11 +15,10 @@ fn lens() -> DiscLens {
     DiscLens { focus_dioptres: 0.5, radius_um_per_dioptre: 8.0, focal_mm: 1.0, ..DiscLens::default() }
 }
 
-fn picture(plane: Array2<f32>, depth_m: Array2<f32>, points: Option<&PointLights>) -> Array2<f64> {
+fn picture(plane: Array2<f32>, depth_m: Array2<f32>, points: &[PointLight]) -> Array2<f64> {
     let (rows, columns) = plane.dim();
     let focal_px = FOCAL_PX * rows as f64 / SIDE as f64;
-    let view =
-        View { focal_px, center_x_px: 0.5 * (columns as f64 - 1.0), center_y_px: 0.5 * (rows as f64 - 1.0) };
+    let view = View { focal_px, center_x_px: 0.5 * (columns as f64 - 1.0), center_y_px: 0.5 * (rows as f64 - 1.0) };
     let grid = WavelengthGrid::new(vec![550.0]).unwrap();
     let radiance = SpectralImage::new(Quantity::Radiance, grid, vec![plane]).unwrap();
     let depth = DepthMap::new(depth_m).unwrap();
@@ -47,9 +46,9 @@ fn light_and_middle(picture: &Array2<f64>, level: f64) -> (f64, [f64; 2]) {
     (sum, [mean(&|at| at.0), mean(&|at| at.1)])
 }
 
-fn star(tan: [f64; 2], depth_m: f64, irradiance: f32) -> PointLights {
-    let place = PointPlace::Field { tan_x: tan[0], tan_y: tan[1], depth_m };
-    PointLights::new(vec![place], Array2::from_elem((1, 1), irradiance)).unwrap()
+fn star(tan: [f64; 2], depth_m: f64, irradiance: f32) -> [PointLight; 1] {
+    let place = PointPlace::Field { tan_x: tan[0], tan_y: tan[1] };
+    [PointLight { place, depth_m, light: PointBrightness::Irradiance(vec![irradiance]) }]
 }
 
 /// Of a scene four times as fine as the film, one bright sample anywhere in a pixel, at any depth.
@@ -61,7 +60,7 @@ fn bright_samples_land_where_they_lie_and_keep_their_light() {
             let mut plane = flat(fine, 0.0);
             let at = (127 + down, 120 + across);
             plane[at] = 1.0;
-            let (light, middle) = light_and_middle(&picture(plane, flat(fine, depth_m), None), 0.0);
+            let (light, middle) = light_and_middle(&picture(plane, flat(fine, depth_m), &[]), 0.0);
             let place = |sample: usize| (sample as f64 - 0.5 * (256.0 - 1.0)) / fine as f64;
             assert!((light * 16.0 - 1.0).abs() < 1e-4, "{light}");
             for (found, expected) in middle.into_iter().zip([place(at.0), place(at.1)]) {
@@ -78,7 +77,7 @@ fn stars_of_a_list_bring_what_they_are_said_to() {
     for tan in [[0.0, 0.0], [0.0101, -0.0053], [0.0032, 0.0148]] {
         for depth_m in [1.0, 0.8] {
             let star = star(tan, depth_m, 3e-6);
-            let found = picture(flat(1, level), flat(1, 50.0), Some(&star));
+            let found = picture(flat(1, level), flat(1, 50.0), &star);
             let (light, middle) = light_and_middle(&found, f64::from(level));
             let cos = 1.0 / (1.0 + tan[0] * tan[0] + tan[1] * tan[1]).sqrt();
             let expected = 3e-6 / cos.powi(3) * FOCAL_PX * FOCAL_PX;
@@ -93,8 +92,8 @@ fn stars_of_a_list_bring_what_they_are_said_to() {
 #[test]
 fn surfaces_hide_points() {
     let at = |tan_x: f64, depth_m: f64| star([tan_x, 0.0], depth_m, 1e-6);
-    let light = |depth_m: &Array2<f32>, star: &PointLights| {
-        picture(flat(1, 0.0), depth_m.clone(), Some(star)).sum() / (1e-6 * FOCAL_PX * FOCAL_PX)
+    let light = |depth_m: &Array2<f32>, star: &[PointLight]| {
+        picture(flat(1, 0.0), depth_m.clone(), star).sum() / (1e-6 * FOCAL_PX * FOCAL_PX)
     };
     let wall = flat(1, 1.5);
     assert!(light(&wall, &at(0.0, 3.0)) < 1e-6);

@@ -6,7 +6,7 @@ use dioptric_spectrum::{DepthMap, Observer, Quantity, SpectralImage, SpectrumErr
 use ndarray::{Array2, s};
 use rayon::prelude::*;
 
-use crate::{PointLights, SceneError, SceneLight, View, resample::resampled};
+use crate::{PointLight, SceneError, SceneLight, View, resample::resampled};
 
 /// How much nearer than the first surface, relatively, a hidden layer may be: half floats carry three digits.
 const HIDDEN_TOLERANCE: f32 = 2e-3;
@@ -25,7 +25,7 @@ pub struct Scene {
     /// What lies behind the first surface, where that is known.
     pub hidden: Option<HiddenLayer>,
     /// Stars and lamps beside its samples.
-    pub points: Option<PointLights>,
+    pub points: Vec<PointLight>,
     /// The light on it, where that is known: what a white balance may go by.
     pub light: Option<SceneLight>,
     /// What was done to its samples to make it, a sentence each: depths filled, bands resampled.
@@ -46,7 +46,16 @@ pub struct HiddenLayer {
 impl Scene {
     /// Returns a scene of radiance alone.
     pub fn new(name: impl Into<String>, radiance: SpectralImage) -> Self {
-        Self { name: name.into(), radiance, depth: None, view: None, hidden: None, points: None, light: None, notes: vec![] }
+        Self {
+            name: name.into(),
+            radiance,
+            depth: None,
+            view: None,
+            hidden: None,
+            points: vec![],
+            light: None,
+            notes: vec![],
+        }
     }
 
     /// The number of rows.
@@ -283,7 +292,11 @@ impl Scene {
             depth: self.depth.clone(),
             view: self.view,
             hidden,
-            points: self.points.as_ref().map(|points| points.resampled(self.radiance.grid(), grid)).transpose()?,
+            points: self
+                .points
+                .iter()
+                .map(|point| point.resampled(self.radiance.grid(), grid))
+                .collect::<Result<_, _>>()?,
             light: self.light.clone(),
             notes: self.notes.clone(),
         })

@@ -139,7 +139,7 @@ impl StillLife {
             depth: Some(depth),
             view: Some(self.view()?),
             hidden: None,
-            points: None,
+            points: vec![],
             light: Some(light()?),
             notes: vec![],
         })
