@@ -59,8 +59,6 @@ pub(crate) struct Imaging {
     visible: Option<Visible>,
     /// The points beside the scene; `None` where no film point looks.
     points: Vec<Option<Beside>>,
-    /// The wavelength at which rays are drawn, nm.
-    middle_nm: f64,
     kept: Mutex<Kept>,
     halos: Halos,
     /// The largest that the kernels of a band have been, bytes.
@@ -123,7 +121,6 @@ impl Imaging {
             reach_mm,
             visible,
             points,
-            middle_nm,
             kept: Mutex::new(kept),
             halos,
             // Those of the middle band tell how much memory kernels take.
@@ -282,7 +279,6 @@ impl Imaging {
             lens,
             film: &self.spec.film,
             wavelength_nm: self.spec.grid.centers_nm()[band],
-            middle_nm: self.middle_nm,
             visible: self.visible.as_ref(),
             hides: self.scene.hides,
         };
@@ -309,8 +305,12 @@ impl Imaging {
         let [(of_scene, _), (beside, _)] = brought;
         let mut picture = picture.finish();
         picture.iter_mut().zip(of_scene).for_each(|(sum, light)| *sum += light);
-        let lit = self.stopwatch.time(Part::Compositing, || self.lit(picture, &beside, &map));
-        Ok(self.stopwatch.time(Part::Compositing, || self.halos.applied(band, lit)))
+        Ok(self.stopwatch.time(Part::Compositing, || {
+            // What a pixel sees is spread before it is lit: an even scene stays even.
+            let picture = self.halos.applied(band, picture);
+            let beside = (!beside.is_empty()).then(|| Array2::from_shape_vec((rows, columns), beside).ok()).flatten();
+            self.lit(picture, beside.map(|beside| self.halos.applied(band, beside)), &map)
+        }))
     }
 
     /// Lays what the tiles of a layer gather behind a picture.
@@ -368,8 +368,8 @@ impl Imaging {
     }
 
     /// Returns a picture of radiance as irradiance: times that of a uniform scene of radiance 1. Film points that look beyond the scene see but what shines
-    /// `beside` it, which is empty or row by row.
-    fn lit(&self, mut picture: Array2<f32>, beside: &[f32], map: &FilmMap) -> Array2<f32> {
+    /// `beside` it.
+    fn lit(&self, mut picture: Array2<f32>, beside: Option<Array2<f32>>, map: &FilmMap) -> Array2<f32> {
         let raster = Raster::new(&self.spec.film, Level::PIXEL);
         let Rectangle { first_row, first_column, columns, .. } = film_pixels(&self.spec.film);
         let x_mm: Vec<f64> = (0..columns as i64).map(|column| raster.x_mm((first_column + column) as f64)).collect();
@@ -388,7 +388,7 @@ impl Imaging {
                 } else {
                     1.0
                 };
-                *sample = *sample * seen_part + beside.get(row * columns + i).unwrap_or(&0.0);
+                *sample = *sample * seen_part + beside.as_ref().map_or(0.0, |beside| beside[(row, i)]);
                 *sample *= if gain.is_nan() { 0.0 } else { gain as f32 };
             }
         });

@@ -132,8 +132,6 @@ pub(crate) struct Drawing<'a> {
     pub(crate) lens: &'a dyn LensImage,
     pub(crate) film: &'a Film,
     pub(crate) wavelength_nm: f64,
-    /// At which blur radii are as rays have them.
-    pub(crate) middle_nm: f64,
     pub(crate) visible: Option<&'a Visible>,
     /// Whether layers hide those behind them.
     pub(crate) hides: bool,
@@ -171,7 +169,7 @@ impl Drawing<'_> {
     /// Returns points that share a kernel.
     fn groups<'p>(&self, points: &'p [Point]) -> Vec<Vec<&'p Point>> {
         let radius_px =
-            |dioptres: f64| self.lens.blur_radius_mm(DVec2::ZERO, dioptres, self.middle_nm) / self.pitch_mm();
+            |dioptres: f64| self.lens.blur_radius_mm(DVec2::ZERO, dioptres, self.wavelength_nm) / self.pitch_mm();
         let per_dioptre = radius_px(1.0) - radius_px(0.0);
         let mut apart_px = APART_PX;
         loop {
@@ -201,7 +199,6 @@ impl Drawing<'_> {
             FilmQuery { place_mm, dioptres, wavelength_nm: self.wavelength_nm, pitch_um: cell_px * self.film.pitch_um };
         let width_px = group[0].width_mm / pitch_mm;
         let kernel = Sums::of(&self.lens.kernel(query), cell_px, width_px);
-        let radius_px = self.lens.blur_radius_mm(DVec2::ZERO, dioptres, self.middle_nm) / pitch_mm;
 
         let pixels = Raster::new(self.film, Level::PIXEL);
         let place_px = |point: &Point| [-point.place_mm.y, point.place_mm.x].map(|mm| mm / pitch_mm);
@@ -213,7 +210,7 @@ impl Drawing<'_> {
             let Some(reached) = kernel.reached(place, &pixels).intersection(film) else { continue };
             let seen = SeenPoint {
                 layer: point.layer,
-                radius_px: radius_px as f32,
+                dioptres,
                 place_px: (place[0] as f32, place[1] as f32),
                 width_px: width_px as f32,
             };

@@ -46,9 +46,9 @@ enum Parts<'a> {
 
 /// A point that shines, as the pixels around it see it.
 pub(crate) struct SeenPoint {
-    /// The layer that it lies in or behind, and its blur radius with its sign, pixels.
+    /// The layer that it lies in or behind, and its depth.
     pub(crate) layer: usize,
-    pub(crate) radius_px: f32,
+    pub(crate) dioptres: f64,
     /// Pixels below and to the right of the film's middle, and how wide it is, pixels.
     pub(crate) place_px: (f32, f32),
     pub(crate) width_px: f32,
@@ -102,7 +102,6 @@ impl Visible {
 
     /// Takes from what pixels gather of a layer what they do not see of it, `open` being the part of their pupils that layers well before it leave.
     pub(crate) fn weigh(&self, layer: usize, open: &dyn Fn(usize, usize) -> f32, gathered: &mut Gathered) {
-        let told_of_layer = told(self.sight.radius_px()[layer]);
         let Rectangle { first_row, first_column, rows, columns } = gathered.at;
         for row in 0..rows {
             let mut column = 0;
@@ -115,6 +114,7 @@ impl Visible {
                     continue;
                 };
                 let parts = block.of_layer(layer);
+                let told_of_layer = told(self.sight.radius_px(layer, pixel));
                 for column in column..end {
                     let (index, pixel) = (row * columns + column, (pixel.0, first_column + column as i64));
                     if gathered.alpha[index] <= 0.0 {
@@ -145,7 +145,8 @@ impl Visible {
     /// Returns the part of a point's light that reaches a pixel, `open` being the part that layers well before the point leave of the pixel's pupil.
     pub(crate) fn part_of_point(&self, point: &SeenPoint, pixel: (i64, i64), open: f32) -> f32 {
         let most_px = self.sight.near_edges(pixel).most_px;
-        let told = told(point.radius_px).min(told(most_px)).clamp(0.0, 1.0);
+        let radius_px = self.sight.radius_px_of(point.dioptres, pixel);
+        let told = told(radius_px).min(told(most_px)).clamp(0.0, 1.0);
         let block = self.blocks.get(&(pixel.0.div_euclid(BLOCK), pixel.1.div_euclid(BLOCK)));
         let Some(BlockParts { met, .. }) = block.filter(|_| told > 0.0 && open > NEGLIGIBLE_PART) else { return open };
         let from = self.sight.place_px(pixel);
@@ -155,7 +156,7 @@ impl Visible {
             let down = point.place_px.0 - from.0 + within(ray / TO_POINT);
             let across = point.place_px.1 - from.1 + within(ray % TO_POINT);
             // What aberrations and pixels put beyond the disc came through its rim.
-            let scale = (point.radius_px.abs() / down.hypot(across).max(1e-6)).min(1.0) / point.radius_px;
+            let scale = (radius_px.abs() / down.hypot(across).max(1e-6)).min(1.0) / radius_px;
             self.sight.reaches(point.layer, met, from, (scale * down, scale * across))
         });
         open + told * (reach.count() as f32 / (TO_POINT * TO_POINT) as f32 - open)
