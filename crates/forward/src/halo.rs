@@ -11,7 +11,12 @@ use multiversion::multiversion;
 use ndarray::Array2;
 use rayon::prelude::*;
 
-use crate::{Film, layers::Layers};
+use crate::{
+    Film,
+    layers::Layers,
+    points::Point,
+    surroundings::{Surroundings, beside},
+};
 
 /// A share of the light beyond the window that is not worth spreading: kernels leave out as little on each side.
 const NEGLIGIBLE: f64 = 1e-6;
@@ -125,15 +130,21 @@ impl Halos {
             let ((lower, below), (upper, above)) = (known.range(..=band).next_back()?, known.range(band..).next()?);
             let fraction = (band - lower) as f64 / (upper - lower).max(1) as f64;
             let beyond = Beyond::between(*below, *above, fraction);
-            (beyond.share > NEGLIGIBLE).then(|| Halo::new(beyond, (film.rows, film.columns)))
+            let (rows, columns) = (film.rows + 2 * beside(film), film.columns + 2 * beside(film));
+            (beyond.share > NEGLIGIBLE).then(|| Halo::new(beyond, (rows, columns)))
         };
         Self { of_bands: (0..n_bands).into_par_iter().map(halo).collect() }
     }
 
-    /// Returns the picture of a band with the halos of its points, if any light lies beyond its windows.
-    pub(crate) fn applied(&self, band: usize, picture: Array2<f32>) -> Array2<f32> {
+    /// Returns the picture of a band with the halos of its points and of what lies around it, if any light lies beyond its windows.
+    pub(crate) fn applied(
+        &self,
+        band: usize,
+        picture: Array2<f32>,
+        (surroundings, radiance, points): (&Surroundings<'_>, &[f32], &[Point]),
+    ) -> Array2<f32> {
         match self.of_bands.get(band) {
-            Some(Some(halo)) => halo.applied(picture),
+            Some(Some(halo)) => surroundings.with(&picture, (radiance, points), |wide| halo.applied(wide)),
             _ => picture,
         }
     }

@@ -28,6 +28,7 @@ use crate::{
     sight::Sight,
     stopwatch::{Part, Stopwatch},
     surface::{LayerCoordinates, Surface},
+    surroundings::Surroundings,
     tile::{TileGroup, film_pixels},
     tiling::{LayeredLens, Rule, Tiling, reach_px},
     visible::Visible,
@@ -302,14 +303,17 @@ impl Imaging {
             self.lay(&task, &tiles.groups, &mut picture)?;
             work.advance(tiles.groups.len() as u64 * GROUP_UNITS);
         }
-        let [(of_scene, _), (beside, _)] = brought;
+        let [(of_scene, lamps), (beside, points)] = brought;
         let mut picture = picture.finish();
         picture.iter_mut().zip(of_scene).for_each(|(sum, light)| *sum += light);
         Ok(self.stopwatch.time(Part::Compositing, || {
             // What a pixel sees is spread before it is lit: an even scene stays even.
-            let picture = self.halos.applied(band, picture);
+            let around = Surroundings { film: &self.spec.film, scene: &self.raster, map: &map };
+            let front = front.as_slice().unwrap_or_default();
+            let picture = self.halos.applied(band, picture, (&around, front, &lamps));
             let beside = (!beside.is_empty()).then(|| Array2::from_shape_vec((rows, columns), beside).ok()).flatten();
-            self.lit(picture, beside.map(|beside| self.halos.applied(band, beside)), &map)
+            let spread = |beside| self.halos.applied(band, beside, (&around, &[], &points));
+            self.lit(picture, beside.map(spread), &map)
         }))
     }
 

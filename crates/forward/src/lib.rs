@@ -44,6 +44,7 @@ mod source;
 mod spec;
 mod stopwatch;
 mod surface;
+mod surroundings;
 mod symmetry;
 mod tile;
 mod tiling;

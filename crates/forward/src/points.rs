@@ -112,6 +112,16 @@ impl Beside {
 }
 
 impl Point {
+    /// Returns how far below and to the right of the film's middle it lies, in pixels of a pitch.
+    pub(crate) fn place_px(&self, pitch_mm: f64) -> [f64; 2] {
+        [-self.place_mm.y, self.place_mm.x].map(|mm| mm / pitch_mm)
+    }
+
+    /// Its radiance times the area of film that sees it, in pixels.
+    pub(crate) fn light(&self) -> f64 {
+        self.light
+    }
+
     /// Returns a lamp among the samples of a scene, at a depth, on the first surface or behind it.
     pub(crate) fn of_lamp(
         lamp: &Lamp,
@@ -201,12 +211,12 @@ impl Drawing<'_> {
         let kernel = Sums::of(&self.lens.kernel(query), cell_px, width_px);
 
         let pixels = Raster::new(self.film, Level::PIXEL);
-        let place_px = |point: &Point| [-point.place_mm.y, point.place_mm.x].map(|mm| mm / pitch_mm);
-        let reached = group.iter().filter_map(|point| kernel.reached(place_px(point), &pixels).intersection(film));
+        let reached =
+            group.iter().filter_map(|point| kernel.reached(point.place_px(pitch_mm), &pixels).intersection(film));
         let at = Rectangle::around(reached)?;
         let mut light = vec![0.0; at.len()];
         for point in group {
-            let place = place_px(point);
+            let place = point.place_px(pitch_mm);
             let Some(reached) = kernel.reached(place, &pixels).intersection(film) else { continue };
             let seen = SeenPoint {
                 layer: point.layer,
