@@ -322,6 +322,7 @@ fn data_sheet(bench: &Bench) -> NoiseDataSheet {
     let step_v = sensor.adc.step_v(sensor.swing_v).unwrap_or(1.0);
     let dark_e_per_s = sensor.dark_current.at(exposure.temperature_c);
     let read_e = sensor.read_noise_v(exposure.gain_mode).hypot(sensor.row_noise_v) / gain_v_per_e;
+    let read_e = read_e.hypot(sensor.telegraph.rms_e(sensor.correlated_double_sampling));
     let [iso_40, iso_10] = ISO_SNR.map(|snr| sensor.iso_by_noise(&ISO_LIGHT, &exposure, snr));
     NoiseDataSheet {
         gain_dn_per_e: gain_v_per_e * exposure.analog_gain / step_v,
