@@ -327,7 +327,7 @@ pub(crate) struct FrameArgs {
     /// most .05 %) or uncompressed [default: single]
     #[arg(long, value_name = "KIND", help_heading = heading::RESULTS)]
     pub(crate) exr_samples: Option<ExrSamples>,
-    /// Switches noise on: all, none, or a list of photon, dark-current, read, reset, row, prnu, dsnu, column, defects;
+    /// Switches noise on: all, none, or a list of photon, dark-current, read, reset, row, prnu, dsnu, column, defects, telegraph;
     /// all,-NAME leaves one out [default: all]
     #[arg(long, value_name = "LIST", help_heading = heading::EXPOSURE)]
     pub(crate) noise: Option<String>,
