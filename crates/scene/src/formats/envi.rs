@@ -17,7 +17,7 @@ use super::{
     reading::{FileQuantity, NoData, light_unit},
     reduced::reduced_size,
     stated::{name_of, note_of, short},
-    unusable::unreadable,
+    unusable::{starts_with, unreadable},
 };
 use crate::{SceneError, resample::resampling_weights};
 
@@ -77,6 +77,19 @@ pub fn envi_bytes(path: &Path) -> Option<u64> {
     Some(fs::metadata(data_file(&header, &mut vec![]).ok()?).ok()?.len())
 }
 
+/// Returns the rows and columns that an ENVI header states; `None` where it is none.
+pub(super) fn envi_size(header_path: &Path) -> Option<(usize, usize)> {
+    let header = envi_header::parse(header_path, &header_text(header_path).ok()?).ok()?;
+    Some((header.rows, header.columns))
+}
+
+fn header_text(header_path: &Path) -> Result<String, SceneError> {
+    let mut bytes = Vec::new();
+    let file = File::open(header_path).map_err(|error| unreadable(header_path, error))?;
+    file.take(LIMIT_HEADER_BYTES).read_to_end(&mut bytes).map_err(|error| unreadable(header_path, error))?;
+    Ok(String::from_utf8_lossy(&bytes).into_owned())
+}
+
 /// Returns the header that belongs to a file: itself, or `a.raw.hdr` or `a.hdr` for `a.raw`.
 pub(super) fn header_of(path: &Path) -> Option<PathBuf> {
     let appended = |ending: &str| {
@@ -85,16 +98,15 @@ pub(super) fn header_of(path: &Path) -> Option<PathBuf> {
         PathBuf::from(name)
     };
     let candidates = [appended(".hdr"), path.with_extension("hdr"), appended(".HDR"), path.with_extension("HDR")];
-    candidates.into_iter().find(|header| header != path && header.is_file())
+    // Radiance pictures have the same ending.
+    let is_radiance = |header: &PathBuf| starts_with(header, b"#?").unwrap_or(false);
+    candidates.into_iter().find(|header| header != path && header.is_file() && !is_radiance(header))
 }
 
 impl EnviFile {
     /// Reads the header and finds the file of numbers. Bands whose wavelengths nothing states are those wanted, where there are as many.
     fn open(header_path: &Path, told_nm: Option<&[f64]>, wanted_nm: Option<&[f64]>) -> Result<Self, SceneError> {
-        let mut bytes = Vec::new();
-        let file = File::open(header_path).map_err(|error| unreadable(header_path, error))?;
-        file.take(LIMIT_HEADER_BYTES).read_to_end(&mut bytes).map_err(|error| unreadable(header_path, error))?;
-        let mut header = envi_header::parse(header_path, &String::from_utf8_lossy(&bytes))?;
+        let mut header = envi_header::parse(header_path, &header_text(header_path)?)?;
         let mut notes: Vec<String> = header.note.take().into_iter().collect();
         let wrong = |key: &str, reason: String| SceneError::Header {
             file: header_path.to_owned(),
@@ -107,7 +119,7 @@ impl EnviFile {
                 if own.as_ref().is_some_and(|own| own != told) {
                     return Err(wrong(
                         "wavelength",
-                        "the header has it: --wavelengths-nm says something else".to_owned(),
+                        "the header has it: --scene-wavelengths-nm says something else".to_owned(),
                     ));
                 }
                 told.to_vec()
@@ -117,7 +129,7 @@ impl EnviFile {
                 Some(wanted) => wanted.to_vec(),
                 None => {
                     let reason = format!(
-                        "the header lacks it: expected it there, or --wavelengths-nm, {} numbers",
+                        "the header lacks it: expected it there, or --scene-wavelengths-nm, {} numbers",
                         header.bands
                     );
                     return Err(wrong("wavelength", reason));

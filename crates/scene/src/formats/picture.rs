@@ -21,7 +21,7 @@ const AT_ONCE: usize = 1 << 13;
 /// What a pixel takes as codes of 16 bits while it is lifted to bands, bytes.
 const CODES_BYTES: u64 = 6;
 /// A color is beyond the display's gamut where it has less of a primary than this share of white below 0.
-const BEYOND: f64 = 0.01;
+pub(super) const BEYOND: f64 = 0.01;
 /// What a pixel takes as planes of single floats beside its codes, bytes.
 const SAMPLES_BYTES: u64 = 15;
 
@@ -222,7 +222,7 @@ fn stated_colors(path: &Path) -> Result<Option<StatedColors>, SceneError> {
 }
 
 /// Returns the orientation that a picture states.
-fn orientation_of(path: &Path) -> Orientation {
+pub(super) fn orientation_of(path: &Path) -> Orientation {
     let reader = image::ImageReader::open(path).ok().and_then(|reader| reader.with_guessed_format().ok());
     let decoder = reader.and_then(|reader| reader.into_decoder().ok());
     decoder.and_then(|mut decoder| decoder.orientation().ok()).unwrap_or(Orientation::NoTransforms)

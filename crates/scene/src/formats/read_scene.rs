@@ -1,10 +1,6 @@
 //! Any file of a scene, by its name and its first bytes.
 
-use std::{
-    fs::File,
-    io::Read,
-    path::{Path, PathBuf},
-};
+use std::path::{Path, PathBuf};
 
 use dioptric_spectrum::{DepthMap, Quantity, SpectralImage, SpectrumError, WavelengthGrid};
 use ndarray::Array2;
@@ -13,7 +9,8 @@ use super::{
     band_folder::band_folder,
     camera::CameraData,
     chart_table::read_chart,
-    contents::{Contents, Cube, Heeds, Image, pad_spectral, straightened, straightened_depth},
+    contents::{Contents, Cube, Heeds, Image, is_of, pad_spectral, straightened, straightened_depth},
+    cube_folder::CubeFolder,
     depth::{depth_beside, files_beside, likely_beside, read_depth},
     envi::{contents_of_envi, header_of},
     lighting::lit,
@@ -25,6 +22,7 @@ use super::{
     pfm::read_pfm,
     picture::{Oriented, oriented, picture_size_of},
     primaries::into_srgb,
+    radiance_header::RadianceHeader,
     raw_depth::{DepthWords, RawDepth},
     read_options::ReadOptions,
     reading::{DepthKind, FileQuantity, FileReading, Frame, light_unit},
@@ -34,7 +32,7 @@ use super::{
     tiff_file::{TiffFile, read_tiff},
     understood::{self, Sources, bands},
     unmeasured::{self, FillDepth},
-    unusable::unreadable,
+    unusable::{starts_with, unreadable},
 };
 use crate::{HiddenLayer, Scene, SceneError, View};
 
@@ -102,6 +100,9 @@ fn behind(file: &Path, mut z_m: Array2<f32>, first: Option<&DepthMap>) -> Result
 
 fn contents_of(path: &Path, options: &ReadOptions) -> Result<Contents, SceneError> {
     if path.is_dir() {
+        if let Some(cube) = CubeFolder::find(path) {
+            return cube.read(path, |face| contents_of(face, options));
+        }
         return band_folder(path, options.reading.wavelengths_nm.as_deref())?.into_contents(path, options);
     }
     if !path.exists() {
@@ -128,13 +129,6 @@ fn contents_of(path: &Path, options: &ReadOptions) -> Result<Contents, SceneErro
     }
 }
 
-fn starts_with(path: &Path, start: &[u8]) -> Result<bool, SceneError> {
-    let mut bytes = vec![];
-    let file = File::open(path).map_err(|error| unreadable(path, error))?;
-    file.take(start.len() as u64).read_to_end(&mut bytes).map_err(|error| unreadable(path, error))?;
-    Ok(bytes == start)
-}
-
 /// An ordinary picture: what a display shows, or linear colors where it has floats.
 fn of_picture(path: &Path, options: &ReadOptions, mut notes: Vec<String>) -> Result<Contents, SceneError> {
     let (columns, rows) = picture_size_of(path)?;
@@ -156,6 +150,9 @@ fn of_picture(path: &Path, options: &ReadOptions, mut notes: Vec<String>) -> Res
             let mut planes = [plane(0), plane(1), plane(2)];
             if let Some(colors) = &colors {
                 into_srgb(&mut planes, &colors.to_srgb);
+            }
+            if is_of(path, &["hdr"]) {
+                notes.extend(RadianceHeader::read(path)?.apply(path, &mut planes)?);
             }
             return Ok(linear(planes, None, notes));
         }
@@ -206,7 +203,9 @@ fn of_npy(path: &Path, options: &ReadOptions) -> Result<Contents, SceneError> {
     let at = |index: usize| array.values[index];
     let planes = super::axes::planes(&array.sides, options.reading.axes.as_deref(), n_bands, true, at)
         .map_err(|reason| unreadable(path, reason))?;
-    Cube { planes, top: array.top, wavelengths_nm: None, quantity: None, notes: vec![] }.into_contents(path, options)
+    let note = super::axes::note(&array.sides, options.reading.axes.as_deref(), n_bands);
+    let notes = note.map(|note| format!("{}: {note}", name_of(path))).into_iter().collect();
+    Cube { planes, top: array.top, wavelengths_nm: None, quantity: None, notes }.into_contents(path, options)
 }
 
 fn of_exr(path: &Path, options: &ReadOptions) -> Result<Contents, SceneError> {
@@ -264,6 +263,7 @@ fn of_exr(path: &Path, options: &ReadOptions) -> Result<Contents, SceneError> {
 fn of_mat(path: &Path, options: &ReadOptions) -> Result<Contents, SceneError> {
     let scene = match read_mat(path, &options.reading)? {
         MatScene::Cube(cube) => return cube.into_contents(path, options),
+        MatScene::Linear(planes, notes) => return Ok(linear(planes, None, notes)),
         MatScene::Iset(scene) => scene,
     };
     let (rows, columns) = (scene.image.rows(), scene.image.columns());
