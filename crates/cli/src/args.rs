@@ -215,6 +215,9 @@ pub(crate) struct RunArgs {
     /// Scales the radiance to this mean luminance, cd/m²
     #[arg(long, alias = "mean-luminance", value_name = "L", help_heading = heading::SCENE)]
     pub(crate) mean_luminance_cd_m2: Option<f64>,
+    /// Scales the light of the scene so that the film gets this illuminance on average, lux
+    #[arg(long, value_name = "LUX", conflicts_with = "mean_luminance_cd_m2", help_heading = heading::SCENE)]
+    pub(crate) mean_lux: Option<f64>,
     /// Light that is on a scene of radiance whose file does not state it, as --illuminant has it
     #[arg(long, value_name = "LIGHT", help_heading = heading::SCENE)]
     pub(crate) scene_light: Option<String>,
@@ -484,7 +487,7 @@ pub(crate) enum PsfMode {
 /// A sensor to expose.
 #[derive(Debug, Args)]
 pub(crate) struct SenseArgs {
-    /// Spectral irradiance, EXR
+    /// Spectral irradiance: EXR, or an optical image of `ISETCam` (.mat)
     pub(crate) irradiance: PathBuf,
     /// Sensor, a file or the name of a built-in one
     #[arg(long, value_name = "SENSOR", help_heading = heading::FILM)]

@@ -14,6 +14,7 @@ mod develop;
 pub mod display;
 mod error;
 pub mod figures;
+mod film_files;
 mod frame_files;
 mod json;
 mod keys;
@@ -54,6 +55,7 @@ pub use capture_files::{irradiance_files, write_capture, write_frames_and_depth,
 pub use develop::DevelopedFile;
 pub use dioptric_files::Staged;
 pub use error::{PipelineError, SceneLack};
+pub use film_files::convert_irradiance;
 pub use frame_files::{FrameFile, Frames, LensFacts, Outputs, picture_png, write_frames};
 pub use json::{write_file, write_json};
 pub use keys::{Key, PICTURE, PictureOptions, light_word, white_word};

@@ -62,7 +62,7 @@ const RANGES: &[(Range, &[&str])] = &[
     (of(0.0, 270.0, "degrees"), &["rotate_deg"]),
     (of(1e-6, 1e6, "m"), &["baseline_m"]),
     (of(-1e6, 1e6, "samples"), &["offset_px"]),
-    (of(1e-9, 1e9, "lux"), &["illuminance_lux"]),
+    (of(1e-9, 1e9, "lux"), &["illuminance_lux", "mean_lux"]),
     (of(1e-9, 1e9, "cd/m²"), &["mean_luminance_cd_m2", "white_cd_m2"]),
     (of(1e-9, 1e9, "m"), &["unit_m"]),
     (of(-1e9, 1e9, "m"), &["eye_m", "look_at_m", "at_m"]),

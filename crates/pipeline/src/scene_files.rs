@@ -96,8 +96,7 @@ impl SceneRequest {
     pub fn convert(&self, output: &Path, samples: Option<ExrSamples>) -> Result<SceneInfo, PipelineError> {
         let is_mat = output.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("mat"));
         if is_mat && samples.is_some() {
-            let reason = format!("{} is no EXR file, expected it without --exr-samples", output.display());
-            return Err(PipelineError::Unsuitable { what: "samples of an EXR file", reason });
+            return Err(no_exr_samples(output));
         }
         let scene = self.open()?;
         if is_mat {
@@ -107,6 +106,11 @@ impl SceneRequest {
         }
         Ok(SceneInfo::of(&scene))
     }
+}
+
+pub(crate) fn no_exr_samples(output: &Path) -> PipelineError {
+    let reason = format!("{} is no EXR file, expected it without --exr-samples", output.display());
+    PipelineError::Unsuitable { what: "samples of an EXR file", reason }
 }
 
 impl SceneInfo {

@@ -45,6 +45,11 @@ impl KeptCamera {
     pub fn world_render(&self, progress: &dyn Progress, cancel: &Cancel) -> Result<WorldRender, PipelineError> {
         self.camera.validate()?;
         let inputs = self.irradiance_inputs()?;
+        if inputs.mean_lux.is_some() {
+            let reason = "is of a picture that 'run' takes: rays that are added up bring the light that the world has"
+                .to_owned();
+            return Err(PipelineError::Unsuitable { what: "mean_lux", reason });
+        }
         let chain = self.chain(progress, cancel);
         let resolved = chain.scene(&inputs.scene)?;
         let lens = chain.lens(&inputs.plan.bank.film.lens)?;

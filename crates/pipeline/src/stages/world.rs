@@ -178,7 +178,9 @@ pub(super) fn view(
         Some(stated) => Some(SceneLight { illuminant: stated.clone(), illuminance_lux: None }),
         None => light_on(world, &pinhole)?,
     };
-    let scene = Scene { depth: Some(depth), view: Some(view), hidden, light, ..Scene::new(name, radiance) };
+    let (first_nm, last_nm) = radiance.grid().range_nm();
+    let notes = world.note_on_bands(first_nm, last_nm).map(|note| format!("{name}: {note}")).into_iter().collect();
+    let scene = Scene { depth: Some(depth), view: Some(view), hidden, light, notes, ..Scene::new(name, radiance) };
     Ok(ResolvedScene { scene, binning })
 }
 

@@ -155,6 +155,7 @@ const PANELS: &[(&str, &[&str])] = &[
     ("illuminance", &["SceneSpec.illuminance_lux"]),
     ("light", &["SceneSpec.illuminant", "Illuminant"]),
     ("mean luminance", &["SceneSpec.mean_luminance_cd_m2"]),
+    ("mean on the film", &["SceneSpec.mean_lux"]),
     ("flat, by its size", &["SceneSpec.flat"]),
     ("flat width", &["FlatSize.width_mm"]),
     ("flat distance", &["FlatSize.distance_mm"]),
