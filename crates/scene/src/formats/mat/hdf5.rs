@@ -229,7 +229,7 @@ fn numbers_of(dataset: &Dataset) -> Result<Vec<u8>, String> {
 }
 
 fn broken(error: hdf5_pure::Error) -> String {
-    let way = "expected one that older programs read as well (h5repack --high=V18)";
+    let way = "expected one without links, which older programs read as well (h5repack --high=V18)";
     format!("it is HDF5 that cannot be read ({error}): {way}")
 }
 
