@@ -208,6 +208,7 @@ const TEXT: &[(&str, &str)] = &[
     ("CameraTurn", "as above"),
     ("Processing.perspective", "eight numbers, which are read off the picture"),
     ("Perspective", "as above"),
+    ("SceneSpec.points", "a table of points in a file of its own, named in the text of the camera file"),
     ("SceneSpec.reading", "what a file does not state itself, said once in the text of the camera file"),
     ("FileReading", "as above"),
     ("DepthKind", "as above"),
