@@ -540,7 +540,8 @@ mod tests {
         let head = "ENVI\nsamples = 200000\nlines = 100000\nbands = 31\ndata type = 12\ninterleave = bil\n";
         std::fs::write(&path, head).unwrap();
         std::fs::write(path.with_extension("raw"), "").unwrap();
-        let scene = ["--scene", path.to_str().unwrap(), "--fov-deg", "40", "--depth-m", "1000", "--lens", "pinhole:0.2mm"];
+        let scene =
+            ["--scene", path.to_str().unwrap(), "--fov-deg", "40", "--depth-m", "1000", "--lens", "pinhole:0.2mm"];
         let more = ["--film-mm", "10", "--pixels", "320x320"];
         let FilmSpec::Pixels { columns, rows, pitch_um } = camera(&[&scene[..], &more].concat()).film else {
             panic!("a film of no size")

@@ -190,7 +190,7 @@ fn half_order(kind: &Datatype) -> Option<DatatypeByteOrder> {
     };
     match kind {
         Datatype::FloatingPoint { size: 2, byte_order, layout } if *layout == HALF => {
-            Some(byte_order.clone()).filter(|order| !matches!(order, DatatypeByteOrder::Vax))
+            Some(*byte_order).filter(|order| !matches!(order, DatatypeByteOrder::Vax))
         }
         _ => None,
     }
