@@ -164,6 +164,7 @@ const PANELS: &[(&str, &[&str])] = &[
     ("missing depth", &["SceneSpec.fill_depth"]),
     ("filled depth", &["FillDepth.Metres"]),
     ("hidden file", &["SceneSpec.hidden"]),
+    ("points file", &["SceneSpec.points"]),
     ("method", &["WorldSpec.method"]),
     ("until", &["WorldSpec.effort"]),
     ("samples", &["RenderEffort.Samples"]),
@@ -320,6 +321,7 @@ fn everything(camera: &mut Camera) {
 fn otherwise(camera: &mut Camera) {
     camera.dual_pixel = Some(DualPixelSpec::of(Photodiodes::LeftRight));
     camera.focus = FocusSpec::FilmMm(50.0);
+    camera.scene.mean_lux = Some(10.0);
     camera.wavelengths = WavelengthSpec::ListNm(vec![450.0, 550.0]);
     camera.frames = FramesSpec::BracketStops(vec![-1.0, 0.0]);
     camera.exposure = with_exposure_s(camera.exposure, 0.01);

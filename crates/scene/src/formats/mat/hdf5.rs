@@ -190,7 +190,7 @@ fn half_order(kind: &Datatype) -> Option<DatatypeByteOrder> {
     };
     match kind {
         Datatype::FloatingPoint { size: 2, byte_order, layout } if *layout == HALF => {
-            Some(byte_order.clone()).filter(|order| !matches!(order, DatatypeByteOrder::Vax))
+            Some(*byte_order).filter(|order| !matches!(order, DatatypeByteOrder::Vax))
         }
         _ => None,
     }
@@ -229,7 +229,7 @@ fn numbers_of(dataset: &Dataset) -> Result<Vec<u8>, String> {
 }
 
 fn broken(error: hdf5_pure::Error) -> String {
-    let way = "expected one that older programs read as well (h5repack --high=V18)";
+    let way = "expected one without links, which older programs read as well (h5repack --high=V18)";
     format!("it is HDF5 that cannot be read ({error}): {way}")
 }
 
