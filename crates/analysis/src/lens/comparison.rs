@@ -150,7 +150,8 @@ mod tests {
         };
         let analyses = [&lens, &larger].map(|lens| request.compute(lens).unwrap());
         let curves = [0, 1].map(|i| analyses[i].lens_curves([&lens, &larger][i]).unwrap());
-        let one = |i: usize| ComparedLens { lens: [&lens, &larger][i], analysis: &analyses[i], curves: Some(&curves[i]) };
+        let one =
+            |i: usize| ComparedLens { lens: [&lens, &larger][i], analysis: &analyses[i], curves: Some(&curves[i]) };
         let comparison = LensComparison::of([one(0), one(1)]);
         let ratio = |quantity: &str| {
             let row = comparison.rows.iter().find(|row| row.quantity == quantity).unwrap();
