@@ -10,7 +10,7 @@ impl LensFile {
     /// # Errors
     /// Those of [`Lens::scaled`].
     pub fn scaled(mut self, factor: f64) -> Result<Self, OpticsError> {
-        let LensFile { lens, film_distance_mm, object_distance_mm, fields, configurations, microlens, .. } = &mut self;
+        let Self { lens, film_distance_mm, object_distance_mm, fields, configurations, microlens, .. } = &mut self;
         scale((lens, film_distance_mm, object_distance_mm, fields), factor)?;
         for Configuration { lens, film_distance_mm, object_distance_mm, fields, .. } in configurations {
             scale((lens, film_distance_mm, object_distance_mm, fields), factor)?;

@@ -133,7 +133,8 @@ impl PupilBoundary {
     fn area_change(&self) -> f64 {
         let n = self.rho_mm.len();
         let squares = |every: usize| self.rho_mm.iter().step_by(every).map(|rho| rho * rho).sum::<f64>() * every as f64;
-        let change = |every: usize| if n % every == 0 { (squares(every) / squares(1) - 1.0).abs() } else { 0.0 };
+        let change =
+            |every: usize| if n.is_multiple_of(every) { (squares(every) / squares(1) - 1.0).abs() } else { 0.0 };
         change(2).max(0.25 * change(4))
     }
 }
