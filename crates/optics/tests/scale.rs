@@ -39,7 +39,7 @@ fn trace(lens: &Lens, factor: f64) -> RayBatch {
     let starts: Vec<DVec3> = places.iter().map(|&(x, y)| DVec3::new(x, y, -10.0) * factor).collect();
     let direction = ObjectPoint::far(0.05, DVec2::new(0.6, 0.8)).direction_to(DVec3::ZERO);
     let mut rays = RayBatch::from_points(&starts, &vec![direction; starts.len()]);
-    lens.at(550.0).unwrap().trace_to_film(&mut rays, Vignetting::On, 60.0 * factor);
+    lens.at(550.0).expect("media that are known").trace_to_film(&mut rays, Vignetting::On, 60.0 * factor);
     rays
 }
 

@@ -163,7 +163,6 @@ impl Lens {
     ///     How many times as large the lens is as the file has it, in all its lengths.
     #[staticmethod]
     #[pyo3(signature = (path, *, glasses=None, missing_glass="refuse", glass_range="refuse", slope_per_nm=None, configuration=None, lens_scale=None))]
-    #[expect(clippy::too_many_arguments, reason = "keywords of Python")]
     fn read(
         path: PathBuf,
         glasses: Option<Vec<PathBuf>>,
