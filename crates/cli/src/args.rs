@@ -414,7 +414,8 @@ pub(crate) struct TraceArgs {
 pub(crate) struct PsfArgs {
     #[command(flatten)]
     pub(crate) lens: LensArgs,
-    /// Field angles, degrees [default: those of the lens's file, else 0]
+    /// Field angles, degrees: to the right as 0,10, along x and y as 5/10, or from the axis and about it as 100@30 [default: those of
+    /// the lens's file, else 0]
     #[arg(long, value_name = "LIST", help_heading = heading::POINTS)]
     pub(crate) fields_deg: Option<String>,
     /// How far above the axis all of these fields lie, degrees

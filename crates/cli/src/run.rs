@@ -67,7 +67,8 @@ pub(crate) fn run(arguments: &RunArgs, common: &Common) -> anyhow::Result<()> {
     if report.film.dark_fraction > display::LEAST_DARK_FRACTION {
         let percent = 100.0 * report.film.dark_fraction;
         let words = "where that is not black in the scene, the lens shows less of it than the film is large: take a smaller \
-                     film (--film scene) or a wider scene";
+                     film (--film scene) or a wider scene. A scene ends before 90 degrees from the axis; what a lens sees beyond, dioptric render \
+                     takes from a panorama (--sky)";
         remark(common.quiet, &format!("{percent:.1} % of the film gets no light; {words}"));
     }
     if report.sensor.exposure_time_s > LONGEST_EXPOSURE_S {

@@ -7,9 +7,9 @@ const EYE_NM: f64 = 589.3;
 
 /// Returns the power at a wavelength, dioptres, and the accommodation at which the retina is in focus.
 fn power_and_focus(name: &str, wavelength_nm: f64) -> (f64, f64) {
-    let file = LensFile::built_in(name).unwrap();
-    let lens = file.lens.at(wavelength_nm).unwrap();
-    let retina_mm = file.film_distance_mm.unwrap();
+    let file = LensFile::built_in(name).expect("an eye");
+    let lens = file.lens.at(wavelength_nm).expect("media that are known");
+    let retina_mm = file.film_distance_mm.expect("a retina");
     // Light of a far object that comes together behind the retina: −n/s of the vitreous, seen through the eye.
     let first = lens.first_order();
     let focus = lens.object_distance_mm_for(retina_mm).map_or_else(

@@ -61,7 +61,7 @@ pub use json::{write_file, write_json};
 pub use keys::{Key, PICTURE, PictureOptions, light_word, white_word};
 pub use light_field::{DepthEstimate, DepthSearch, LightField, ViewGeometry};
 pub use lights::{parse_illuminant, parse_white};
-pub use numbers::{number, parse_bytes, parse_numbers, parse_pairs};
+pub use numbers::{number, parse_bytes, parse_directions, parse_numbers, parse_pairs};
 pub use paintings::{PaintingFolder, program_build};
 pub use progress::{Clock, ImagingTimes, Progress, Silent, Stage};
 pub use quality::Quality;

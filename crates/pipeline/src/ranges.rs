@@ -84,6 +84,7 @@ const RANGES: &[(Range, &[&str])] = &[
     (of(-89.0, 89.0, "degrees"), &["tilt_deg", "swing_deg"]),
     (of(-1e4, 1e4, "mm"), &["rise_mm", "shift_mm"]),
     (of(-1.0, 1.0, "per nm"), &["slope_per_nm"]),
+    (of(1e-6, 1e6, ""), &["lens_scale"]),
     (of(-180.0, 180.0, "degrees"), &["field_y_deg", "field_deg", "fields_deg"]),
     (of(-1e12, 1e12, "mm"), &["fields_mm"]),
     (of(1.0, 1e6, ""), &["configuration"]),

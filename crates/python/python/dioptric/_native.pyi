@@ -292,6 +292,7 @@ class Lens:
         glass_range: Literal["refuse", "extend"] = "refuse",
         slope_per_nm: float | None = None,
         configuration: int | None = None,
+        lens_scale: float | None = None,
     ) -> Lens: ...
     @staticmethod
     def parse(text: str, name: str = "lens.ron") -> Lens: ...

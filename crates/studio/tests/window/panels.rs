@@ -37,6 +37,7 @@ const PANELS: &[(&str, &[&str])] = &[
     ("configuration", &["LensReadOptions.configuration"]),
     ("catalogues", &["LensReadOptions.glasses"]),
     ("index slope", &["LensReadOptions.slope_per_nm"]),
+    ("lens scale", &["LensReadOptions.lens_scale"]),
     ("seq numbers", &["LensReadOptions.seq_numbers"]),
     ("stop", &["Camera.stop"]),
     ("f-number", &["StopSpec.FNumber"]),
@@ -263,6 +264,7 @@ fn cameras() -> Vec<Camera> {
             scene.flat = Some(FlatSize { width_mm: 10.0, distance_mm: 100.0 });
             camera.lens = LensSpec::File("none.zmx".into());
             camera.lens_reading.slope_per_nm = Some(-1e-4);
+            camera.lens_reading.lens_scale = Some(2.0);
             camera.frames = FramesSpec::Interleaved { ratio: 8.0, period_rows: 2, gain_ratio: 1.0 };
         }),
         world(RenderEffort::Samples(8)),
