@@ -28,7 +28,7 @@ use crate::{
     sight::Sight,
     stopwatch::{Part, Stopwatch},
     surface::{LayerCoordinates, Surface},
-    surroundings::Surroundings,
+    surroundings::{Surroundings, beside},
     tile::{TileGroup, film_pixels},
     tiling::{LayeredLens, Rule, Tiling, reach_px},
     visible::{Before, Visible},
@@ -213,7 +213,12 @@ impl Imaging {
         // The picture, what is open and what the surface covers; a layer as it is sampled and as it is gathered, light and coverage of each.
         const PLANES: usize = 7;
         let (Film { rows, columns, .. }, (scene_rows, scene_columns)) = (self.spec.film, self.size());
-        PLANES * size_of::<f32>() * (rows * columns).max(scene_rows * scene_columns) + self.kernel_bytes
+        // Halos: the picture with what lies around it, what they bring and take, and half of each on wider pixels.
+        const HALO_PLANES: usize = 6;
+        let m = beside(&self.spec.film);
+        let halos = if self.halos.are_any() { HALO_PLANES * (rows + 2 * m) * (columns + 2 * m) } else { 0 };
+        let planes = PLANES * (rows * columns).max(scene_rows * scene_columns) + halos;
+        size_of::<f32>() * planes + self.kernel_bytes
     }
 
     /// Reads a band and images it.

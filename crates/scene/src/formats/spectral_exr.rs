@@ -142,6 +142,12 @@ pub(super) fn read_raw_exr(path: &Path) -> Result<RawFile, SceneError> {
         Some(EnvironmentMap::Cube) => Some(Panorama::Cube { yaw_deg: 0.0, pitch_deg: 0.0 }),
     };
     let mut notes = vec![];
+    if let Some(Panorama::Equirectangular { .. }) = panorama {
+        let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
+        notes.push(format!(
+            "{name}: its pixels are taken as areas of equal angles; envmap of its header puts the outermost on the edges, half a pixel away"
+        ));
+    }
     let index = layers.iter().position(RawLayer::has_bands);
     let mut first = layers.remove(index.unwrap_or(0));
     let (size, position) = (first.size, first.position);
