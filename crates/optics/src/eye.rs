@@ -49,6 +49,8 @@ struct Numbers {
 }
 
 impl SchematicEye {
+    /// Their names, relaxed.
+    pub const NAMES: [&str; 3] = ["eye:navarro", "eye:arizona", "eye:legrand"];
     /// How these eyes are named.
     pub const PATTERNS: &str = "eye:navarro, eye:arizona, eye:legrand, accommodated as eye:navarro:4D";
 

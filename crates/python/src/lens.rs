@@ -121,10 +121,10 @@ fn range_of(glass_range: &str) -> PyResult<GlassRange> {
 
 #[pymethods]
 impl Lens {
-    /// Returns the names of the built-in lenses.
+    /// Returns the names of the built-in lenses, relaxed eyes among them.
     #[staticmethod]
     fn names() -> Vec<&'static str> {
-        dioptric_optics::Lens::built_in_names().collect()
+        dioptric_optics::Lens::built_in_names().chain(dioptric_optics::SchematicEye::NAMES).collect()
     }
 
     /// Returns the built-in lenses as a list of dictionaries: ``name``, ``efl_mm`` and ``f_number`` at 550 nm wide open,
