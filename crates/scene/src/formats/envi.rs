@@ -100,7 +100,12 @@ pub(super) fn header_of(path: &Path) -> Option<PathBuf> {
     let candidates = [appended(".hdr"), path.with_extension("hdr"), appended(".HDR"), path.with_extension("HDR")];
     // Radiance pictures have the same ending.
     let is_radiance = |header: &PathBuf| starts_with(header, b"#?").unwrap_or(false);
-    candidates.into_iter().find(|header| header != path && header.is_file() && !is_radiance(header))
+    // Of several files of numbers beside a header the first is its own.
+    let is_own = |header: &PathBuf| {
+        data_file(header, &mut vec![]).is_ok_and(|data| fs::canonicalize(data).ok() == fs::canonicalize(path).ok())
+    };
+    let is_header = |header: &PathBuf| header != path && header.is_file() && !is_radiance(header) && is_own(header);
+    candidates.into_iter().find(is_header)
 }
 
 impl EnviFile {

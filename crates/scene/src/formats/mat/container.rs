@@ -23,6 +23,9 @@ const PEEK_BYTES: usize = 512;
 const MATRIX: u32 = 14;
 const COMPRESSED: u32 = 15;
 
+/// Stands for the file in place of a variable.
+pub(super) const WHOLE: &str = "/";
+
 /// The variables of a file that were wanted, inflated.
 #[derive(Debug)]
 pub(super) struct MatFile {
@@ -97,7 +100,8 @@ impl MatFile {
         for entry in chosen {
             variables.push((entry.listed.name.clone(), file.element(entry).map_err(wrong)?));
         }
-        let attributes = entries.iter().map(|entry| (entry.listed.name.clone(), entry.attributes.clone())).collect();
+        let own = entries.iter().map(|entry| (entry.listed.name.clone(), entry.attributes.clone()));
+        let attributes = std::iter::once((WHOLE.to_owned(), file.attributes())).chain(own).collect();
         let listed = entries.into_iter().map(|entry| entry.listed).collect();
         Ok(Self { is_big_endian: false, is_row_major: !file.is_matlab, variables, listed, attributes })
     }

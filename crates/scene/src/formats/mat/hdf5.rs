@@ -34,6 +34,11 @@ impl Hdf5 {
         Ok(Self { file: File::from_bytes(bytes).map_err(broken)?, is_matlab })
     }
 
+    /// Returns the names of what the file states of itself.
+    pub(super) fn attributes(&self) -> Vec<String> {
+        self.file.root().attrs().map(|own| unknown(own.into_keys().collect())).unwrap_or_default()
+    }
+
     /// Lists the variables of MATLAB, or the arrays of all groups, by their paths.
     pub(super) fn entries(&self) -> Result<Vec<Entry>, String> {
         let mut entries = vec![];

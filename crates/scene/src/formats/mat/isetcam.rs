@@ -17,7 +17,7 @@ use super::{
         stated::{name_of, note_of},
         unusable::unreadable,
     },
-    container::{Content, MatArray, MatFile},
+    container::{Content, MatArray, MatFile, WHOLE},
     elements::Listed,
     iset_kinds,
 };
@@ -217,7 +217,7 @@ fn cube_of(path: &Path, file: &MatFile, name: &str, reading: &FileReading) -> Re
     let file_name = name_of(path);
     let ambiguous = axes::note(&array.sides, reading.axes.as_deref(), n_bands);
     notes.extend(ambiguous.map(|note| format!("{file_name}: '{name}': {note}")));
-    notes.extend(note_of(path, "attribute", file.attributes_of(name)));
+    notes.extend(note_of(path, "attribute", &[file.attributes_of(WHOLE), file.attributes_of(name)].concat()));
     let mut quantity = None;
     let told = reading.quantity.is_some() || reading.unit.is_some();
     if !told && !numbers.is_integer {
