@@ -210,11 +210,12 @@ impl Imaging {
 
     /// About what a band takes while it is imaged, bytes: its planes, and kernels.
     pub(crate) fn band_bytes(&self) -> usize {
-        // The picture, what is open and what the surface covers; a layer as it is sampled and as it is gathered, light and coverage of each.
-        const PLANES: usize = 7;
+        // The picture, what is open and what the surface covers; a layer as it is sampled and as it is gathered, light and coverage of each; both surfaces
+        // without their lamps.
+        const PLANES: usize = 9;
         let (Film { rows, columns, .. }, (scene_rows, scene_columns)) = (self.spec.film, self.size());
-        // Halos: the picture with what lies around it, what they bring and take, and half of each on wider pixels.
-        const HALO_PLANES: usize = 6;
+        // Halos: the picture with what lies around it, what they bring and take.
+        const HALO_PLANES: usize = 4;
         let m = beside(&self.spec.film);
         let halos = if self.halos.are_any() { HALO_PLANES * (rows + 2 * m) * (columns + 2 * m) } else { 0 };
         let planes = PLANES * (rows * columns).max(scene_rows * scene_columns) + halos;

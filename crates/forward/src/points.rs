@@ -157,6 +157,8 @@ const OWN_SURFACE: f32 = 0.1;
 /// Points no farther apart than this share a kernel, pixels; of more than so many kernels, twice as far, and so on.
 const APART_PX: f64 = 16.0;
 const MOST_KERNELS: usize = 256;
+/// Kernels that are drawn at once.
+const AT_ONCE: usize = 8;
 /// Change of blur radius between points that share a kernel, pixels.
 const BLUR_STEP_PX: f64 = 0.5;
 /// Blur radius of kernels on samples of a quarter pixel, pixels; wider ones are on samples in proportion.
@@ -167,12 +169,15 @@ impl Drawing<'_> {
     pub(crate) fn add(&self, points: &[Point], picture: &Composite, sums: &mut [f32]) {
         let film = film_pixels(self.film);
         let groups = self.groups(points);
-        let patches: Vec<(Rectangle, Vec<f32>)> =
-            groups.par_iter().filter_map(|group| self.patch(group, picture, &film)).collect();
-        for (at, light) in patches {
-            let lines = sums[at.offset_in(&film)..].chunks_mut(film.columns);
-            for (line, light) in lines.zip(light.chunks_exact(at.columns)) {
-                line.iter_mut().zip(light).for_each(|(sum, light)| *sum += light);
+        // Some at once: each may be as large as the film.
+        for groups in groups.chunks(AT_ONCE) {
+            let patches: Vec<(Rectangle, Vec<f32>)> =
+                groups.par_iter().filter_map(|group| self.patch(group, picture, &film)).collect();
+            for (at, light) in patches {
+                let lines = sums[at.offset_in(&film)..].chunks_mut(film.columns);
+                for (line, light) in lines.zip(light.chunks_exact(at.columns)) {
+                    line.iter_mut().zip(light).for_each(|(sum, light)| *sum += light);
+                }
             }
         }
     }

@@ -42,6 +42,10 @@ pub(super) fn contents_of_envi(path: &Path, options: &ReadOptions) -> Result<Con
     let (meaning, what) = file.meaning(options)?;
     let mut notes: Vec<String> = file.notes.clone();
     notes.extend(file.unused_unit(path));
+    if let (Meaning::Light(..), Some(own)) = (&meaning, file.header.reflectance_scale) {
+        let name = name_of(path);
+        notes.push(format!("{name}: its reflectance scale factor of {own} is not used: it has a unit of radiance"));
+    }
     let order = file.order();
     let own = WavelengthGrid::new(order.iter().map(|&band| file.wavelengths_nm[band]).collect())
         .map_err(|reason| SceneError::Values { file: path.to_owned(), reason })?;
@@ -220,13 +224,20 @@ impl EnviFile {
         };
         if let (Some(wanted), Some(_)) = (wants_light, own_unit)
             && (!wanted || told_unit.is_some_and(|told| Some(told) != own_unit))
-            && options.white_level.is_none()
         {
             let unit = header.data_units.as_deref().unwrap_or_default();
             return units(format!(
                 "its data units are '{}', which says something else than was asked for",
                 short(unit)
             ));
+        }
+        if wants_light == Some(true) && is_reflecting {
+            return units("its header states the number of a perfect white, so that it is a reflectance: expected it without a unit or quantity of light".to_owned());
+        }
+        if let (Some(own), Some(told)) = (header.reflectance_scale, options.white_level)
+            && own != told
+        {
+            return units(format!("its reflectance scale factor is {own}, which a white level of {told} contradicts"));
         }
         // Gains without a unit are those of ENVI, W m⁻² sr⁻¹ µm⁻¹.
         let gain_unit = || LightUnit::parse("W/m^2/sr/um").filter(|_| has_gains && !is_reflecting);
