@@ -150,7 +150,7 @@ pub(crate) struct Drawing<'a> {
 
 /// How far beside each other, pixels, rays through different parts of the pupil must meet the film to be told apart, beside what aberrations do.
 const PART_OF_PIXEL: f64 = 0.3;
-/// Of less of the surface before a point nothing is told: it hides it.
+/// The share of a surface before a point that must be laid to tell how much of the pupil it leaves; of less, it leaves none.
 const LEAST_LAID: f32 = 0.05;
 /// What a surface that spans ten layers leaves open of a pixel before the last of them: less is left by others.
 const OWN_SURFACE: f32 = 0.1;

@@ -50,6 +50,10 @@ impl KeptCamera {
                 .to_owned();
             return Err(PipelineError::Unsuitable { what: "mean_lux", reason });
         }
+        if self.camera.scene.points.is_some() {
+            let reason = "are met by no ray from the film, expected none: 'run' images them".to_owned();
+            return Err(PipelineError::Unsuitable { what: "points", reason });
+        }
         let chain = self.chain(progress, cancel);
         let resolved = chain.scene(&inputs.scene)?;
         let lens = chain.lens(&inputs.plan.bank.film.lens)?;
