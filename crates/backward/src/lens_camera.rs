@@ -3,11 +3,11 @@
 //! For a place x on the film and a point p of the last vertex plane, drawn from an area A, the spectral irradiance is the
 //! mean of `L (n_i/n_o)² cos θ cos θ_p A / |p − x|²`, with θ from the normal of the film and `θ_p` from that of the plane:
 //! for parallel planes cos⁴θ A/z². L is the radiance along the ray that leaves the lens, 0 where the lens blocks it;
-//! along a ray L/n² stays the same.
+//! along a ray L/n² stays the same, less what surfaces and glass take.
 
 use dioptric_diffraction::{AngularSpread, CircularStop, Hurb};
 use dioptric_optics::{
-    ExitPupilBounds, Lens, PupilReach, RayBatch, RayBatchF32, ReversedLens, Vignetting,
+    ExitPupilBounds, Lens, PupilReach, RayBatch, RayBatchF32, RayLightF32, ReversedLens, Vignetting,
     glam::{DVec2, DVec3, Vec3},
 };
 use dioptric_world::Ray;
@@ -183,18 +183,20 @@ impl LensCamera {
         let lenses = nodes.iter().map(|&node| &self.lenses[node % self.lenses.len()]);
         for lens in lenses.take(if out.is_shared { 1 } else { PACKET }) {
             let mut rays = start.clone();
+            let mut light = RayLightF32::unpolarized(rays.len());
             match self.settings.diffraction {
-                None => lens.trace_f32(&mut rays),
+                None => lens.trace_light_f32(&mut rays, &mut light),
                 Some(model) => {
-                    lens.trace_to_stop_f32(&mut rays);
+                    lens.trace_light_to_stop_f32(&mut rays, &mut light);
                     diffract(lens, &mut rays, model, (samples, &turns));
-                    lens.trace_from_stop_f32(&mut rays);
+                    lens.trace_light_from_stop_f32(&mut rays, &mut light);
                 }
             }
             let indices = lens.forward().image_index() / lens.forward().object_index();
             let share = lens.forward().diffraction_efficiency();
             for (i, &weight) in weights.iter().enumerate() {
-                let weight = if rays.fate[i].is_in_flight() { weight * indices * indices * share } else { 0.0 };
+                let is_lit = rays.fate[i].is_in_flight();
+                let weight = if is_lit { weight * indices * indices * share * light.share(i) } else { 0.0 };
                 let point = Vec3::new(rays.x_mm[i], rays.y_mm[i], rays.z_mm[i]).as_dvec3();
                 let direction = Vec3::new(rays.l[i], rays.m[i], rays.n[i]).as_dvec3();
                 let direction = if weight > 0.0 { direction } else { -DVec3::Z };
@@ -302,9 +304,9 @@ const NEWTON_STEPS: usize = 6;
 /// The step of its difference quotients, mm.
 const DIFFERENCE_MM: f64 = 1e-4;
 
-/// Whether the lens has the same indices at all these wavelengths, and no diffractive surface.
+/// Whether the lens has the same indices at all these wavelengths, loses no light and has no diffractive surface.
 fn is_achromatic(lens: &Lens, wavelengths_nm: &[f64]) -> Result<bool, BackwardError> {
-    if !lens.diffractive().is_empty() {
+    if !lens.diffractive().is_empty() || !lens.at(wavelengths_nm[0])?.is_lossless() {
         return Ok(false);
     }
     let media = lens.interfaces().iter().map(|interface| &interface.medium_after);

@@ -29,6 +29,7 @@ pub(crate) fn run(command: &LensCommand, common: &Common) -> anyhow::Result<()> 
         LensCommand::Analyze(arguments) => crate::analyze::run(arguments, common),
         LensCommand::Compare(arguments) => crate::lens_compare::run(arguments, common),
         LensCommand::Draw(arguments) => draw(arguments, common),
+        LensCommand::Ghosts(arguments) => crate::lens_ghosts::run(arguments, common),
         LensCommand::Convert { input, output, strict, reading } => {
             convert((input, output), *strict, &reading.reading(), common)
         }
@@ -71,6 +72,9 @@ fn convert(
     reading: &LensReadOptions,
     common: &Common,
 ) -> anyhow::Result<()> {
+    if reading.coating.is_some() {
+        anyhow::bail!("--coating is no part of a lens's file, which states coatings surface by surface: leave it out");
+    }
     let converted = convert_lens(input, output, reading)?;
     if is_strict && !converted.unread.is_empty() {
         let losses = converted.unread.join("; ");
@@ -263,7 +267,8 @@ fn number(key: &str, value: &serde_json::Value) -> String {
         None if key.ends_with("_deg")
             || key.ends_with("colors_nm")
             || key.starts_with('C')
-            || key.ends_with("f_number")
+            || key.ends_with("_number")
+            || key == "transmission"
             || key.ends_with("_na") =>
         {
             "–".to_owned()

@@ -4,7 +4,9 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand, ValueEnum};
 use dioptric_analysis::{AnalysisFilm, LensDefaults};
-use dioptric_pipeline::{FocusSpec, GlassRange, LensReadOptions, MissingGlass, SeqNumbers, StopSpec, parse_numbers};
+use dioptric_pipeline::{
+    CoatingSpec, FocusSpec, GlassRange, LensReadOptions, MissingGlass, SeqNumbers, StopSpec, parse_numbers,
+};
 
 use crate::{common::Common, movement_args::MovementArgs, terminal::remark};
 
@@ -21,6 +23,8 @@ pub(crate) enum LensCommand {
     Compare(LensCompareArgs),
     /// Draws the lens with rays, as SVG or, in a build with the feature png, PNG
     Draw(LensDrawArgs),
+    /// Lists the light that pairs of surfaces reflect to the film: where, how wide and how bright
+    Ghosts(LensGhostsArgs),
     /// Writes a lens in another format, chosen by the extension
     Convert {
         /// Lens to read: a file, the name of a built-in one, thin:50mm:f2, pinhole:0.1mm or eye:navarro:4D
@@ -190,6 +194,10 @@ pub(crate) struct LensReadingArgs {
     /// Makes the lens so many times as large in all its lengths, as 25.4 for a file in inches that says millimetres [default: 1]
     #[arg(long, value_name = "K")]
     pub(crate) lens_scale: Option<f64>,
+    /// What covers all surfaces between air and glass: bare, mgf2, vcoat, bbar, a file (.csv, .ron), or ideal for no loss of light
+    /// at all [default: the file's own, else mgf2]
+    #[arg(long, value_name = "COATING")]
+    pub(crate) coating: Option<String>,
 }
 
 /// What the numbers of surfaces are in a CODE V file that does not say.
@@ -259,6 +267,9 @@ impl LensReadingArgs {
         reading.configuration = self.configuration.or(reading.configuration);
         reading.slope_per_nm = self.slope_per_nm.or(reading.slope_per_nm);
         reading.lens_scale = self.lens_scale.or(reading.lens_scale);
+        if let Some(coating) = &self.coating {
+            reading.coating = Some(CoatingSpec::named(coating));
+        }
     }
 }
 
@@ -350,6 +361,29 @@ pub(crate) struct LensDrawArgs {
     pub(crate) film: LensFilmArgs,
     #[command(flatten)]
     pub(crate) bands: BandArgs,
+}
+
+/// Whose ghosts to list, and of which sources.
+#[derive(Debug, Args)]
+pub(crate) struct LensGhostsArgs {
+    #[command(flatten)]
+    pub(crate) lens: LensArgs,
+    /// Field angles of the source above the axis, degrees [default: those of the lens's file, else 0,5,10]
+    #[arg(long, alias = "field-deg", value_name = "LIST")]
+    pub(crate) fields_deg: Option<String>,
+    /// Distance of the source from the first vertex, mm, or inf [default: that of the lens's file, else inf]
+    #[arg(long, value_name = "D")]
+    pub(crate) distance_mm: Option<f64>,
+    #[command(flatten)]
+    pub(crate) film: LensFilmArgs,
+    #[command(flatten)]
+    pub(crate) bands: BandArgs,
+    /// Width and height of the film, mm, on which the veil is counted
+    #[arg(long, value_name = "WxH", default_value = "36x24")]
+    pub(crate) film_size_mm: String,
+    /// Rays over the rim of the first surface
+    #[arg(long, value_name = "N", default_value_t = 20_000)]
+    pub(crate) n_rays: usize,
 }
 
 /// Something to do with glasses.

@@ -15,6 +15,7 @@ mod glass;
 mod lens;
 mod lens_args;
 mod lens_compare;
+mod lens_ghosts;
 mod light_field;
 mod measure;
 mod measure_args;

@@ -351,8 +351,9 @@ pub(crate) fn parse_size(text: &str) -> anyhow::Result<(usize, usize)> {
 
 pub(crate) fn summary(report: &RunReport, total_s: f64, out: &Path) -> String {
     format!(
-        "{}: {} × {} pixels of {} µm on {}, {} bands, {} ms, {:.1} s\n{}\n",
+        "{}: {}{} × {} pixels of {} µm on {}, {} bands, {} ms, {:.1} s\n{}\n",
         report.camera.name,
+        report.lens.t_number.map_or_else(String::new, |t| format!("T/{:.2}, ", t.abs())),
         report.film.columns,
         report.film.rows,
         number(report.film.pitch_um),

@@ -86,6 +86,12 @@ pub enum OpticsError {
         /// What is wrong.
         reason: String,
     },
+    /// A coating that makes no sense, or that is not known where it is asked for.
+    #[error("{reason}")]
+    Coating {
+        /// What is wrong.
+        reason: String,
+    },
     /// A surface that cannot be a mirror.
     #[error("surface {surface} cannot be a mirror: {reason}")]
     Mirror {

@@ -134,6 +134,11 @@ impl Lens {
 }
 
 impl Absorption {
+    /// Of the medium behind each surface, 1/mm.
+    pub(crate) fn per_mm(&self) -> &[f64] {
+        &self.per_mm
+    }
+
     /// The surfaces behind which lies a medium whose extinction is not known at the wavelength.
     pub fn unknown_behind(&self) -> &[usize] {
         &self.unknown

@@ -1,6 +1,8 @@
 //! Schematic eyes: models of the human eye by surfaces, accommodated by so many dioptres.
 
-use crate::{Glass, GlassCatalogue, ImageSurface, Interface, Lens, OpticsError, Shape, Surface, formats::LensFile};
+use crate::{
+    Coating, Glass, GlassCatalogue, ImageSurface, Interface, Lens, OpticsError, Shape, Surface, formats::LensFile,
+};
 
 /// A schematic eye, looking at a distance.
 ///
@@ -122,7 +124,8 @@ impl SchematicEye {
             side(3, vitreous, 0.0),
         ];
         let retina = ImageSurface { curvature_per_mm: -1.0 / retina_mm, conic: 0.0 };
-        let lens = Lens::new(name, source, interfaces, 2)?.with_image_surface(retina)?;
+        let bare = [0, 1, 3, 4].map(|surface| (surface, Coating::Bare)).to_vec();
+        let lens = Lens::new(name, source, interfaces, 2)?.with_image_surface(retina)?.with_coatings(bare)?;
         let near = Some(1e3 / self.accommodation_dioptres).filter(|distance_mm| distance_mm.is_finite());
         Ok(LensFile { film_distance_mm: Some(thicknesses_mm[3]), object_distance_mm: near, ..LensFile::from(lens) })
     }

@@ -1,14 +1,15 @@
 //! A lens: surfaces in a row, one of them the stop.
 
 mod changes;
+mod coatings;
 mod media;
 mod scale;
 
 use glam::DVec2;
 
 use crate::{
-    Aperture, CoordinateBreak, DiffractiveSurface, Glass, GlassRange, Interface, OpticsError, PhaseProfile, Placement,
-    Shape, Surface, placement,
+    Aperture, Coating, CoordinateBreak, DiffractiveSurface, Glass, GlassRange, Interface, OpticsError, PhaseProfile,
+    Placement, Shape, Surface, placement,
 };
 
 pub use self::changes::SurfaceChange;
@@ -29,6 +30,10 @@ pub struct Lens {
     apertures: Vec<Aperture>,
     mirrors: Vec<usize>,
     diffractive: Vec<DiffractiveSurface>,
+    /// By surfaces, as far as they are stated.
+    coatings: Vec<(usize, Coating)>,
+    /// What covers the other surfaces between air and a denser medium; `None` where no light is lost at all.
+    other_coating: Option<Coating>,
     image_surface: ImageSurface,
     glass_range: GlassRange,
 }
@@ -123,6 +128,8 @@ impl Lens {
             apertures,
             mirrors: Vec::new(),
             diffractive: Vec::new(),
+            coatings: Vec::new(),
+            other_coating: None,
             image_surface: ImageSurface::default(),
             glass_range: GlassRange::default(),
         })
@@ -276,7 +283,8 @@ impl Lens {
             let (first, last) = step.surfaces;
             CoordinateBreak { surfaces: (first, if last == n { n + 1 } else { last }), ..*step }
         };
-        Self::new_with_apertures(&self.name, &self.source, interfaces, self.stop, self.apertures.clone())?
+        let lens = Self::new_with_apertures(&self.name, &self.source, interfaces, self.stop, self.apertures.clone())?;
+        Self { coatings: self.coatings.clone(), other_coating: self.other_coating.clone(), ..lens }
             .with_object_medium(self.object_medium.clone())?
             .with_mirrors(self.mirrors.clone())?
             .with_diffractive(self.diffractive.clone())?

@@ -84,6 +84,8 @@ impl Lens {
         let rows = places.iter().enumerate().map(row).collect();
         let lens = Self::new_with_apertures(self.name(), self.source(), rows, now(self.stop()), apertures)?;
         let phase = |phase: &DiffractiveSurface| DiffractiveSurface { surface: now(phase.surface), ..phase.clone() };
+        let coatings = self.coatings().iter().map(|(surface, coating)| (now(*surface), coating.clone())).collect();
+        let lens = lens.with_coatings(coatings)?.with_light_loss(self.other_coating().cloned())?;
         let lens = lens.with_object_medium(self.object_medium().clone())?;
         let lens = lens.with_diffractive(self.diffractive().iter().map(phase).collect())?;
         lens.with_mirrors(self.mirrors().iter().map(|&mirror| now(mirror)))?

@@ -13,7 +13,8 @@ use crate::{
     Aperture, FirstOrder, ImageSurface, Lens, OpticsError, Placement, RayBatch, Shape, Surface, Vignetting,
     paraxial::{self, Matrix},
     placement,
-    trace::{self, Goal, Kind, Phase, Plan, Step},
+    trace::{self, Goal, Kind, LightPass, Lights, Phase, Plan, Step},
+    transmission::{RayLight, SurfaceLoss, Transmission, pass_one_by_one},
 };
 
 pub use self::axial::AxialBeam;
@@ -40,8 +41,28 @@ pub struct MonoLens {
     placed: Option<Placed>,
     /// That of the stop, whether it limits the light or not.
     first_order: FirstOrder,
+    /// What light loses at surfaces and in glass, if any is lost.
+    pub(crate) losses: Option<Losses>,
     /// The beam of a far point on the axis, once it is asked for.
     far_beam: OnceLock<Option<AxialBeam>>,
+}
+
+/// What light loses at each surface and behind it, and the passes made of that once they are asked for.
+#[derive(Clone, Debug)]
+pub(crate) struct Losses {
+    surfaces: Vec<SurfaceLoss>,
+    per_mm: Vec<f64>,
+    transmission: OnceLock<Transmission>,
+}
+
+impl Losses {
+    pub(crate) fn surfaces(&self) -> &[SurfaceLoss] {
+        &self.surfaces
+    }
+
+    pub(crate) fn transmission(&self) -> &Transmission {
+        self.transmission.get_or_init(|| Transmission::of(&self.surfaces, &self.per_mm))
+    }
 }
 
 impl Lens {
@@ -91,10 +112,14 @@ impl MonoLens {
         let (mut steps, mut index_before) = (Vec::new(), lens.index_in(lens.object_medium(), wavelength_nm)?);
         let (vertices_z_mm, n_surfaces) = (lens.vertices_z_mm(), lens.interfaces().len());
         let (mut vertex_z, mut before_z_mm) = (0.0, 0.0);
+        let mut losses = Vec::new();
         lens.check_wavefronts_at(wavelength_nm)?;
         for (i, interface) in lens.interfaces().iter().enumerate() {
             let index_after =
                 lens.index_in(&interface.medium_after, wavelength_nm).map_err(|error| error.behind_surface(i))?;
+            if !lens.is_lossless() {
+                losses.push(SurfaceLoss::of(lens, i, wavelength_nm, [index_before, index_after])?);
+            }
             let (is_backward, is_mirror) = (lens.is_backward_before(i), lens.is_mirror(i));
             let as_met = is_backward.then(|| interface.surface.flipped());
             let surface = as_met.as_ref().unwrap_or(&interface.surface);
@@ -121,6 +146,14 @@ impl MonoLens {
             index_before = index_after;
         }
         let first_order = paraxial::first_order(&steps, lens.stop(), wavelength_nm);
+        let losses = match lens.is_lossless() {
+            true => None,
+            false => {
+                let per_mm = lens.absorption_at(wavelength_nm)?.per_mm().to_vec();
+                let is_clear = losses.iter().all(|loss| *loss == SurfaceLoss::None) && per_mm.iter().all(|a| *a == 0.0);
+                (!is_clear).then(|| Losses { surfaces: losses, per_mm, transmission: OnceLock::new() })
+            }
+        };
         let rear = &lens.interfaces()[n_surfaces - 1].surface;
         let rear = if lens.is_backward_before(n_surfaces) { rear.flipped() } else { rear.clone() };
         Ok(Self {
@@ -135,6 +168,7 @@ impl MonoLens {
             placed: Placed::of(lens, &vertices_z_mm),
             vertices_z_mm,
             first_order,
+            losses,
             far_beam: OnceLock::new(),
         })
     }
@@ -304,6 +338,19 @@ impl MonoLens {
         }
     }
 
+    /// Traces rays through all surfaces, as [`trace`](Self::trace) does, and their light.
+    pub fn trace_light(&self, rays: &mut RayBatch, light: &mut RayLight, rims: Vignetting) {
+        assert_eq!(rays.len(), light.0.n_rays(), "light along each ray");
+        let Some(losses) = &self.losses else { return self.trace(rays, rims) };
+        let passes = &losses.transmission().forward;
+        if self.placements().is_some() {
+            let trace = |surface: usize, rays: &mut RayBatch| self.trace_surfaces(surface..surface + 1, rays, rims);
+            return trace_light_by_surfaces(passes, rays, &mut light.0, trace);
+        }
+        let steps = self.steps_for(rays.object_z_mm);
+        trace::trace_light(&Plan::new(&steps, 0, rims), passes, rays.slices(), &mut light.0);
+    }
+
     /// Traces rays through all surfaces on the threads of the current rayon pool.
     ///
     /// The result is that of [`trace`](Self::trace), to the bit.
@@ -338,6 +385,21 @@ impl MonoLens {
             }
         }
         Cow::Owned(steps)
+    }
+}
+
+/// Traces rays and their light surface by surface; `trace` takes the rays through the surface of a number.
+pub(crate) fn trace_light_by_surfaces(
+    passes: &[LightPass<f64>],
+    rays: &mut RayBatch,
+    lights: &mut Lights<f64>,
+    mut trace: impl FnMut(usize, &mut RayBatch),
+) {
+    for (surface, pass) in passes.iter().enumerate() {
+        let before: Vec<(DVec3, DVec3)> = (0..rays.len()).map(|i| (rays.point_mm(i), rays.direction(i))).collect();
+        trace(surface, rays);
+        let after = |i: usize| rays.fate[i].is_in_flight().then(|| (rays.point_mm(i), rays.direction(i)));
+        pass_one_by_one(lights, pass, &before, after);
     }
 }
 

@@ -3,13 +3,16 @@
 //! The lens is mirrored at the plane z = 0, and its surfaces are met in the opposite order, so that the kernels of the
 //! forward trace do the work: the same digits, surfaces and fates.
 
+use std::borrow::Cow;
+
 use glam::{DMat3, DVec3};
 
 use crate::{
-    MonoLens, Placement, RayBatch, RayBatchF32, Vignetting,
+    MonoLens, Placement, RayBatch, RayBatchF32, RayLight, RayLightF32, Vignetting,
+    mono::trace_light_by_surfaces,
     rays::RaySlices,
     toric::Toric,
-    trace::{self, Goal, Kind, Plan, Real, Step},
+    trace::{self, Goal, Kind, LightPass, Lights, Plan, Real, Step},
 };
 
 /// A lens at one wavelength, traced from the film to the scene.
@@ -108,6 +111,27 @@ impl ReversedLens {
         self.trace_part_f32(Part::FromStop, rays);
     }
 
+    /// Traces rays as [`trace`](Self::trace) does, and their light: that of a ray of the scene along the same way.
+    pub fn trace_light(&self, rays: &mut RayBatch, light: &mut RayLight, rims: Vignetting) {
+        let Some(losses) = &self.forward.losses else { return self.trace(rays, rims) };
+        self.trace_part_light(Part::Whole, (rays, &mut light.0), &losses.transmission().backward, rims);
+    }
+
+    /// Traces rays in single precision as [`trace_f32`](Self::trace_f32) does, and their light.
+    pub fn trace_light_f32(&self, rays: &mut RayBatchF32, light: &mut RayLightF32) {
+        self.trace_part_light_f32(Part::Whole, rays, light);
+    }
+
+    /// Does the same to the stop, as [`trace_to_stop`](Self::trace_to_stop).
+    pub fn trace_light_to_stop_f32(&self, rays: &mut RayBatchF32, light: &mut RayLightF32) {
+        self.trace_part_light_f32(Part::ToStop, rays, light);
+    }
+
+    /// Does the same from the stop on, as [`trace_from_stop`](Self::trace_from_stop).
+    pub fn trace_light_from_stop_f32(&self, rays: &mut RayBatchF32, light: &mut RayLightF32) {
+        self.trace_part_light_f32(Part::FromStop, rays, light);
+    }
+
     /// Returns for each ray from the image space the least over the surfaces of semi-aperture less distance from the
     /// axis, mm; −∞ for one that does not get through. Openings count as rims, obscurations do not.
     ///
@@ -159,6 +183,64 @@ impl ReversedLens {
         mirror(&mut rays.slices());
     }
 
+    fn trace_part_light(
+        &self,
+        part: Part,
+        (rays, lights): (&mut RayBatch, &mut Lights<f64>),
+        passes: &[LightPass<f64>],
+        rims: Vignetting,
+    ) {
+        assert_eq!(rays.len(), lights.n_rays(), "light along each ray");
+        let passes = self.passes_of(part, passes);
+        mirror(&mut rays.slices());
+        lights.mirror();
+        let steps = part_of(&mirrored_steps(&self.forward, rays.object_z_mm), self.forward.stop(), part);
+        let first = self.forward.first_of(part);
+        match self.poses_of(part) {
+            Some(placements) => {
+                let plan = |at: usize| {
+                    move |own: &[Step], place: usize| Plan::reversed(own, first - at - place, rims, at + place == 0)
+                };
+                trace_light_by_surfaces(&passes, rays, lights, |at, rays| {
+                    trace::trace_placed_by(&steps[at..=at], &placements[at..=at], plan(at), &mut rays.slices());
+                });
+            }
+            None => trace::trace_light(&plan_of(&steps, part, first, rims), &passes, rays.slices(), lights),
+        }
+        mirror(&mut rays.slices());
+        lights.mirror();
+    }
+
+    fn trace_part_light_f32(&self, part: Part, rays: &mut RayBatchF32, light: &mut RayLightF32) {
+        let Some(losses) = &self.forward.losses else { return self.trace_part_f32(part, rays) };
+        if self.placements.is_some() {
+            let (mut wide, mut lights) = (rays.widened(), light.0.converted());
+            self.trace_part_light(part, (&mut wide, &mut lights), &losses.transmission().backward, Vignetting::On);
+            light.0 = lights.converted();
+            return rays.set_rounded(&wide, |point, _| point);
+        }
+        let passes = self.passes_of(part, &losses.transmission().backward_f32);
+        mirror(&mut rays.slices());
+        light.0.mirror();
+        trace::trace_light(&self.plans_f32[part as usize], &passes, rays.slices(), &mut light.0);
+        mirror(&mut rays.slices());
+        light.0.mirror();
+    }
+
+    /// The passes of light through the surfaces of a part; on the way to the stop that does nothing yet.
+    fn passes_of<'a, T: Real>(&self, part: Part, passes: &'a [LightPass<T>]) -> Cow<'a, [LightPass<T>]> {
+        let stop_place = self.forward.n_surfaces() - 1 - self.forward.stop();
+        match part {
+            Part::Whole => passes.into(),
+            Part::FromStop => passes[stop_place..].into(),
+            Part::ToStop => {
+                let mut own = passes[..=stop_place].to_vec();
+                own[stop_place].series = None;
+                own.into()
+            }
+        }
+    }
+
     /// The placements of the surfaces of a part.
     fn poses_of(&self, part: Part) -> Option<&[Placement]> {
         let stop_place = self.forward.n_surfaces() - 1 - self.forward.stop();
@@ -194,7 +276,8 @@ fn mirrored_steps(lens: &MonoLens, object_z_mm: f64) -> Vec<Step> {
     lens.steps_for(object_z_mm).iter().rev().map(mirrored).collect()
 }
 
-fn mirrored(step: &Step) -> Step {
+/// Returns a step as light meets it from behind, mirrored at z = 0.
+pub(crate) fn mirrored(step: &Step) -> Step {
     if step.is_mirror {
         return step.clone();
     }

@@ -9,6 +9,7 @@ mod asphere;
 mod block;
 mod crossing;
 mod kernel;
+mod light;
 mod phase;
 mod placed;
 mod plan;
@@ -18,6 +19,7 @@ mod scalar_reference;
 #[cfg(test)]
 mod tests;
 mod toric;
+mod tree;
 
 use multiversion::multiversion;
 
@@ -27,10 +29,12 @@ use self::{
     plan::Pass,
 };
 pub(crate) use self::{
+    light::{Argument, LightPass, Lights, trace_light},
     phase::Phase,
     placed::{move_to_placed_conic, move_to_placed_plane, placed_clearances, trace_placed, trace_placed_by},
     plan::Plan,
     real::Real,
+    tree::{GhostTree, SideLight},
 };
 use crate::{Aperture, RayFate, rays::RaySlices, toric::Toric};
 
@@ -104,13 +108,13 @@ pub(crate) enum Goal {
 
 /// Traces rays given in the lens frame.
 pub(crate) fn trace_batch<T: Real>(plan: &Plan<T>, goal: Goal, mut rays: RaySlices<'_, T>) {
-    trace_blocks(plan, goal, &mut rays, |_, _, _| {});
+    trace_blocks(plan, goal, &mut rays, |_, _, _, _| {});
 }
 
 /// Traces rays without rims, and keeps for each the least over all surfaces of semi-aperture less distance from the
 /// axis; −∞ for a ray that does not get through.
 pub(crate) fn trace_clearances(plan: &Plan<f64>, mut rays: RaySlices<'_>, clearances: &mut [f64]) {
-    trace_blocks(plan, Goal::LastSurface, &mut rays, |surface, blocks, start| {
+    trace_blocks(plan, Goal::LastSurface, &mut rays, |surface, _, blocks, start| {
         let pass = &plan.passes[surface];
         kernel::keep_clearance(pass.semi_aperture, blocks, &mut clearances[start..]);
         if !pass.apertures.is_empty() {
@@ -136,12 +140,12 @@ pub(crate) fn move_to_plane(rays: RaySlices<'_>, plane_z: f64, index: f64) {
     }
 }
 
-/// Traces rays; `note` sees every surface passed, the blocks on it and the number of their first ray.
+/// Traces rays; `note` sees every surface passed, the blocks as they came and as they leave it, and the number of their first ray.
 fn trace_blocks<T: Real>(
     plan: &Plan<T>,
     goal: Goal,
     rays: &mut RaySlices<'_, T>,
-    note: impl FnMut(usize, &[Block<T>], usize),
+    note: impl FnMut(usize, &[Block<T>], &[Block<T>], usize),
 ) {
     // A few rays need not pay for the room of many.
     match rays.fate.len() <= LANES {
@@ -154,7 +158,7 @@ fn trace_groups<T: Real, const B: usize>(
     plan: &Plan<T>,
     goal: Goal,
     rays: &mut RaySlices<'_, T>,
-    mut note: impl FnMut(usize, &[Block<T>], usize),
+    mut note: impl FnMut(usize, &[Block<T>], &[Block<T>], usize),
 ) {
     let (first_z, last_z) = plan.ends_z();
     let (mut here, mut there) = ([Block::EMPTY; B], [Block::EMPTY; B]);
@@ -172,7 +176,7 @@ fn trace_groups<T: Real, const B: usize>(
             if pass.is_clipped_further() {
                 is_any_ended |= aperture::clip(&pass.apertures, to);
             }
-            note(i, to, start);
+            note(i, from, to, start);
             (from, to) = (to, from);
             if is_any_ended {
                 let at = At { pass, surface: plan.surface(i), start };

@@ -93,6 +93,7 @@ const RANGES: &[(Range, &[&str])] = &[
     (of(0.0, 1e3, ""), &["gamma"]),
     (of(1e-6, 1.0, ""), &["error", "bank_error"]),
     (of(2.0, 400.0, "rings"), &["rings"]),
+    (of(1.0, 1e8, "rays"), &["n_rays"]),
     // The film and the sensor.
     (of(1e-3, 1e5, "µm"), &["pixel_um", "pitch_um"]),
     (of(1e-3, 1e5, "mm"), &["film_width_mm", "spacing_mm"]),

@@ -1,6 +1,6 @@
 //! The bundle of rays that a point of the film sees, traced back through the lens into the scene.
 
-use dioptric_optics::{FilmCone, MonoLens, RayBatch, ReversedLens, Vignetting};
+use dioptric_optics::{FilmCone, MonoLens, RayBatch, RayLight, ReversedLens, Vignetting};
 use glam::{DVec2, DVec3};
 
 use crate::{
@@ -107,20 +107,26 @@ impl FilmPointJob<'_> {
         let cosines: Vec<DVec2> = mesh.nodes().enumerate().map(node).collect();
         let mut rays = cone.rays(&cosines);
         let mut at_stop = if has_stop { self.at_stop(rays.clone()) } else { vec![] };
-        self.lens.trace(&mut rays, Vignetting::Off);
+        let mut light = RayLight::unpolarized(rays.len());
+        self.lens.trace_light(&mut rays, &mut light, Vignetting::Off);
         let mut seen: Vec<SceneRay> = self.scene_rays(&rays);
+        let mut shares: Vec<f64> = (0..rays.len()).map(|i| light.share(i)).collect();
         for i in 0..seen.len() {
             let inside = i.checked_sub(mesh.n_azimuths).filter(|inside| *inside > 0).unwrap_or(0);
             if !rays.fate[i].is_in_flight() {
-                seen[i] = seen[inside];
+                (seen[i], shares[i]) = (seen[inside], shares[inside]);
             }
             if has_stop && !at_stop[i].by_l.across.is_finite() {
                 at_stop[i] = at_stop[inside];
             }
         }
 
-        // Weigh cells by their projected solid angle and by what obscurations and other diffraction orders leave of it.
+        // Weigh cells by their projected solid angle and by what surfaces, glass, obscurations and other diffraction orders leave of it.
         let mut energies = cell_areas(mesh, &outline.rho);
+        if !self.lens.forward().is_lossless() {
+            let of_cell = |(ring, j)| 0.25 * mesh.corners(ring, j).map(|node| shares[node]).iter().sum::<f64>();
+            energies.iter_mut().zip(mesh.cells()).for_each(|(e, cell)| *e *= of_cell(cell));
+        }
         if self.unobscured.is_some() {
             let shares = clear_shares(mesh, &outline, &|cosines, with| self.passed(&cone, cosines, with));
             energies.iter_mut().zip(shares).for_each(|(e, share)| *e *= share);

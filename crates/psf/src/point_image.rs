@@ -80,8 +80,10 @@ impl PointImage {
         let targets: Vec<DVec2> = mesh.nodes().enumerate().map(node).collect();
         let nodes = landed(&lens, (&point, plane), &settings, &targets)?;
 
-        // Weigh cells by the solid angle that they take up, seen from the point, and by what obscurations leave of it.
-        let weights: Vec<f64> = targets.iter().map(|target| weight(&point, plane, *target)).collect();
+        // Weigh cells by the solid angle that they take up, seen from the point, and by what surfaces, glass and obscurations leave of it.
+        let shares = lens.trace_shares(&mut plane.rays(&lens, &point, &targets), Vignetting::Off);
+        let weights: Vec<f64> =
+            targets.iter().zip(shares).map(|(target, share)| share * weight(&point, plane, *target)).collect();
         let cell = |((ring, j), area): ((usize, usize), f64)| {
             area * mesh.corners(ring, j).map(|node| weights[node]).iter().sum::<f64>() / 4.0
         };

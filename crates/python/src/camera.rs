@@ -99,6 +99,8 @@ impl Camera {
     ///     Its stop as it is; what the camera said of the stop of the old lens goes with that.
     /// f_number, stop_mm : float
     ///     How far the stop is open.
+    /// coating : str
+    ///     What covers all surfaces between air and glass: "bare", "mgf2", "vcoat", "bbar", a file, or "ideal" for no loss of light.
     /// focus_mm : float, or "near"
     ///     Distance in focus before the first vertex; "near" for the near part of the scene.
     /// film_mm : float

@@ -1,9 +1,10 @@
 //! Changes of a camera by name, each as the command line has it.
 
-use dioptric_optics::Lens as OpticsLens;
+use dioptric_optics::{Lens as OpticsLens, LensFile};
 use dioptric_pipeline::{
-    Camera, Crop, FilmSpec, FocusSpec, FramesSpec, GivenParts, KeptCamera, LensReadOptions, LensSpec, PICTURE,
-    RetiredBank, SceneSpec, SensorOptions, SensorSpec, StopSpec, WavelengthSpec, with_auto_exposure, with_exposure_s,
+    Camera, CoatingSpec, Crop, FilmSpec, FocusSpec, FramesSpec, Given, GivenParts, KeptCamera, LensReadOptions,
+    LensSpec, PICTURE, RetiredBank, SceneSpec, SensorOptions, SensorSpec, StopSpec, WavelengthSpec, with_auto_exposure,
+    with_exposure_s,
 };
 use dioptric_sensor::Processing;
 use pyo3::{
@@ -37,6 +38,7 @@ const ALL: &[&str] = &[
     "lens",
     "f_number",
     "stop_mm",
+    "coating",
     "focus_mm",
     "film_mm",
     "tilt_deg",
@@ -118,10 +120,11 @@ pub(crate) fn changed(
     let mut changed = kept.clone();
     let mut checks_lens = false;
     each_option(function, options, known, |key, value| {
-        checks_lens |= matches!(key, "lens" | "f_number" | "stop_mm");
+        checks_lens |= matches!(key, "lens" | "f_number" | "stop_mm" | "coating");
         match key {
             "lens" => set_lens(&mut changed, value),
             "scene" => set_scene(&mut changed, value),
+            "coating" => set_coating(&mut changed, value),
             "sensor" => set_sensor(&mut changed, value),
             _ => {
                 let (mut camera, given) = (changed.camera().clone(), changed.given().clone());
@@ -151,6 +154,21 @@ pub(crate) fn open_lens(kept: &KeptCamera) -> PyResult<OpticsLens> {
         None => camera.lens.open(&camera.lens_reading).map_err(exception)?.lens,
     };
     camera.stop.apply(lens).map_err(exception)
+}
+
+/// Covers the surfaces of the lens, the camera file's or a given one.
+fn set_coating(kept: &mut KeptCamera, value: &Bound<'_, PyAny>) -> PyResult<()> {
+    let coating = Some(CoatingSpec::named(&path_or_name("coating", value)?));
+    let (mut camera, given) = (kept.camera().clone(), kept.given().clone());
+    if let Some(lens) = &given.lens {
+        let reading = LensReadOptions { coating, ..LensReadOptions::default() };
+        let file = reading.coated(LensFile::from((**lens).clone())).map_err(exception)?;
+        *kept = kept.with_given_lens(Given::new(file.lens));
+        return Ok(());
+    }
+    camera.lens_reading.coating = coating;
+    *kept = kept.with_camera(camera, given);
+    Ok(())
 }
 
 /// Puts another lens in: what the camera said of the stop and the glasses of the old one goes with it.

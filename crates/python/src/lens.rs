@@ -8,7 +8,8 @@ use std::{
 use dioptric_analysis::{LensData, LensDefaults, LensInfoRequest, built_in_lenses, surface_rows};
 use dioptric_optics::{Layout, LensFile, MonoLens, ReadOptions, Vignetting};
 use dioptric_pipeline::{
-    Camera, Given, GlassRange, KeptCamera, LensReadOptions, LensSpec, MissingGlass, REFERENCE_WAVELENGTH_NM, StopSpec,
+    Camera, CoatingSpec, Given, GlassRange, KeptCamera, LensReadOptions, LensSpec, MissingGlass,
+    REFERENCE_WAVELENGTH_NM, StopSpec,
 };
 use ndarray::{ArrayD, IxDyn};
 use pyo3::{
@@ -161,8 +162,11 @@ impl Lens {
     ///     has in use.
     /// lens_scale : float, optional
     ///     How many times as large the lens is as the file has it, in all its lengths.
+    /// coating : str, optional
+    ///     What covers all surfaces between air and glass: "bare", "mgf2", "vcoat", "bbar", a file, or "ideal" for no loss of light at all;
+    ///     without it what the file states, else "mgf2".
     #[staticmethod]
-    #[pyo3(signature = (path, *, glasses=None, missing_glass="refuse", glass_range="refuse", slope_per_nm=None, configuration=None, lens_scale=None))]
+    #[pyo3(signature = (path, *, glasses=None, missing_glass="refuse", glass_range="refuse", slope_per_nm=None, configuration=None, lens_scale=None, coating=None))]
     fn read(
         path: PathBuf,
         glasses: Option<Vec<PathBuf>>,
@@ -171,6 +175,7 @@ impl Lens {
         slope_per_nm: Option<f64>,
         configuration: Option<usize>,
         lens_scale: Option<f64>,
+        coating: Option<&str>,
     ) -> PyResult<Self> {
         let missing_glass = match missing_glass {
             "refuse" => MissingGlass::Refuse,
@@ -187,6 +192,7 @@ impl Lens {
             slope_per_nm,
             configuration,
             lens_scale,
+            coating: coating.map(CoatingSpec::named),
             ..LensReadOptions::default()
         };
         guarded(|| Self::of_choice(LensSpec::File(path), reading))
@@ -203,8 +209,10 @@ impl Lens {
     #[pyo3(signature = (text, name="lens.ron"))]
     fn parse(text: &str, name: &str) -> PyResult<Self> {
         guarded(|| {
-            let file = LensFile::from_bytes(name.as_ref(), text.as_bytes(), &ReadOptions::default());
-            Ok(Self::new(file.map_err(exception)?, None))
+            let file =
+                LensFile::from_bytes(name.as_ref(), text.as_bytes(), &ReadOptions::default()).map_err(exception)?;
+            let file = LensReadOptions::default().coated(file).map_err(exception)?;
+            Ok(Self::new(file, None))
         })
     }
 
@@ -239,6 +247,21 @@ impl Lens {
             choice: self.choice.as_ref().map(of_range),
             stop: self.stop,
             mono: Mutex::default(),
+        })
+    }
+
+    /// Returns the lens with this on all surfaces between air and glass: "bare", "mgf2", "vcoat", "bbar", a file, or "ideal" for no loss of
+    /// light at all; None for what its file states, else "mgf2".
+    #[pyo3(signature = (coating=None))]
+    fn with_coating(&self, coating: Option<&str>) -> PyResult<Self> {
+        let coating = coating.map(CoatingSpec::named);
+        guarded(|| {
+            let Some((lens, reading)) = &self.choice else {
+                let reading = LensReadOptions { coating, ..LensReadOptions::default() };
+                let file = reading.coated(self.file.clone()).map_err(exception)?;
+                return Ok(Self { stop: self.stop, ..Self::new(file, None) });
+            };
+            Self::of_choice(lens.clone(), LensReadOptions { coating, ..reading.clone() })?.stopped(self.stop)
         })
     }
 

@@ -88,7 +88,7 @@ fn paths(camera: &mut Camera) -> Vec<&mut PathBuf> {
         SceneSource::StillLife { .. } | SceneSource::Target { .. } => None,
     };
     lens.into_iter()
-        .chain(&mut camera.lens_reading.glasses)
+        .chain(camera.lens_reading.files_mut())
         .chain(sensor)
         .chain(camera.filters.iter_mut().filter_map(FilterSpec::file_mut))
         .chain(scene)

@@ -75,6 +75,11 @@ pub struct LensData {
     /// obscurations, tilted or decentered.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub f_number_of_light: Option<f64>,
+    /// The share of the light of the axial beam that surfaces and glass let through; `None` where no light gets through the rims.
+    pub transmission: Option<f64>,
+    /// The f-number of a lens without losses that has as much light: the f-number (of the light, where that is another) over the square
+    /// root of the transmission.
+    pub t_number: Option<f64>,
     /// Whether the stop limits the light of the point on the axis at the object's distance. Where it does not, f-number and
     /// diameters of pupils are those of the beam that the rims let through.
     pub stop_limits: bool,
@@ -242,13 +247,18 @@ impl LensData {
             false => mono.limiting_beam_for(object_distance_mm),
         };
         let has_odd_apertures = !lens.is_rotational() || mono.n_obscurations() > 0;
+        let f_number_of_light = has_odd_apertures.then(|| mono.f_number_of_light()).flatten();
+        let transmission = mono.axial_transmission(object_distance_mm);
+        let t_number = transmission.map(|share| f_number_of_light.unwrap_or(first.f_number) / share.sqrt());
         let [half_light_field_deg, last_light_field_deg] = field_limits_deg(&mono, [0.5, 0.01]);
         Ok(Self {
             lens: lens.name().to_owned(),
             configurations: Vec::new(),
             first_order: first,
             real_f_number: mono.real_f_number(),
-            f_number_of_light: has_odd_apertures.then(|| mono.f_number_of_light()).flatten(),
+            f_number_of_light,
+            transmission,
+            t_number,
             stop_limits: limit.is_none_or(|beam| beam.limiting_surface == mono.stop()),
             limiting_surface: limit.map_or(mono.stop(), |beam| beam.limiting_surface),
             angular_magnification: angular_magnification(lens, &mono),

@@ -36,7 +36,7 @@ impl Spot {
     /// Sends the light of a point through its true pupil.
     ///
     /// `energy` is the solid angle (of a far point the cross-section of the beam) over that of the axial point; where the axis is dark, over
-    /// that of the paraxial entrance pupil.
+    /// that of the paraxial entrance pupil; times the share that surfaces and glass let through.
     pub(crate) fn through_pupil(
         mono: &MonoLens,
         point: &ObjectPoint,
@@ -48,7 +48,7 @@ impl Spot {
         Self {
             at_mm: mono.landed(light.rays(), film_distance_mm).map(FilmPoint::in_picture_mm).collect(),
             weights: light.weights().to_vec(),
-            energy: light.collected() / on_axis.map_or_else(|| stated_light(mono, axial), |light| light.collected()),
+            energy: light.collected() / on_axis.map_or_else(|| stated_light(mono, axial), |light| light.passed()),
         }
     }
 

@@ -6,7 +6,7 @@ use crate::{MonoLens, ObjectPoint, PupilBoundary, PupilRegion, Vignetting};
 
 /// Returns the projected solid angle of the cone of light that arrives at the image of a point, times the square of the
 /// image space's index over the object space's, sr: the irradiance there for a uniform scene of radiance 1; 0 where no
-/// light gets through. Of the light that diffractive surfaces send into other orders it is left out.
+/// light gets through. What surfaces and glass take is left out; of the light that diffractive surfaces send into other orders it is left out.
 ///
 /// The solid angle is the area that the rays' direction cosines (l, m) fill; its edge is that of the true, vignetted
 /// pupil, found at `n_azimuths` (rounded up to an even number), less what obscurations stop. It is exact for a sharp image; where aberrations are
@@ -58,8 +58,8 @@ fn whole_cone(lens: &MonoLens, point: &ObjectPoint, n: usize, normal: DVec3) -> 
         nodes.iter().enumerate().filter_map(area).sum::<f64>().abs()
     };
     let area = PupilRegion::find(lens, point, n).map_or(0.0, |region| match region.outline() {
-        Some(outline) => of_outline(outline),
-        None => of_nodes(&region),
+        Some(outline) => of_outline(outline) * lens.mean_share(&region, point, N_ON_LINE),
+        None => of_nodes(&region) * lens.mean_share(&region, point, N_ON_LINE),
     });
     (lens.image_index() / lens.object_index()).powi(2) * area
 }

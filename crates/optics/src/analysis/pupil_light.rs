@@ -37,6 +37,7 @@ pub struct PupilLight {
     rays: RayBatch,
     weights: Vec<f64>,
     collected: f64,
+    passed: f64,
 }
 
 impl PupilLight {
@@ -45,7 +46,7 @@ impl PupilLight {
     ///
     /// A point shines alike in all directions: a far one evenly on a plane that faces it.
     pub fn to_film(lens: &MonoLens, point: &ObjectPoint, film_distance_mm: f64, rule: PupilRule) -> Option<Self> {
-        let mut light = Self { rays: RayBatch::default(), weights: Vec::new(), collected: 0.0 };
+        let mut light = Self { rays: RayBatch::default(), weights: Vec::new(), collected: 0.0, passed: 0.0 };
         lens.for_each_clear_part(&mut |part, sign| {
             let n_before = light.weights.len();
             if let Some(region) = PupilRegion::find(part, point, rule.n_azimuths) {
@@ -70,9 +71,14 @@ impl PupilLight {
     }
 
     /// How much light of the point gets to the film: of a far one the cross-section of its beam before the lens, mm²; of a near
-    /// one the solid angle of its cone, steradians.
+    /// one the solid angle of its cone, steradians; less what surfaces and glass take.
     pub fn collected(&self) -> f64 {
         self.collected
+    }
+
+    /// What [`collected`](Self::collected) would be if surfaces and glass took nothing.
+    pub fn passed(&self) -> f64 {
+        self.passed
     }
 
     /// Returns where the rays meet the film, mm along its own x and y, and how much light each stands for.
@@ -107,12 +113,13 @@ impl PupilLight {
         let per_area = |i: usize| solid_angle_per_area(region.plane(), point, rays.direction(i));
         let weights: Vec<f64> =
             areas_mm2.iter().enumerate().map(|(i, area_mm2)| sign * area_mm2 * per_area(i)).collect();
-        lens.trace(&mut rays, Vignetting::On);
+        let shares = lens.trace_shares(&mut rays, Vignetting::On);
         lens.to_film(&mut rays, film_distance_mm);
         self.rays.object_z_mm = rays.object_z_mm;
         for i in (0..rays.len()).filter(|&i| rays.fate[i].is_in_flight()) {
             self.rays.push(rays.point_mm(i), rays.direction(i), rays.opl_mm[i]);
-            self.weights.push(weights[i]);
+            self.weights.push(weights[i] * shares[i]);
+            self.passed += weights[i];
         }
     }
 }

@@ -6,7 +6,8 @@ use ron::extensions::Extensions;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    Aperture, CoordinateBreak, DiffractiveSurface, Glass, ImageSurface, Interface, Lens, OpticsError, Shape, Surface,
+    Aperture, Coating, CoordinateBreak, DiffractiveSurface, Glass, ImageSurface, Interface, Lens, OpticsError, Shape,
+    Surface,
 };
 
 use self::configuration_row::ConfigurationRow;
@@ -87,6 +88,9 @@ pub(super) struct Row {
     #[serde(default, skip_serializing_if = "is_false")]
     pub(super) mirror: bool,
     pub(super) semi_aperture_mm: f64,
+    /// Left out for the usual one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) coating: Option<Coating>,
     /// Left out for air. Behind a mirror it is that before it.
     #[serde(default, skip_serializing_if = "is_air")]
     pub(super) medium: Glass,
@@ -158,9 +162,11 @@ fn file_of(prescription: Prescription) -> Result<LensFile, TextError> {
     let &[stop] = stops.as_slice() else { return Err(OpticsError::Stops { n_stops: stops.len() }.into()) };
     let mirrors: Vec<usize> = (0..prescription.surfaces.len()).filter(|&i| prescription.surfaces[i].mirror).collect();
     let mut interfaces = Vec::with_capacity(prescription.surfaces.len());
+    let mut coatings = Vec::new();
     let mut surface_comments = Vec::with_capacity(prescription.surfaces.len());
     for (surface, row) in prescription.surfaces.into_iter().enumerate() {
         let curvature_per_mm = curvature_per_mm(surface, "radius_mm", row.radius_mm)?;
+        coatings.extend(row.coating.map(|coating| (surface, coating)));
         let surface = Surface { curvature_per_mm, shape: row.shape, semi_aperture_mm: row.semi_aperture_mm };
         interfaces.push(Interface { surface, medium_after: row.medium, thickness_after_mm: row.thickness_mm });
         surface_comments.push(row.comment);
@@ -170,7 +176,7 @@ fn file_of(prescription: Prescription) -> Result<LensFile, TextError> {
     let lens =
         Lens::new_with_apertures(prescription.name, prescription.source, interfaces, stop, prescription.apertures)?;
     let lens = lens.with_object_medium(prescription.object_medium)?.with_mirrors(mirrors)?;
-    let lens = lens.with_diffractive(prescription.diffractive)?;
+    let lens = lens.with_diffractive(prescription.diffractive)?.with_coatings(coatings)?;
     let lens = lens.with_moves(prescription.moves)?.with_image_surface(image_surface)?;
     let positive = |key: &str, found: Option<f64>| match found.filter(|mm| !(mm.is_finite() && *mm > 0.0)) {
         Some(found) => Err(TextError { line: None, reason: format!("{key} is {found}, expected a number above 0") }),
@@ -246,6 +252,7 @@ impl Lens {
             shape: interface.surface.shape.clone(),
             stop: i == self.stop(),
             mirror: self.is_mirror(i),
+            coating: self.coatings().iter().find(|(surface, _)| *surface == i).map(|(_, coating)| coating.clone()),
             semi_aperture_mm: interface.surface.semi_aperture_mm,
             medium: interface.medium_after.clone(),
             thickness_mm: interface.thickness_after_mm,

@@ -82,10 +82,10 @@ impl Line<'_> {
 
 /// Keywords without a part in how a lens images: of windows, drawings, tolerances, polarization, ray aiming and physical optics.
 const HARMLESS: &[&str] = &[
-    "AUTH", "BLNK", "COAT", "COFN", "COTF", "EERA", "FIMP", "FLAP", "GFAC", "GLRS", "GSTD", "HIDE", "HYPR", "IWDP",
-    "LANG", "LUID", "MEMA", "MIRR", "MODE", "MOFF", "NSCD", "OMMA", "PFIL", "PICB", "POLS", "POPS", "PUSH", "RAIM",
-    "RAED", "RAGL", "ROPD", "RSCE", "RSCH", "RWRE", "RFLS", "SCBD", "SDMA", "SLAB", "SSID", "STUD", "TOL", "TOLR",
-    "TOLS", "UDAD", "VANN", "VDSZ", "VERS", "WAVN",
+    "AUTH", "BLNK", "COFN", "COTF", "EERA", "FIMP", "FLAP", "GFAC", "GLRS", "GSTD", "HIDE", "HYPR", "IWDP", "LANG",
+    "LUID", "MEMA", "MIRR", "MODE", "MOFF", "NSCD", "OMMA", "PFIL", "PICB", "POLS", "POPS", "PUSH", "RAIM", "RAED",
+    "RAGL", "ROPD", "RSCE", "RSCH", "RWRE", "RFLS", "SCBD", "SDMA", "SLAB", "SSID", "STUD", "TOL", "TOLR", "TOLS",
+    "UDAD", "VANN", "VDSZ", "VERS", "WAVN",
 ];
 /// The unknown keywords that are named.
 const MOST_NAMED: usize = 6;
@@ -115,6 +115,8 @@ struct Zmx {
     /// The number that the file gives each of them.
     surface_numbers: Vec<usize>,
     notes: Vec<String>,
+    /// The coatings that it names, each once.
+    coatings: Vec<String>,
     /// Keywords that are not known, each once.
     unknown: Vec<String>,
 }
@@ -185,6 +187,12 @@ impl Zmx {
                 self.stored = if line.words.len() > 1 { line.count(1)? } else { 1 };
             }
             _ if self.n_configurations > 1 => self.operands.extend(ZmxOperand::of(line)?),
+            "COAT" => {
+                let name = line.text();
+                if !name.is_empty() && !self.coatings.contains(&name) {
+                    self.coatings.push(name);
+                }
+            }
             keyword if HARMLESS.contains(&keyword) => {}
             keyword => {
                 if !self.unknown.iter().any(|known| known == keyword) {
@@ -193,6 +201,17 @@ impl Zmx {
             }
         }
         Ok(())
+    }
+
+    /// Returns a sentence on the coatings that the file names, if there are any: what they are stands in another file.
+    fn note_on_coatings(&self) -> Option<String> {
+        let named = self.coatings.iter().take(MOST_NAMED).cloned().collect::<Vec<_>>().join(", ");
+        let more = if self.coatings.len() > MOST_NAMED { " and more" } else { "" };
+        (!self.coatings.is_empty()).then(|| {
+            format!(
+                "its coatings are named but not stated ({named}{more}): the usual ones are taken, or those of --coating"
+            )
+        })
     }
 
     /// Returns a sentence on the keywords that are not known, if there are any.
@@ -252,6 +271,7 @@ impl Zmx {
         let mut notes = std::mem::take(&mut self.notes);
         notes.extend(self.note_on_solves());
         notes.extend(self.note_on_gaps());
+        notes.extend(self.note_on_coatings());
         notes.extend(self.note_on_unknown());
         let [object, .., image] = self.surfaces.as_slice() else {
             let reason = format!("the file has {} surfaces; expected an object and an image", self.surfaces.len());

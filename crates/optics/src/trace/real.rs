@@ -31,10 +31,13 @@ pub(crate) trait Real:
     const ZERO: Self;
     const ONE: Self;
     const TWO: Self;
+    const HALF: Self;
     const MAX: Self;
     const INFINITY: Self;
     /// A Newton step, against 1 + distance, after which the next would be lost in rounding: its square is.
     const SMALL_STEP: Self;
+    /// Of the square of a product of two sines: below it is a plane of incidence that rounding made.
+    const TINY: Self;
     /// Whether rays gather path length; f32 holds no fraction of a wave of it.
     const HAS_PATH: bool;
     const YES: Self::Mask;
@@ -52,16 +55,18 @@ pub(crate) trait Real:
 }
 
 macro_rules! real {
-    ($float:ty, $mask:ty, $small_step:expr, $has_path:expr) => {
+    ($float:ty, $mask:ty, $small_step:expr, $tiny:expr, $has_path:expr) => {
         impl Real for $float {
             type Mask = $mask;
 
             const ZERO: Self = 0.0;
             const ONE: Self = 1.0;
             const TWO: Self = 2.0;
+            const HALF: Self = 0.5;
             const MAX: Self = Self::MAX;
             const INFINITY: Self = Self::INFINITY;
             const SMALL_STEP: Self = $small_step;
+            const TINY: Self = $tiny;
             const HAS_PATH: bool = $has_path;
             const YES: $mask = <$mask>::MAX;
             const NO: $mask = 0;
@@ -89,5 +94,5 @@ macro_rules! real {
     };
 }
 
-real!(f64, u64, 1e-9, true);
-real!(f32, u32, 2e-5, false);
+real!(f64, u64, 1e-9, 1e-80, true);
+real!(f32, u32, 2e-5, 1e-34, false);

@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use dioptric_optics::{
-    GlassCatalogue, GlassRange, IdealLens, Lens, LensFile, MissingGlass, ReadOptions, SchematicEye, SeqNumbers,
-    SurfaceChange,
+    COATING_CENTER_NM, Coating, GlassCatalogue, GlassRange, IdealLens, Lens, LensFile, MissingGlass, ReadOptions,
+    SchematicEye, SeqNumbers, SurfaceChange,
 };
 use dioptric_sensor::Sensor;
 use serde::{Deserialize, Serialize};
@@ -108,7 +108,56 @@ impl LensSpec {
             }
             *lens = lens.clone().with_glass_range(reading.glass_range);
         }
-        Ok(file)
+        reading.coated(file)
+    }
+}
+
+/// Returns the lens with what covers its surfaces: what its file states and a quarter wave of magnesium fluoride elsewhere, or one
+/// coating on all of them.
+fn coated(lens: Lens, coating: Option<&CoatingSpec>) -> Result<Lens, PipelineError> {
+    let everywhere = match coating {
+        None => return Ok(lens.with_light_loss(Some(Coating::MGF2))?),
+        Some(CoatingSpec::Ideal) => return Ok(lens.with_light_loss(None)?),
+        Some(CoatingSpec::Bare) => Coating::Bare,
+        Some(CoatingSpec::MgF2) => Coating::MGF2,
+        Some(CoatingSpec::VCoat) => Coating::VCoat { at_nm: COATING_CENTER_NM },
+        Some(CoatingSpec::Bbar) => Coating::Broadband { at_nm: COATING_CENTER_NM },
+        Some(CoatingSpec::File(path)) => Coating::read(path)?,
+    };
+    // What a mirror is made of stays.
+    let of_mirrors = lens.coatings().iter().filter(|(surface, _)| lens.is_mirror(*surface)).cloned().collect();
+    Ok(lens.with_coatings(of_mirrors)?.with_light_loss(Some(everywhere))?)
+}
+
+/// What covers the surfaces of a lens between air and glass.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub enum CoatingSpec {
+    /// Nothing.
+    Bare,
+    /// A quarter wave of magnesium fluoride at 550 nm.
+    MgF2,
+    /// Two layers that reflect nothing at 550 nm.
+    VCoat,
+    /// Three layers for the whole of the visible.
+    Bbar,
+    /// Light passes as if no surface reflected and no glass absorbed any.
+    Ideal,
+    /// A coating of a file: a table of reflectance (`.csv`) or layers (`.ron`).
+    File(PathBuf),
+}
+
+impl CoatingSpec {
+    /// Returns what a word names, or else the file of that name.
+    pub fn named(text: &str) -> Self {
+        match text.to_ascii_lowercase().as_str() {
+            "bare" => Self::Bare,
+            "mgf2" => Self::MgF2,
+            "vcoat" => Self::VCoat,
+            "bbar" => Self::Bbar,
+            "ideal" => Self::Ideal,
+            _ => Self::File(PathBuf::from(text)),
+        }
     }
 }
 
@@ -181,6 +230,9 @@ pub struct LensReadOptions {
     /// How many times as large the lens is as its prescription has it, in all its lengths; `None` for as large. What is changed of a lens
     /// ([`LensSpec::Changed`]) is changed of the larger one.
     pub lens_scale: Option<f64>,
+    /// What covers all surfaces between air and glass; `None` for what the lens's file states and, where it states nothing, a quarter wave of
+    /// magnesium fluoride at 550 nm. Surfaces between two glasses reflect by Fresnel's equations, and glass absorbs what is known of it.
+    pub coating: Option<CoatingSpec>,
     /// What the numbers of surfaces are in a CODE V file that says neither radii nor curvatures; `None` for what is plausible.
     pub seq_numbers: Option<SeqNumbers>,
     /// Which configuration of a lens file that has several, as the positions of a zoom lens, counted from 1; `None` for the one that the
@@ -189,6 +241,36 @@ pub struct LensReadOptions {
 }
 
 impl LensReadOptions {
+    /// Returns a lens file with what covers the surfaces of its lens.
+    ///
+    /// # Errors
+    /// When the file of a coating cannot be read, or its coatings make no sense.
+    pub fn coated(&self, mut file: LensFile) -> Result<LensFile, PipelineError> {
+        let lenses = file.configurations.iter_mut().map(|configuration| &mut configuration.lens);
+        for lens in lenses.chain([&mut file.lens]) {
+            *lens = coated(lens.clone(), self.coating.as_ref())?;
+        }
+        Ok(file)
+    }
+
+    /// The files that it names.
+    pub fn files_mut(&mut self) -> impl Iterator<Item = &mut PathBuf> {
+        let coating = match &mut self.coating {
+            Some(CoatingSpec::File(path)) => Some(path),
+            _ => None,
+        };
+        self.glasses.iter_mut().chain(coating)
+    }
+
+    /// The files that it names.
+    pub fn files(&self) -> impl Iterator<Item = &Path> {
+        let coating = match &self.coating {
+            Some(CoatingSpec::File(path)) => Some(path),
+            _ => None,
+        };
+        self.glasses.iter().chain(coating).map(PathBuf::as_path)
+    }
+
     /// Returns it as options of the lens readers.
     fn options(&self) -> Result<ReadOptions, PipelineError> {
         // A catalogue is a file, or that of a maker, whose glass a name then means that several have.

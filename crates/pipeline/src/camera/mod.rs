@@ -37,7 +37,7 @@ pub use dual_pixel::DualPixelSpec;
 pub use filters::FilterSpec;
 pub(crate) use frames::at_rest;
 pub use frames::{Exposed, FramesSpec, PhotodiodeReads};
-pub use lens::{LensReadOptions, REFERENCE_WAVELENGTH_NM, nearest_to_reference_nm};
+pub use lens::{CoatingSpec, LensReadOptions, REFERENCE_WAVELENGTH_NM, nearest_to_reference_nm};
 pub use light_field::LightFieldSpec;
 pub use movements::Movements;
 pub use photodiodes::Photodiodes;
@@ -435,7 +435,7 @@ impl Camera {
         if let Some(path) = self.lens.file_mut() {
             *path = folder.join(&path);
         }
-        for path in &mut self.lens_reading.glasses {
+        for path in self.lens_reading.files_mut() {
             *path = folder.join(&path);
         }
         if let SensorSpec::File(path) = &mut self.sensor {

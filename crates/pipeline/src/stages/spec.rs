@@ -244,14 +244,14 @@ fn check_patch(camera: &Camera, sensor: &Sensor) -> Result<(), PipelineError> {
 impl LensInputs {
     pub(crate) fn of(camera: &Camera, given: &GivenParts) -> Self {
         let lens_file = camera.lens.file().filter(|_| given.lens.is_none()).map_or_else(Vec::new, FileStamp::all_of);
-        let catalogues = camera.lens_reading.glasses.iter().map(|path| FileStamp::of(path));
+        let named = camera.lens_reading.files().map(FileStamp::of);
         Self {
             given: given.lens.clone(),
             choice: camera.lens.clone(),
             reading: camera.lens_reading.clone(),
             stop: camera.stop,
             movements: camera.movements,
-            files: lens_file.into_iter().chain(catalogues).collect(),
+            files: lens_file.into_iter().chain(named).collect(),
         }
     }
 }

@@ -68,6 +68,7 @@ class Camera:
         lens: Lens | _Path | None = ...,
         f_number: float | None = ...,
         stop_mm: float | None = ...,
+        coating: _Path | None = ...,
         focus_mm: float | Literal["near"] | None = ...,
         film_mm: float | None = ...,
         tilt_deg: float | None = ...,
@@ -293,6 +294,7 @@ class Lens:
         slope_per_nm: float | None = None,
         configuration: int | None = None,
         lens_scale: float | None = None,
+        coating: _Path | None = None,
     ) -> Lens: ...
     @staticmethod
     def parse(text: str, name: str = "lens.ron") -> Lens: ...
@@ -301,6 +303,7 @@ class Lens:
     @staticmethod
     def pinhole(diameter_mm: float) -> Lens: ...
     def with_stop(self, *, f_number: float | None = None, diameter_mm: float | None = None) -> Lens: ...
+    def with_coating(self, coating: _Path | None = None) -> Lens: ...
     def with_glass_range(self, glass_range: Literal["refuse", "extend"]) -> Lens: ...
     def notes_at(self, wavelengths_nm: Sequence[float]) -> list[str]: ...
     @property

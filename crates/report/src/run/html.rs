@@ -121,6 +121,13 @@ fn glance(report: &RunReport) -> String {
     let tiles = [
         (format!("{:.2} mm", lens.efl_mm), format!("focal length at {:.0} nm", lens.wavelength_nm)),
         (format!("f/{:.2}", lens.f_number), focused),
+        (
+            report.lens.t_number.map_or_else(|| "–".to_owned(), |t| format!("T/{t:.2}")),
+            report.lens.transmission.map_or_else(
+                || "T-number".to_owned(),
+                |share| format!("T-number: {:.1} % of the light gets through", 100.0 * share),
+            ),
+        ),
         (distance, "in focus, from the first vertex".to_owned()),
         (format!("{} × {}", film.columns, film.rows), format!("pixels of {:.2} µm", film.pitch_um)),
         (

@@ -3,7 +3,9 @@
 use std::path::PathBuf;
 
 use dioptric_optics::Lens;
-use dioptric_pipeline::{Camera, FocusSpec, GlassRange, LensReadOptions, LensSpec, MissingGlass, SeqNumbers, StopSpec};
+use dioptric_pipeline::{
+    Camera, CoatingSpec, FocusSpec, GlassRange, LensReadOptions, LensSpec, MissingGlass, SeqNumbers, StopSpec,
+};
 use egui::{CollapsingHeader, Ui};
 
 use super::{
@@ -250,6 +252,27 @@ fn reading(ui: &mut Ui, reading: &mut LensReadOptions) {
     let words = "How many times as large the lens is as its prescription has it, in all its lengths";
     let scale = NumberField::even("lens scale", "", 1e-6..=1e6, 0.1..=10.0, words);
     optional(ui, scale, &mut reading.lens_scale, 2.0);
+    let file = match &reading.coating {
+        Some(CoatingSpec::File(path)) => path.display().to_string(),
+        _ => String::new(),
+    };
+    let mut coatings = vec![
+        (None, "the file's own, else MgF2"),
+        (Some(CoatingSpec::Bare), "none"),
+        (Some(CoatingSpec::MgF2), "MgF2, one layer"),
+        (Some(CoatingSpec::VCoat), "V coat, two layers"),
+        (Some(CoatingSpec::Bbar), "broadband, three layers"),
+        (Some(CoatingSpec::Ideal), "no loss of light at all"),
+    ];
+    if !file.is_empty() {
+        coatings.push((reading.coating.clone(), "of a file"));
+    }
+    let words = "What covers the surfaces between air and glass";
+    choice(ui, "coating", words, &mut reading.coating, &coatings);
+    let words = "A table of reflectance (.csv) or layers (.ron) that cover the surfaces between air and glass";
+    if let Some(typed) = text(ui, "coating file", words, &file) {
+        reading.coating = (!typed.trim().is_empty()).then(|| CoatingSpec::File(PathBuf::from(typed.trim())));
+    }
     let numbers =
         [(None, "what is plausible"), (Some(SeqNumbers::Radii), "radii"), (Some(SeqNumbers::Curvatures), "curvatures")];
     let words = "What the numbers of surfaces are in a CODE V file that does not state it";

@@ -1,0 +1,333 @@
+//! The share of light that surfaces and glass let through, along rays.
+
+use glam::DVec3;
+
+use crate::{
+    Coating, DiffractiveSurface, Film, Lens, MonoLens, ObjectPoint, OpticsError, PupilRegion, RayBatch, Vignetting,
+    coating::{complex_index, share_between},
+    trace::{Argument, LightPass, Lights, Real},
+};
+
+/// What light loses at one surface, as light meets it forward.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum SurfaceLoss {
+    /// Nothing.
+    None,
+    /// What the film does not transmit.
+    Film(Film),
+    /// The same whatever the angle, that of light that falls straight on it: at gratings, which turn light by no law of Snell's.
+    Straight(Film),
+    /// What a table at one wavelength reflects, between media of these indices.
+    Table(Vec<(f64, [f64; 2])>, [f64; 2]),
+    /// What the film of a mirror does not reflect.
+    MirrorFilm(Film),
+    /// What a table of a mirror does not reflect.
+    MirrorTable(Vec<(f64, [f64; 2])>),
+}
+
+/// Points at which a surface is looked at, and so the most terms of its series.
+const N_NODES: usize = 32;
+/// Terms of a series below this are left out: in double precision, and in single.
+pub(crate) const LEAST_TERMS: [f64; 2] = [1e-12, 1e-7];
+
+/// What light loses in a lens at one wavelength: the passes through its surfaces, in double and single precision, in the order in which
+/// light meets them forward and backward.
+#[derive(Clone, Debug)]
+pub(crate) struct Transmission {
+    pub(crate) forward: Vec<LightPass<f64>>,
+    pub(crate) backward: Vec<LightPass<f64>>,
+    pub(crate) backward_f32: Vec<LightPass<f32>>,
+}
+
+impl SurfaceLoss {
+    /// Returns what a surface of a lens loses, between media of these indices.
+    ///
+    /// # Errors
+    /// When a coating is not known at the wavelength, or it is that of a mirror where there is none, or the other way round.
+    pub(crate) fn of(lens: &Lens, surface: usize, wavelength_nm: f64, indices: [f64; 2]) -> Result<Self, OpticsError> {
+        let coating = lens.coating_of(surface, indices);
+        let of_surface =
+            |error: OpticsError| OpticsError::Coating { reason: format!("the coating of surface {surface}: {error}") };
+        let wrong = |expected: &str| {
+            let reason = format!("the coating of surface {surface} is not one that {expected}");
+            Err(OpticsError::Coating { reason })
+        };
+        let [before, after] = indices;
+        let is_thin_lens = matches!(lens.interfaces()[surface].surface.shape, crate::Shape::ThinLens { .. });
+        if *coating == Coating::Ideal || is_thin_lens {
+            return Ok(Self::None);
+        }
+        if lens.is_mirror(surface) {
+            return match coating {
+                Coating::Table(table) => Ok(Self::MirrorTable(table.at(wavelength_nm).map_err(of_surface)?)),
+                Coating::Metal { metal, .. } => {
+                    let layers = coating.layers_at(wavelength_nm, &|_| None).map_err(of_surface)?;
+                    let metal = complex_index(metal, wavelength_nm).map_err(of_surface)?;
+                    Ok(Self::MirrorFilm(Film::new(before, &layers, metal, wavelength_nm)))
+                }
+                _ => wrong("mirrors have: Ideal, Metal or Table"),
+            };
+        }
+        if let Coating::Table(table) = coating {
+            return Ok(Self::Table(table.at(wavelength_nm).map_err(of_surface)?, indices));
+        }
+        if matches!(coating, Coating::Metal { .. }) {
+            return wrong("lets light through, as this surface must, which is no mirror");
+        }
+        let medium_before = surface.checked_sub(1).map_or(lens.object_medium(), |i| &lens.interfaces()[i].medium_after);
+        let dense = if before > after { medium_before } else { &lens.interfaces()[surface].medium_after };
+        let dense_at = |nm: f64| lens.index_in(dense, nm).ok().or(Some(before.max(after)));
+        let mut layers = coating.layers_at(wavelength_nm, &dense_at).map_err(of_surface)?;
+        if layers.is_empty() && before == after {
+            return Ok(Self::None);
+        }
+        if before > after {
+            layers.reverse();
+        }
+        let film = Film::new(before, &layers, after.into(), wavelength_nm);
+        let turns_otherwise = |phase: &DiffractiveSurface| phase.surface == surface;
+        let is_diffractive = lens.diffractive().iter().any(turns_otherwise);
+        // Without a step of the index the angle of incidence leaves no trace in the directions.
+        let is_straight = is_diffractive || (before / after - 1.0).abs() < 1e-9;
+        Ok(if is_straight { Self::Straight(film) } else { Self::Film(film) })
+    }
+
+    /// The least product of the directions before and behind, and the greatest; of a mirror those of the cosine of incidence.
+    fn ends(&self) -> [f64; 2] {
+        let of_indices = |[a, b]: [f64; 2]| [a.min(b) / a.max(b), 1.0];
+        match self {
+            Self::None | Self::Straight(_) => [0.0, 1.0],
+            Self::Film(film) => of_indices(film.indices()),
+            Self::Table(_, indices) => of_indices(*indices),
+            Self::MirrorFilm(_) | Self::MirrorTable(_) => [0.0, 1.0],
+        }
+    }
+
+    /// Returns half the sum and half the difference of the shares of s and p that go on, and t_s t_p* of amplitudes whose squares are these
+    /// shares, for rays whose directions before and behind have this product; of a mirror, for this cosine of incidence.
+    fn at(&self, product: f64) -> [f64; 4] {
+        // Refraction: n d of the denser medium less that of the other is along the normal.
+        let cosines = |[before, after]: [f64; 2]| {
+            let normal = (before * before + after * after - 2.0 * before * after * product).sqrt();
+            let (low, high) = (before.min(after), before.max(after));
+            let [of_low, of_high] = [(high * product - low) / normal, (high - low * product) / normal];
+            if before < after { [of_low, of_high] } else { [of_high, of_low] }
+        };
+        let transmitted = |film: &Film, cos: f64| {
+            let found = film.amplitudes(cos);
+            let [of_s, of_p] = film.power_of_squares(cos);
+            terms(found.t_s * of_s.sqrt(), found.t_p * of_p.sqrt())
+        };
+        let left = |[r_s, r_p]: [f64; 2]| terms((1.0 - r_s).sqrt().into(), (1.0 - r_p).sqrt().into());
+        match self {
+            Self::None => [1.0, 0.0, 1.0, 0.0],
+            Self::Straight(film) => transmitted(film, 1.0),
+            Self::Film(film) => transmitted(film, cosines(film.indices())[0]),
+            Self::Table(table, indices) => {
+                let [before, after] = cosines(*indices);
+                left(share_between(table, if indices[0] < indices[1] { before } else { after }))
+            }
+            Self::MirrorFilm(film) => {
+                let found = film.amplitudes(product);
+                terms(found.r_s, -found.r_p)
+            }
+            Self::MirrorTable(table) => {
+                let [r_s, r_p] = share_between(table, product);
+                terms(r_s.sqrt().into(), r_p.sqrt().into())
+            }
+        }
+    }
+
+    /// Returns the pass of light through the surface.
+    fn pass<T: Real>(&self, per_mm: f64, least_term: f64) -> LightPass<T> {
+        let per_mm = T::of(per_mm);
+        if *self == Self::None {
+            return LightPass { per_mm, ..LightPass::NOTHING };
+        }
+        let is_constant = matches!(self, Self::Straight(_));
+        let series = Series::of(self.ends(), is_constant, least_term, |at| self.at(at));
+        let is_mirror = matches!(self, Self::MirrorFilm(_) | Self::MirrorTable(_));
+        series.pass(if is_mirror { Argument::LowCosine { ratio2: T::ONE } } else { Argument::Product }, per_mm)
+    }
+
+    /// Returns the pass of light that the surface sends back where it comes from before or, with `is_from_behind`, from behind it; `None`
+    /// where none does, as at gratings and between equal indices, whose reflections are not followed.
+    pub(crate) fn back<T: Real>(&self, is_from_behind: bool, least_term: f64) -> Option<LightPass<T>> {
+        let (indices, of_cosine): ([f64; 2], Box<dyn Fn(f64) -> [f64; 4]>) = match self {
+            Self::None | Self::Straight(_) | Self::MirrorFilm(_) | Self::MirrorTable(_) => return None,
+            Self::Film(film) => {
+                let film = if is_from_behind { film.reversed() } else { film.clone() };
+                let indices = film.indices();
+                let of_low = move |low: f64| {
+                    let [here, there] = indices;
+                    // n sin θ is the same on both sides.
+                    let cos =
+                        if here < there { low } else { (1.0 - (1.0 - low * low) * (there / here).powi(2)).sqrt() };
+                    let found = film.amplitudes(cos);
+                    terms(found.r_s, -found.r_p)
+                };
+                (indices, Box::new(of_low))
+            }
+            Self::Table(table, [before, after]) => {
+                let indices = if is_from_behind { [*after, *before] } else { [*before, *after] };
+                let of_low = |low: f64| {
+                    let [r_s, r_p] = share_between(table, low);
+                    terms(r_s.sqrt().into(), r_p.sqrt().into())
+                };
+                (indices, Box::new(of_low))
+            }
+        };
+        let [here, there] = indices;
+        let ratio2 = T::of((here / here.min(there)).powi(2));
+        Some(Series::of([0.0, 1.0], false, least_term, of_cosine).pass(Argument::LowCosine { ratio2 }, T::ZERO))
+    }
+}
+
+/// Chebyshev series of what a surface does to light, between two ends.
+struct Series {
+    ends: [f64; 2],
+    coefficients: [Vec<f64>; 4],
+}
+
+impl Series {
+    /// Fits the series of a function of one argument, without terms below the least.
+    fn of(ends: [f64; 2], is_constant: bool, least_term: f64, values_at: impl Fn(f64) -> [f64; 4]) -> Self {
+        let [from, to] = ends;
+        let angle = |j: usize| std::f64::consts::PI * (j as f64 + 0.5) / N_NODES as f64;
+        let values: Vec<[f64; 4]> =
+            (0..N_NODES).map(|j| values_at(0.5 * (from + to) + 0.5 * (to - from) * angle(j).cos())).collect();
+        let coefficients = std::array::from_fn(|k| {
+            let coefficient = |i: usize| {
+                let sum: f64 = (0..N_NODES).map(|j| values[j][k] * (i as f64 * angle(j)).cos()).sum();
+                sum * if i == 0 { 1.0 } else { 2.0 } / N_NODES as f64
+            };
+            let mut list: Vec<f64> = (0..if is_constant { 1 } else { N_NODES }).map(coefficient).collect();
+            while list.last().is_some_and(|last| last.abs() < least_term) {
+                list.pop();
+            }
+            list
+        });
+        Self { ends, coefficients }
+    }
+
+    fn pass<T: Real>(self, argument: Argument<T>, per_mm: T) -> LightPass<T> {
+        let [from, to] = self.ends;
+        let (scale, offset) = (2.0 / (to - from), -(to + from) / (to - from));
+        let series = self.coefficients.map(|list| list.into_iter().map(T::of).collect());
+        LightPass { argument, scale: T::of(scale), offset: T::of(offset), series: Some(series), per_mm }
+    }
+}
+
+fn terms(s: num_complex::Complex64, p: num_complex::Complex64) -> [f64; 4] {
+    let (of_s, of_p, both) = (s.norm_sqr(), p.norm_sqr(), s * p.conj());
+    [0.5 * (of_s + of_p), 0.5 * (of_s - of_p), both.re, both.im]
+}
+
+impl Transmission {
+    /// Returns that of these surfaces; `per_mm` is the absorption behind each. That before the first and behind the last is left out.
+    pub(crate) fn of(losses: &[SurfaceLoss], per_mm: &[f64]) -> Self {
+        let n = losses.len();
+        let before = |i: usize| if i == 0 { 0.0 } else { per_mm[i - 1] };
+        let behind = |i: usize| if i + 1 == n { 0.0 } else { per_mm[i] };
+        let [double, single] = LEAST_TERMS;
+        let forward: Vec<LightPass<f64>> = (0..n).map(|i| losses[i].pass(before(i), double)).collect();
+        let backward = (0..n).rev().map(|i| LightPass { per_mm: behind(i), ..forward[i].clone() }).collect();
+        let backward_f32 = (0..n).rev().map(|i| losses[i].pass(behind(i), single)).collect();
+        Self { forward, backward, backward_f32 }
+    }
+}
+
+/// The light along the rays of a batch: what is left of unpolarized light, and how it has become polarized.
+#[derive(Clone, Debug)]
+pub struct RayLight(pub(crate) Lights<f64>);
+
+/// The same in single precision.
+#[derive(Clone, Debug)]
+pub struct RayLightF32(pub(crate) Lights<f32>);
+
+impl RayLight {
+    /// Returns unpolarized light along so many rays.
+    pub fn unpolarized(n_rays: usize) -> Self {
+        Self(Lights::unpolarized(n_rays))
+    }
+
+    /// Returns the share of a ray's light that is left; of one that has ended, that on its way there.
+    pub fn share(&self, ray: usize) -> f64 {
+        self.0.share(ray)
+    }
+}
+
+impl RayLightF32 {
+    /// Returns unpolarized light along so many rays.
+    pub fn unpolarized(n_rays: usize) -> Self {
+        Self(Lights::unpolarized(n_rays))
+    }
+
+    /// Returns the share of a ray's light that is left.
+    pub fn share(&self, ray: usize) -> f64 {
+        self.0.share(ray)
+    }
+}
+
+/// Takes light through one surface along rays that have been traced to it and on: with the points and directions before.
+pub(crate) fn pass_one_by_one(
+    lights: &mut Lights<f64>,
+    pass: &LightPass<f64>,
+    before: &[(DVec3, DVec3)],
+    after: impl Fn(usize) -> Option<(DVec3, DVec3)>,
+) {
+    for (i, (from, direction)) in before.iter().enumerate() {
+        if let Some((to, turned)) = after(i) {
+            lights.pass_one(i, pass, (to - *from).dot(*direction), direction.to_array(), turned.to_array());
+        }
+    }
+}
+
+/// Rings of rays over which the transmission of the beam on the axis is taken, and azimuths.
+const AXIAL_RINGS: usize = 4;
+const AXIAL_AZIMUTHS: usize = 48;
+
+impl MonoLens {
+    /// Whether no light is lost at surfaces or in glass.
+    pub fn is_lossless(&self) -> bool {
+        self.losses.is_none()
+    }
+
+    /// Traces rays through all surfaces, as [`trace`](Self::trace) does, and returns for each the share of unpolarized light that surfaces
+    /// and the glass between the first and the last let through; 0 of rays that end.
+    ///
+    /// The light is that which goes straight on: what is reflected twice comes on top (ghosts). Diffraction orders are not in it
+    /// ([`diffraction_efficiency`](Self::diffraction_efficiency)).
+    pub fn trace_shares(&self, rays: &mut RayBatch, rims: Vignetting) -> Vec<f64> {
+        let mut light = RayLight::unpolarized(rays.len());
+        self.trace_light(rays, &mut light, rims);
+        (0..rays.len()).map(|i| if rays.fate[i].is_in_flight() { light.share(i) } else { 0.0 }).collect()
+    }
+
+    /// Returns the mean share of light that the lens lets through over the beam of a point on the axis that gets through its rims; `None`
+    /// where none does. Far points have a distance of infinity; others are counted in mm from the first vertex.
+    pub fn axial_transmission(&self, object_distance_mm: f64) -> Option<f64> {
+        if self.is_lossless() {
+            return Some(1.0);
+        }
+        let point = match object_distance_mm.is_finite() {
+            true => ObjectPoint::Finite(DVec3::new(0.0, 0.0, -object_distance_mm)),
+            false => ObjectPoint::Infinite(DVec3::Z),
+        };
+        let region = PupilRegion::find(self, &point, AXIAL_AZIMUTHS)?;
+        Some(self.mean_share(&region, &point, AXIAL_RINGS))
+    }
+
+    /// Returns the mean share of a point's light that the lens lets through, over a region of its pupil.
+    pub(crate) fn mean_share(&self, region: &PupilRegion, point: &ObjectPoint, n_rings: usize) -> f64 {
+        if self.is_lossless() {
+            return 1.0;
+        }
+        let (targets, areas): (Vec<_>, Vec<f64>) = region.nodes(n_rings).into_iter().unzip();
+        let mut rays = region.plane().rays(self, point, &targets);
+        let shares = self.trace_shares(&mut rays, Vignetting::Off);
+        let lit = (0..rays.len()).filter(|&i| rays.fate[i].is_in_flight());
+        let (light, area) = lit.fold((0.0, 0.0), |(light, area), i| (light + shares[i] * areas[i], area + areas[i]));
+        if area > 0.0 { light / area } else { 0.0 }
+    }
+}
