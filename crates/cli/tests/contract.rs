@@ -198,7 +198,16 @@ fn psf_adds_polychromatic_rows_and_writes_its_table_and_mosaic() {
         ["psf", "paper-2el", "--fields-deg", "0,2", "--film-mm", "51.8145", "--stop-mm", "4", "--pixel-um", "4"];
     // With losses the mean wavelength is that of the light that is left.
     let light = [
-        "--wavelengths-nm", "500,600", "--polychromatic", "--mtf-per-mm", "10", "--csv", "t.csv", "-o", "m.png", "--coating",
+        "--wavelengths-nm",
+        "500,600",
+        "--polychromatic",
+        "--mtf-per-mm",
+        "10",
+        "--csv",
+        "t.csv",
+        "-o",
+        "m.png",
+        "--coating",
         "ideal",
     ];
     let records = json(folder.path(), &[&common[..], &light, &["--json"]].concat());
@@ -608,4 +617,50 @@ fn round_halos_of_other_pupils_are_stated() {
     };
     assert!(is_noted("obscured.ron", &[]));
     assert!(!is_noted("open.ron", &[]) && !is_noted("obscured.ron", &["--diffraction", "none"]));
+}
+
+#[test]
+fn lens_info_has_the_light_that_gets_through() {
+    let folder = tempfile::tempdir().unwrap();
+    let of = |coating: &[&str]| {
+        let records = json(folder.path(), &[&["lens", "info", "dgauss-50mm", "--json"], coating].concat());
+        ["transmission", "t_number", "f_number"].map(|key| records[0][key].as_f64().unwrap())
+    };
+    let [share, t_number, f_number] = of(&[]);
+    assert!((0.95..0.97).contains(&share) && (t_number / f_number - share.sqrt().recip()).abs() < 1e-12);
+    assert_eq!(of(&["--coating", "mgf2"]), [share, t_number, f_number]);
+    assert_eq!(of(&["--coating", "ideal"]), [1.0, f_number, f_number]);
+    assert!(of(&["--coating", "bare"])[0] < 0.6 && of(&["--coating", "bbar"])[0] > 0.99);
+    fs::write(folder.path().join("r.csv"), "wavelength_nm,angle_deg,r\n400,0,0.01\n400,60,0.01\n700,0,0.01\n700,60,0.01\n").unwrap();
+    // Eight surfaces of 1 %, and two between glasses.
+    assert!((0.915..0.99f64.powi(8)).contains(&of(&["--coating", "r.csv"])[0]));
+    for (coating, words) in [("gold", "coatings are bare, mgf2"), ("none.csv", "cannot be read")] {
+        let failed = dioptric(folder.path(), &["lens", "info", "dgauss-50mm", "--coating", coating]);
+        assert!(!failed.status.success() && String::from_utf8_lossy(&failed.stderr).contains(words), "{coating}");
+    }
+}
+
+#[test]
+fn lens_ghosts_lists_what_pairs_of_surfaces_send() {
+    let folder = tempfile::tempdir().unwrap();
+    let common = ["lens", "ghosts", "dgauss-50mm", "--fields-deg", "0,5", "--film-mm", "37.3768", "--n-rays", "2000"];
+    let table = json(folder.path(), &[&common[..], &["--json"]].concat());
+    let (fields, pairs) = (table["fields"].as_array().unwrap(), table["pairs"].as_array().unwrap());
+    assert_eq!((fields.len(), pairs.len()), (2, 45));
+    for field in fields {
+        let ghosts = field["ghosts"].as_array().unwrap();
+        let sum: f64 = ghosts.iter().map(|row| row["power_on_film"].as_f64().unwrap()).sum();
+        let veil = field["veil"].as_f64().unwrap();
+        assert!((sum / field["image"]["power_on_film"].as_f64().unwrap() / veil - 1.0).abs() < 1e-9);
+        assert!((1e-5..1e-2).contains(&veil), "{veil}");
+        let powers: Vec<f64> = ghosts.iter().map(|row| row["relative_power"].as_f64().unwrap()).collect();
+        assert!(powers.is_sorted_by(|a, b| a >= b));
+    }
+    // The image of a source above the axis is above the middle of the picture.
+    let y_mm = fields[1]["image"]["y_mm"].as_f64().unwrap();
+    assert!((4.3..4.6).contains(&y_mm), "{y_mm}");
+    let text = output(folder.path(), &common);
+    assert!(text.contains("veil") && text.contains("45 pairs; the brightest"), "{text}");
+    let none = json(folder.path(), &[&common[..], &["--coating", "ideal", "--json"]].concat());
+    assert_eq!(none["pairs"], serde_json::json!([]));
 }

@@ -343,11 +343,16 @@ impl MonoLens {
         assert_eq!(rays.len(), light.0.n_rays(), "light along each ray");
         let Some(losses) = &self.losses else { return self.trace(rays, rims) };
         let passes = &losses.transmission().forward;
-        if self.placements().is_some() {
-            let trace = |surface: usize, rays: &mut RayBatch| self.trace_surfaces(surface..surface + 1, rays, rims);
-            return trace_light_by_surfaces(passes, rays, &mut light.0, trace);
-        }
         let steps = self.steps_for(rays.object_z_mm);
+        if let Some(placements) = self.placements() {
+            if steps.iter().any(|step| step.is_mirror) {
+                let trace = |surface: usize, rays: &mut RayBatch| self.trace_surfaces(surface..surface + 1, rays, rims);
+                return trace_light_by_surfaces(passes, rays, &mut light.0, trace);
+            }
+            let plan = |own: &[Step], place: usize| Plan::new(own, place, rims);
+            let both = (&mut rays.slices(), &mut light.0);
+            return trace::trace_placed_light_by((&steps, placements), plan, passes, both);
+        }
         trace::trace_light(&Plan::new(&steps, 0, rims), passes, rays.slices(), &mut light.0);
     }
 

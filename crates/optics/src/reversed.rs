@@ -197,13 +197,18 @@ impl ReversedLens {
         let steps = part_of(&mirrored_steps(&self.forward, rays.object_z_mm), self.forward.stop(), part);
         let first = self.forward.first_of(part);
         match self.poses_of(part) {
-            Some(placements) => {
+            Some(placements) if steps.iter().any(|step| step.is_mirror) => {
                 let plan = |at: usize| {
                     move |own: &[Step], place: usize| Plan::reversed(own, first - at - place, rims, at + place == 0)
                 };
                 trace_light_by_surfaces(&passes, rays, lights, |at, rays| {
                     trace::trace_placed_by(&steps[at..=at], &placements[at..=at], plan(at), &mut rays.slices());
                 });
+            }
+            Some(placements) => {
+                let plan = |own: &[Step], place: usize| Plan::reversed(own, first - place, rims, place == 0);
+                let both = (&mut rays.slices(), &mut *lights);
+                trace::trace_placed_light_by((&steps, placements), plan, &passes, both);
             }
             None => trace::trace_light(&plan_of(&steps, part, first, rims), &passes, rays.slices(), lights),
         }

@@ -31,7 +31,10 @@ use self::{
 pub(crate) use self::{
     light::{Argument, LightPass, Lights, trace_light},
     phase::Phase,
-    placed::{move_to_placed_conic, move_to_placed_plane, placed_clearances, trace_placed, trace_placed_by},
+    placed::{
+        move_to_placed_conic, move_to_placed_plane, placed_clearances, trace_placed, trace_placed_by,
+        trace_placed_light_by,
+    },
     plan::Plan,
     real::Real,
     tree::{GhostTree, SideLight},

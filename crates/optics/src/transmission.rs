@@ -28,7 +28,7 @@ pub(crate) enum SurfaceLoss {
 /// Points at which a surface is looked at, and so the most terms of its series.
 const N_NODES: usize = 32;
 /// Terms of a series below this are left out: in double precision, and in single.
-pub(crate) const LEAST_TERMS: [f64; 2] = [1e-12, 1e-7];
+pub(crate) const LEAST_TERMS: [f64; 2] = [1e-10, 1e-7];
 
 /// What light loses in a lens at one wavelength: the passes through its surfaces, in double and single precision, in the order in which
 /// light meets them forward and backward.

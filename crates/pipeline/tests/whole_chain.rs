@@ -11,9 +11,9 @@ use std::{
 };
 
 use dioptric_pipeline::{
-    Camera, Capture, Clock, Crop, Diffraction, ExrSamples, FilmSpec, FocusSpec, FramesSpec, ImagingTimes, KeptCamera,
-    LensSpec, Movements, PipelineError, Progress, Quality, SceneSource, SceneSpec, SenseRequest, SensorSpec, Silent,
-    Stage, StopSpec, WavelengthSpec, with_exposure_s,
+    Camera, Capture, Clock, CoatingSpec, Crop, Diffraction, ExrSamples, FilmSpec, FocusSpec, FramesSpec, ImagingTimes,
+    KeptCamera, LensSpec, Movements, PipelineError, Progress, Quality, SceneSource, SceneSpec, SenseRequest,
+    SensorSpec, Silent, Stage, StopSpec, WavelengthSpec, with_exposure_s,
 };
 use dioptric_scene::Pattern;
 use dioptric_sensor::{NoiseSource, NoiseSources, Processing};
@@ -62,12 +62,13 @@ fn plane_of_known_radiance_lights_the_film_absolutely() {
         camera.scene.illuminance_lux = Some(illuminance_lux);
         let grid = camera.wavelengths.grid().unwrap().unwrap();
         let shot = capture(camera);
-        // A white under D65, seen by a lens of f/n from afar: π L / (4 n²).
+        // A white under D65, seen by a lens of f/n from afar: π L T / (4 n²), T what surfaces let through.
         let radiance = Illuminant::D65.white_radiance(&grid, illuminance_lux);
         for (band, radiance) in radiance.iter().enumerate() {
             // The f-number is set at 550 nm and paraxial: spherical aberration of the pupil is .4 % at f/4 (README).
-            let n = shot.lens.lens.at(grid.centers_nm()[band]).unwrap().first_order().f_number;
-            let expected = PI * radiance / (4.0 * n * n);
+            let lens = shot.lens.lens.at(grid.centers_nm()[band]).unwrap();
+            let (n, share) = (lens.first_order().f_number, lens.axial_transmission(f64::INFINITY).unwrap());
+            let expected = PI * radiance * share / (4.0 * n * n);
             let ratio = at_middle(&shot, band) / expected;
             assert!((ratio - 1.0).abs() < 0.006, "f/{n}, band {band}: {ratio}");
         }
@@ -113,6 +114,8 @@ fn white_target_is_neutral_in_the_picture() {
     for light in [Illuminant::D65, Illuminant::A] {
         let mut camera = before(Pattern::Uniform);
         camera.scene.illuminant = Some(light.clone());
+        // The balance knows the sensor and the light, not the faint color of coatings.
+        camera.lens_reading.coating = Some(CoatingSpec::Ideal);
         camera.wavelengths = WavelengthSpec::Range { first_nm: 400.0, last_nm: 700.0, step_nm: 10.0 };
         let shot = capture(camera);
         let codes = &shot.developed.picture.codes;

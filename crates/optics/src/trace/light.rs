@@ -5,6 +5,7 @@
 //! A surface needs no more than the directions before and behind it: their cross product is the normal of the plane of incidence, and their
 //! product says the angle (docs/stray-light.md, eq. 3).
 
+use glam::{DMat3, DVec3};
 use multiversion::multiversion;
 
 use super::{
@@ -115,6 +116,17 @@ impl<T: Real> Lights<T> {
     /// Sees the light as rays do that are mirrored at the plane z = 0.
     pub(crate) fn mirror(&mut self) {
         self.z.iter_mut().for_each(|z| *z = -*z);
+    }
+
+    /// Sees the light in a turned frame.
+    pub(super) fn turn(&mut self, rotation: &DMat3) {
+        if *rotation == DMat3::IDENTITY {
+            return;
+        }
+        for ((x, y), z) in self.x.iter_mut().zip(&mut self.y).zip(&mut self.z) {
+            let turned = *rotation * DVec3::new(x.to_f64(), y.to_f64(), z.to_f64());
+            (*x, *y, *z) = (T::of(turned.x), T::of(turned.y), T::of(turned.z));
+        }
     }
 
     /// Takes the light of one ray through a surface: the way to it, and the directions before and behind.
@@ -286,9 +298,10 @@ impl<T: Real, const N: usize> Lane<T, N> {
 fn series_at<T: Real, const N: usize>(coefficients: &[T], x: &[T; N]) -> [T; N] {
     let (mut next, mut after) = ([T::ZERO; N], [T::ZERO; N]);
     let Some((&constant, rest)) = coefficients.split_first() else { return next };
+    let double: [T; N] = std::array::from_fn(|i| T::TWO * x[i]);
     for &coefficient in rest.iter().rev() {
         for i in 0..N {
-            let here = T::TWO * x[i] * next[i] - after[i] + coefficient;
+            let here = double[i] * next[i] - after[i] + coefficient;
             after[i] = next[i];
             next[i] = here;
         }

@@ -7,6 +7,7 @@
 use super::{
     Goal, Plan, Step, Vignetting,
     crossing::{ConicForm, Ray, cross_conic},
+    light::{LightPass, Lights, trace_light},
     move_to_plane, trace_batch, trace_clearances,
 };
 use crate::{Placement, RayFate, rays::RaySlices};
@@ -37,6 +38,25 @@ pub(crate) fn trace_placed_by(
             trace_batch(&plan, Goal::LastSurface, rays.reborrow());
             group.diffract(plan.surface(group.own.len() - 1), &mut rays);
         });
+    }
+}
+
+/// Traces rays and their light by such plans, through surfaces of which none is a mirror; a pass of light for each step.
+pub(crate) fn trace_placed_light_by(
+    (steps, placements): (&[Step], &[Placement]),
+    plan: impl Fn(&[Step], usize) -> Plan<f64>,
+    passes: &[LightPass<f64>],
+    (rays, lights): (&mut RaySlices<'_>, &mut Lights<f64>),
+) {
+    for group in Group::all(steps, placements) {
+        let plan = plan(&group.own, group.place);
+        lights.turn(&group.frame.rotation.transpose());
+        in_frame(&group.frame, false, rays, |mut rays| {
+            let own = &passes[group.place..group.place + group.own.len()];
+            trace_light(&plan, own, rays.reborrow(), lights);
+            group.diffract(plan.surface(group.own.len() - 1), &mut rays);
+        });
+        lights.turn(&group.frame.rotation);
     }
 }
 

@@ -140,7 +140,8 @@ fn pairs_of_the_double_gauss_are_those_of_another_tracer() {
     const LEFT_OUT: [(usize, usize); 4] = [(10, 6), (6, 4), (8, 4), (10, 4)];
     for kind in ["bare", "mgf2"] {
         for field_deg in [0.0f64, 5.0, 10.0] {
-            let path = dioptric_golden::shared(&format!("reference/ghosts/dgauss-50mm_{kind}_{field_deg}.json")).unwrap();
+            let path =
+                dioptric_golden::shared(&format!("reference/ghosts/dgauss-50mm_{kind}_{field_deg}.json")).unwrap();
             let json: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap();
             let found = double_gauss(kind, field_deg);
             let rows = json["pairs"].as_array().unwrap();

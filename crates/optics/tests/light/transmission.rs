@@ -40,13 +40,13 @@ fn a_slanted_plate_transmits_each_polarization_by_itself() {
         let expected = 0.5 * (there.t_s * there.t_s + there.t_p * there.t_p);
         let direction = DVec3::new(0.3 * degrees.to_radians().sin(), 0.91f64.sqrt() * degrees.to_radians().sin(), cos);
         let found = share_of(&bare, DVec3::ZERO, direction);
-        assert!((found - expected).abs() < 1e-10, "{degrees}: {found} {expected}");
+        assert!((found - expected).abs() < 1e-9, "{degrees}: {found} {expected}");
     }
-    // Films are series: good to 1e-10 too.
+    // Surfaces are series: good to 1e-9.
     for coating in [Coating::MGF2, Coating::named("bbar").unwrap(), Coating::named("vcoat").unwrap()] {
         let coated = plate.clone().with_light_loss(Some(coating)).unwrap();
         let straight = share_of(&coated, DVec3::ZERO, DVec3::Z);
-        assert!(straight > 0.96 && straight < 1.0 + 1e-10, "{straight}");
+        assert!(straight > 0.96 && straight < 1.0 + 1e-9, "{straight}");
     }
     let mgf2 = plate.with_light_loss(Some(Coating::MGF2)).unwrap();
     let film = Film::new(1.0, &[(1.38.into(), NM / 4.0 / 1.38)], 1.5.into(), NM).shares(0.6);
@@ -73,7 +73,7 @@ fn crossed_plates_turn_the_plane_of_incidence() {
         let moves = vec![tilt((0, 1), angle, 0.0), tilt((2, 3), second[0], second[1])];
         let lens = lens(&rows, 60.0).with_moves(moves).unwrap().with_light_loss(Some(Coating::Bare)).unwrap();
         let found = share_of(&lens, DVec3::new(0.0, 0.0, -50.0), DVec3::Z);
-        assert!((found - expected).abs() < 1e-10, "{found} {expected}");
+        assert!((found - expected).abs() < 1e-9, "{found} {expected}");
     }
 }
 
