@@ -631,7 +631,11 @@ fn lens_info_has_the_light_that_gets_through() {
     assert_eq!(of(&["--coating", "mgf2"]), [share, t_number, f_number]);
     assert_eq!(of(&["--coating", "ideal"]), [1.0, f_number, f_number]);
     assert!(of(&["--coating", "bare"])[0] < 0.6 && of(&["--coating", "bbar"])[0] > 0.99);
-    fs::write(folder.path().join("r.csv"), "wavelength_nm,angle_deg,r\n400,0,0.01\n400,60,0.01\n700,0,0.01\n700,60,0.01\n").unwrap();
+    fs::write(
+        folder.path().join("r.csv"),
+        "wavelength_nm,angle_deg,r\n400,0,0.01\n400,60,0.01\n700,0,0.01\n700,60,0.01\n",
+    )
+    .unwrap();
     // Eight surfaces of 1 %, and two between glasses.
     assert!((0.915..0.99f64.powi(8)).contains(&of(&["--coating", "r.csv"])[0]));
     for (coating, words) in [("gold", "coatings are bare, mgf2"), ("none.csv", "cannot be read")] {

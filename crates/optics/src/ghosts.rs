@@ -5,14 +5,17 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::{
-    MonoLens, ObjectPoint, OpticsError, RayBatch,
+    MonoLens, ObjectPoint, OpticsError, RayBatch, RayBatchF32,
+    rays::RaySlices,
     reversed::mirrored,
-    trace::{GhostTree, LightPass, SideLight, Step},
-    transmission::{LEAST_TERMS, Transmission},
+    trace::{GhostTree, LightPass, Real, SideLight, Step},
+    transmission::LEAST_TERMS,
 };
 
 /// Rays that one task sends through the tree of all pairs.
 const CHUNK: usize = 2048;
+/// The most rays that are followed in double precision; of more the means are good to 1e-5 in single.
+const MOST_DOUBLE: usize = 30_000;
 
 /// What ghosts of a lens are asked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -130,66 +133,79 @@ impl MonoLens {
         if !(film_distance_mm.is_finite()) {
             return refuse("to a film at a finite distance alone");
         }
-        let Some(losses) = &self.losses else {
-            let tree = self.ghost_tree(None, film_distance_mm);
-            return Ok(self.traced(&tree, request, &[]));
+        let reflects = |i: &usize| {
+            self.losses.as_ref().is_some_and(|losses| losses.surfaces()[*i].back::<f64>(false, 1.0).is_some())
         };
-        let transmission = losses.transmission();
-        let tree = self.ghost_tree(Some((losses, transmission)), film_distance_mm);
-        let reflecting: Vec<usize> =
-            (0..self.n_surfaces()).filter(|&i| losses.surfaces()[i].back::<f64>(false, 1.0).is_some()).collect();
-        Ok(self.traced(&tree, request, &reflecting))
+        let reflecting: Vec<usize> = (0..self.n_surfaces()).filter(reflects).collect();
+        // Many rays make up for the last digits of each.
+        Ok(match request.n_rays > MOST_DOUBLE {
+            true => self.traced::<f32>(&self.ghost_tree(film_distance_mm, LEAST_TERMS[1]), request, &reflecting),
+            false => self.traced::<f64>(&self.ghost_tree(film_distance_mm, LEAST_TERMS[0]), request, &reflecting),
+        })
     }
 
-    fn ghost_tree(&self, losses: Option<(&crate::mono::Losses, &Transmission)>, film_mm: f64) -> GhostTree<f64> {
+    fn ghost_tree<T: Real>(&self, film_mm: f64, least_term: f64) -> GhostTree<T> {
         let steps = self.steps_for(f64::NEG_INFINITY);
         let backward: Vec<Step> = steps.iter().map(mirrored).collect();
         let n = steps.len();
-        let sides = |is_from_behind: bool| -> Vec<SideLight<f64>> {
+        let sides = |is_from_behind: bool| -> Vec<SideLight<T>> {
             let side = |i: usize| {
-                let Some((losses, transmission)) = losses else {
-                    return SideLight { on: LightPass::NOTHING, back: None };
+                let Some(losses) = &self.losses else { return SideLight { on: LightPass::NOTHING, back: None } };
+                // Of the medium that the light comes through; not of that before the lens and behind it.
+                let per_mm = match is_from_behind {
+                    false if i > 0 => losses.per_mm()[i - 1],
+                    true if i + 1 < n => losses.per_mm()[i],
+                    _ => 0.0,
                 };
-                let on = match is_from_behind {
-                    false => transmission.forward[i].clone(),
-                    true => transmission.backward[n - 1 - i].clone(),
-                };
-                let back = losses.surfaces()[i].back::<f64>(is_from_behind, LEAST_TERMS[0]);
-                let per_mm = on.per_mm;
-                SideLight { on, back: back.map(|back| LightPass { per_mm, ..back }) }
+                let surface = &losses.surfaces()[i];
+                let back = surface.back::<T>(is_from_behind, least_term);
+                SideLight {
+                    on: surface.pass(per_mm, least_term),
+                    back: back.map(|back| LightPass { per_mm: T::of(per_mm), ..back }),
+                }
             };
             (0..n).map(side).collect()
         };
         GhostTree::new([&steps, &backward], [sides(false), sides(true)], film_mm)
     }
 
-    fn traced(&self, tree: &GhostTree<f64>, request: &GhostRequest, reflecting: &[usize]) -> Ghosts {
+    fn traced<T: Traced>(&self, tree: &GhostTree<T>, request: &GhostRequest, reflecting: &[usize]) -> Ghosts {
         let n = self.n_surfaces();
         let is_half = self.is_rotational() && lies_along_y(&request.point);
-        let (mut rays, weights) = self.front_rays(request, is_half);
+        let targets = self.front_targets(request, is_half);
+        let weight = |target: &DVec2| match request.point {
+            ObjectPoint::Infinite(_) => 1.0,
+            ObjectPoint::Finite(place) => {
+                let way = target.extend(0.0) - place;
+                way.z.abs() / way.length().powi(3)
+            }
+        };
+        let weights: Vec<f64> = targets.iter().map(weight).collect();
         let all: f64 = weights.iter().sum();
         let n_rays = weights.len();
         let at = |pair: Option<[usize; 2]>| pair.map_or(0, |[first, second]| 1 + first * n + second);
         let half_mm = request.film_half_mm.unwrap_or(DVec2::INFINITY);
-        let of_chunk = |(chunk, rays): (usize, crate::rays::RaySlices<'_>)| {
+        let of_chunk = |(targets, weights): (&[DVec2], &[f64])| {
             let mut sums = vec![Sums::default(); 1 + n * n];
-            tree.trace(&rays, &mut |pair, start, [x, y], shares| {
-                let here = &mut sums[at(pair)];
-                for (i, share) in shares.iter().enumerate().filter(|(_, share)| **share > 0.0) {
-                    let power = share * weights[chunk * CHUNK + start + i];
-                    let place = DVec2::new(x[i], y[i]);
-                    here.power += power;
-                    here.n_open += 1.0;
-                    here.place += power * place;
-                    here.square += power * place.length_squared();
-                    if place.abs().cmple(half_mm).all() {
-                        here.on_film += power;
+            T::with_slices(&self.rays_towards(&request.point, targets, 0.0, 0.0), |rays| {
+                tree.trace(&rays, &mut |pair, start, [x, y], shares| {
+                    let here = &mut sums[at(pair)];
+                    for (i, share) in shares.iter().enumerate().filter(|(_, share)| **share > 0.0) {
+                        let power = share * weights[start + i];
+                        let place = DVec2::new(x[i].to_f64(), y[i].to_f64());
+                        here.power += power;
+                        here.n_open += 1.0;
+                        here.place += power * place;
+                        here.square += power * place.length_squared();
+                        if place.abs().cmple(half_mm).all() {
+                            here.on_film += power;
+                        }
                     }
-                }
+                });
             });
             sums
         };
-        let parts: Vec<Vec<Sums>> = rays.par_slices(CHUNK).enumerate().map(of_chunk).collect();
+        let parts: Vec<Vec<Sums>> = targets.par_chunks(CHUNK).zip(weights.par_chunks(CHUNK)).map(of_chunk).collect();
         let mut sums = vec![Sums::default(); 1 + n * n];
         for part in &parts {
             sums.iter_mut().zip(part).for_each(|(sum, here)| sum.add(here));
@@ -209,27 +225,17 @@ impl MonoLens {
         Ghosts { direct, pairs }
     }
 
-    /// Returns rays from the point through a square grid over the front rim's circle, and their weights; of half the circle at x > 0 where
-    /// the other half is its mirror image.
-    fn front_rays(&self, request: &GhostRequest, is_half: bool) -> (RayBatch, Vec<f64>) {
+    /// Returns places of a square grid over the front rim's circle; of half the circle at x > 0 where the other half is its mirror image.
+    fn front_targets(&self, request: &GhostRequest, is_half: bool) -> Vec<DVec2> {
         let radius_mm = self.semi_aperture_mm(0);
         let n_across = (2.0 * (request.n_rays.max(1) as f64 / std::f64::consts::PI).sqrt()).ceil().max(2.0) as usize;
         let n_across = n_across.next_multiple_of(2);
         let at = |i: usize| radius_mm * ((2 * i + 1) as f64 / n_across as f64 - 1.0);
         let columns = if is_half { n_across / 2..n_across } else { 0..n_across };
-        let targets: Vec<DVec2> = (0..n_across)
+        (0..n_across)
             .flat_map(|row| columns.clone().map(move |column| DVec2::new(at(column), at(row))))
             .filter(|place| place.length() <= radius_mm)
-            .collect();
-        let weight = |target: &DVec2| match request.point {
-            ObjectPoint::Infinite(_) => 1.0,
-            ObjectPoint::Finite(place) => {
-                let way = target.extend(0.0) - place;
-                way.z.abs() / way.length().powi(3)
-            }
-        };
-        let weights = targets.iter().map(weight).collect();
-        (self.rays_towards(&request.point, &targets, 0.0, 0.0), weights)
+            .collect()
     }
 
     /// Returns how many times as far from the axis as the image a ghost's middle lies on the film: along the paraxial ray through the
@@ -274,6 +280,24 @@ impl MonoLens {
         }
         ray = go(reflect(ray, -curvature(second)), gap(second));
         to_film(forward(ray, second + 1)) / direct
+    }
+}
+
+/// A precision in which ghosts are followed.
+trait Traced: Real {
+    /// Hands rays on in this precision.
+    fn with_slices(rays: &RayBatch, work: impl FnOnce(RaySlices<'_, Self>));
+}
+
+impl Traced for f64 {
+    fn with_slices(rays: &RayBatch, work: impl FnOnce(RaySlices<'_, Self>)) {
+        work(rays.clone().slices());
+    }
+}
+
+impl Traced for f32 {
+    fn with_slices(rays: &RayBatch, work: impl FnOnce(RaySlices<'_, Self>)) {
+        work(RayBatchF32::from(rays).slices());
     }
 }
 

@@ -56,6 +56,11 @@ pub(crate) struct Losses {
 }
 
 impl Losses {
+    /// Absorption behind each surface, 1/mm.
+    pub(crate) fn per_mm(&self) -> &[f64] {
+        &self.per_mm
+    }
+
     pub(crate) fn surfaces(&self) -> &[SurfaceLoss] {
         &self.surfaces
     }

@@ -30,6 +30,9 @@ const N_NODES: usize = 32;
 /// Terms of a series below this are left out: in double precision, and in single.
 pub(crate) const LEAST_TERMS: [f64; 2] = [1e-10, 1e-7];
 
+/// How many times as large terms of the last two series are left out.
+const TURNING: f64 = 100.0;
+
 /// What light loses in a lens at one wavelength: the passes through its surfaces, in double and single precision, in the order in which
 /// light meets them forward and backward.
 #[derive(Clone, Debug)]
@@ -139,7 +142,7 @@ impl SurfaceLoss {
     }
 
     /// Returns the pass of light through the surface.
-    fn pass<T: Real>(&self, per_mm: f64, least_term: f64) -> LightPass<T> {
+    pub(crate) fn pass<T: Real>(&self, per_mm: f64, least_term: f64) -> LightPass<T> {
         let per_mm = T::of(per_mm);
         if *self == Self::None {
             return LightPass { per_mm, ..LightPass::NOTHING };
@@ -202,7 +205,9 @@ impl Series {
                 sum * if i == 0 { 1.0 } else { 2.0 } / N_NODES as f64
             };
             let mut list: Vec<f64> = (0..if is_constant { 1 } else { N_NODES }).map(coefficient).collect();
-            while list.last().is_some_and(|last| last.abs() < least_term) {
+            // What turns the polarization counts for the power by the square of what polarizes.
+            let least = if k < 2 { least_term } else { TURNING * least_term };
+            while list.last().is_some_and(|last| last.abs() < least) {
                 list.pop();
             }
             list

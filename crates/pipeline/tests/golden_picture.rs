@@ -5,7 +5,7 @@ use std::path::Path;
 
 use dioptric_golden::workspace_root;
 use dioptric_pipeline::{Camera, Capture, CoatingSpec, FilmSpec, KeptCamera, SceneSource, Silent, WavelengthSpec};
-use dioptric_spectrum::Cancel;
+use dioptric_spectrum::{Bands, Cancel};
 use image::RgbImage;
 
 /// The demo on ten times larger pixels, with seven bands; all noise is seeded.

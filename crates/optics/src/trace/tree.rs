@@ -99,20 +99,23 @@ impl<T: Real> GhostTree<T> {
         note: &mut impl FnMut(Option<[usize; 2]>, usize, [&[T]; 2], &[f64]),
     ) {
         let n = self.forward.len();
-        let mut there: Vec<Lit<T>> = Vec::with_capacity(n);
+        // Where the light is before each surface and behind the last, and room for what is on its way back and forward again.
+        let mut there = vec![Lit::EMPTY; n + 1];
+        let [mut back, mut back_on, mut again, mut again_on] = [const { Lit::EMPTY }; 4];
         for start in (0..rays.fate.len()).step_by(LANES * TREE_BLOCKS) {
-            // Straight on, keeping where the light is before each surface.
-            there.clear();
-            let mut here = Lit::load(rays, start, self.first_z);
-            kernel::approach(self.index_before, &mut here.rays);
-            for side in &self.forward {
-                there.push(here.clone());
-                here = side.passed(&here);
+            there[0] = Lit::load(rays, start, self.first_z);
+            kernel::approach(self.index_before, &mut there[0].rays);
+            for (i, side) in self.forward.iter().enumerate() {
+                let (before, behind) = there.split_at_mut(i + 1);
+                side.pass_on(&before[i], &mut behind[0], side.on.shift);
             }
-            self.note_on_film(None, start, here, note);
+            self.note_on_film(None, start, &mut there[n].clone(), note);
             for j in 1..n {
                 // Back from a surface …
-                let Some(mut back) = self.forward[j].reflected(&there[j]) else { continue };
+                let first = &self.forward[j];
+                if !first.send_back(&there[j], &mut back, first.back.shift) {
+                    continue;
+                }
                 for i in (0..j).rev() {
                     if !back.is_any_alive() {
                         break;
@@ -120,17 +123,19 @@ impl<T: Real> GhostTree<T> {
                     // The way from the surface behind is that to it.
                     let (shift, side) = (self.forward[i + 1].on.shift, &self.backward[i]);
                     // … and forward again from each before it.
-                    if let Some(mut again) = side.reflected_over(&back, shift) {
+                    if side.send_back(&back, &mut again, shift) {
                         for side in &self.forward[i + 1..] {
                             if !again.is_any_alive() {
                                 break;
                             }
-                            again = side.passed(&again);
+                            side.pass_on(&again, &mut again_on, side.on.shift);
+                            std::mem::swap(&mut again, &mut again_on);
                         }
-                        self.note_on_film(Some([j, i]), start, again, note);
+                        self.note_on_film(Some([j, i]), start, &mut again, note);
                     }
                     if i > 0 {
-                        back = side.passed_over(&back, shift);
+                        side.pass_on(&back, &mut back_on, shift);
+                        std::mem::swap(&mut back, &mut back_on);
                     }
                 }
             }
@@ -141,7 +146,7 @@ impl<T: Real> GhostTree<T> {
         &self,
         pair: Option<[usize; 2]>,
         start: usize,
-        mut lit: Lit<T>,
+        lit: &mut Lit<T>,
         note: &mut impl FnMut(Option<[usize; 2]>, usize, [&[T]; 2], &[f64]),
     ) {
         if !lit.is_any_alive() {
@@ -161,24 +166,16 @@ impl<T: Real> GhostTree<T> {
 }
 
 impl<T: Real> Side<T> {
-    fn passed(&self, from: &Lit<T>) -> Lit<T> {
-        self.passed_over(from, self.on.shift)
-    }
-
-    fn passed_over(&self, from: &Lit<T>, shift: T) -> Lit<T> {
-        let mut to = from.clone();
+    /// Lets light on, from a surface that lies before this one by `shift`.
+    fn pass_on(&self, from: &Lit<T>, to: &mut Lit<T>, shift: T) {
         self.on.form.pass_blocks(shift, &from.rays, &mut to.rays);
+        to.light = from.light;
         to.shade(&self.on_light, shift, from);
-        to
     }
 
-    fn reflected(&self, from: &Lit<T>) -> Option<Lit<T>> {
-        self.reflected_over(from, self.back.shift)
-    }
-
-    fn reflected_over(&self, from: &Lit<T>, shift: T) -> Option<Lit<T>> {
-        let light = self.back_light.as_ref()?;
-        let mut to = from.clone();
+    /// Sends light back; returns whether any comes back.
+    fn send_back(&self, from: &Lit<T>, to: &mut Lit<T>, shift: T) -> bool {
+        let Some(light) = &self.back_light else { return false };
         self.back.form.pass_blocks(shift, &from.rays, &mut to.rays);
         // The kernel leaves directions behind a mirror reversed.
         for block in &mut to.rays {
@@ -186,13 +183,16 @@ impl<T: Real> Side<T> {
                 list.iter_mut().for_each(|v| *v = -*v);
             }
         }
+        to.light = from.light;
         to.shade(light, shift, from);
         to.fold();
-        Some(to)
+        true
     }
 }
 
 impl<T: Real> Lit<T> {
+    const EMPTY: Self = Self { rays: [Block::EMPTY; TREE_BLOCKS], light: [Lane::UNPOLARIZED; TREE_BLOCKS] };
+
     fn load(rays: &RaySlices<'_, T>, start: usize, first_z: T) -> Self {
         let block = |k: usize| match start + k * LANES < rays.fate.len() {
             true => Block::load(rays, start + k * LANES, first_z),
