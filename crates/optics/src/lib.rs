@@ -44,7 +44,7 @@ mod wavefront_error;
 pub mod zernike;
 
 pub use air::Air;
-pub use aperture::{Aperture, Outline};
+pub use aperture::{Aperture, EdgeNearby, Iris, IrisOpening, Outline, StopEdges};
 pub use beam::{Beam, rays_over_front};
 pub use bundle::{ObjectPoint, rays_towards};
 pub use diffractive::{Blaze, DiffractiveSurface, PhaseProfile};
