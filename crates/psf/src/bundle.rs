@@ -100,11 +100,7 @@ impl FilmPointJob<'_> {
 
         // Trace the nodes of the mesh; a ray that fails at the very edge of the pupil takes the place of its neighbor inside.
         let mesh = self.mesh;
-        let node = |(i, (share, azimuth)): (usize, (f64, f64))| {
-            let j = i.saturating_sub(1) % mesh.n_azimuths;
-            polar(outline.center, share * outline.rho[2 * j], azimuth)
-        };
-        let cosines: Vec<DVec2> = mesh.nodes().enumerate().map(node).collect();
+        let cosines = outline.nodes(mesh);
         let mut rays = cone.rays(&cosines);
         let mut at_stop = if has_stop { self.at_stop(rays.clone()) } else { vec![] };
         self.lens.trace(&mut rays, Vignetting::Off);
@@ -120,7 +116,7 @@ impl FilmPointJob<'_> {
         }
 
         // Weigh cells by their projected solid angle and by what obscurations and other diffraction orders leave of it.
-        let mut energies = cell_areas(mesh, &outline.rho);
+        let mut energies = cell_areas(mesh, &outline);
         if self.unobscured.is_some() {
             let shares = clear_shares(mesh, &outline, &|cosines, with| self.passed(&cone, cosines, with));
             energies.iter_mut().zip(shares).for_each(|(e, share)| *e *= share);
@@ -141,11 +137,12 @@ impl FilmPointJob<'_> {
 
     fn outline(&self, cone: &FilmCone<'_>, seed: Option<&Outline>) -> Option<Outline> {
         let clearances = |cosines: &[DVec2]| cone.clearances(cosines);
-        seed.and_then(|seed| seed.settled(&clearances)).or_else(|| {
+        let found = seed.and_then(|seed| seed.settled(&clearances)).or_else(|| {
             let (center, rho) = cone.edge(2 * self.mesh.n_azimuths)?;
-            let found = Outline { center, rho };
+            let found = Outline::even(center, rho);
             Some(found.settled(&clearances).unwrap_or(found))
-        })
+        })?;
+        Some(if self.lens.forward().has_openings() { found.with_corners(&clearances) } else { found })
     }
 
     fn scene_rays(&self, rays: &RayBatch) -> Vec<SceneRay> {
