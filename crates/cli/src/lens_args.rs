@@ -6,7 +6,7 @@ use clap::{Args, Subcommand, ValueEnum};
 use dioptric_analysis::{AnalysisFilm, LensDefaults};
 use dioptric_pipeline::{FocusSpec, GlassRange, LensReadOptions, MissingGlass, SeqNumbers, StopSpec, parse_numbers};
 
-use crate::{common::Common, movement_args::MovementArgs, terminal::remark};
+use crate::{common::Common, iris_args::IrisArgs, movement_args::MovementArgs, terminal::remark};
 
 /// Something to do with lenses.
 #[derive(Debug, Subcommand)]
@@ -56,6 +56,8 @@ pub(crate) struct LensStateArgs {
     /// Diameter of the stop, mm [default: the lens's own]
     #[arg(long, value_name = "D")]
     pub(crate) stop_mm: Option<f64>,
+    #[command(flatten)]
+    pub(crate) iris: IrisArgs,
     #[command(flatten)]
     pub(crate) movements: MovementArgs,
 }
@@ -108,7 +110,9 @@ impl LensStateArgs {
         common: &Common,
     ) -> anyhow::Result<LensDefaults> {
         let n_told = used.notes.len();
-        let placed = used.placed(self.stop().unwrap_or_default(), self.movements.movements(), wavelength_nm)?;
+        let mut iris = used.lens.iris().copied();
+        self.iris.change(&mut iris)?;
+        let placed = used.placed(self.stop().unwrap_or_default(), iris, self.movements.movements(), wavelength_nm)?;
         placed.notes[n_told..].iter().for_each(|note| remark(common.quiet, note));
         Ok(placed)
     }

@@ -75,6 +75,9 @@ pub struct LensData {
     /// obscurations, tilted or decentered.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub f_number_of_light: Option<f64>,
+    /// The f-number of the largest round beam within the blades of a stop that they close.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub f_number_inscribed: Option<f64>,
     /// Whether the stop limits the light of the point on the axis at the object's distance. Where it does not, f-number and
     /// diameters of pupils are those of the beam that the rims let through.
     pub stop_limits: bool,
@@ -219,7 +222,8 @@ impl LensData {
             });
         }
         let mono = lens.at(wavelength_nm)?;
-        let x_plane = (!lens.is_rotational()).then(|| PlaneData::of_x(&mono));
+        let is_round_but_for_blades = lens.clone().with_iris(None).is_ok_and(|lens| lens.is_rotational());
+        let x_plane = (!is_round_but_for_blades).then(|| PlaneData::of_x(&mono));
         let colors_nm = question.colors_nm(lens);
         let settings = SeidelSettings {
             wavelength_nm,
@@ -249,6 +253,9 @@ impl LensData {
             first_order: first,
             real_f_number: mono.real_f_number(),
             f_number_of_light: has_odd_apertures.then(|| mono.f_number_of_light()).flatten(),
+            f_number_inscribed: lens
+                .iris_opening()
+                .map(|opening| first.f_number * lens.stop_semi_aperture_mm() / opening.inscribed_radius_mm()),
             stop_limits: limit.is_none_or(|beam| beam.limiting_surface == mono.stop()),
             limiting_surface: limit.map_or(mono.stop(), |beam| beam.limiting_surface),
             angular_magnification: angular_magnification(lens, &mono),

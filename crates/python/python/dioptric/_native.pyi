@@ -68,6 +68,9 @@ class Camera:
         lens: Lens | _Path | None = ...,
         f_number: float | None = ...,
         stop_mm: float | None = ...,
+        blades: int | None = ...,
+        blade_rotation_deg: float | None = ...,
+        blade_curvature: float | None = ...,
         focus_mm: float | Literal["near"] | None = ...,
         film_mm: float | None = ...,
         tilt_deg: float | None = ...,
@@ -301,6 +304,7 @@ class Lens:
     @staticmethod
     def pinhole(diameter_mm: float) -> Lens: ...
     def with_stop(self, *, f_number: float | None = None, diameter_mm: float | None = None) -> Lens: ...
+    def with_iris(self, blades: int | None, *, rotation_deg: float = 0.0, curvature: float = 0.0) -> Lens: ...
     def with_glass_range(self, glass_range: Literal["refuse", "extend"]) -> Lens: ...
     def notes_at(self, wavelengths_nm: Sequence[float]) -> list[str]: ...
     @property
