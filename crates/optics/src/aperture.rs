@@ -166,7 +166,10 @@ mod tests {
                     let is_held = at.cmpge(low - 0.02).all() && at.cmple(high + 0.02).all();
                     assert!(!is_clear || (x.hypot(y) <= aperture.extent_mm() && is_held), "{outline:?} {x} {y}");
                     n_clear += usize::from(is_clear);
-                    // Along a line the edge is where it ends to be clear, or begins.
+                    if aperture.is_iris() && !is_clear {
+                        continue;
+                    }
+                    // Along a line the edge is where it ends to be clear, or begins; of an iris from within.
                     let own = at - DVec2::from_array(aperture.center_mm);
                     let direction = DVec2::from_angle(f64::from(7 * i + j));
                     let way_mm = aperture.outline.edge_along_mm(own, direction);

@@ -123,11 +123,11 @@ impl MonoLens {
             index_before = index_after;
         }
         let first_order = paraxial::first_order(&steps, lens.stop(), wavelength_nm);
-        // Blades reach in from a rim about the circle that has as much area.
+        // Blades reach in from the rim, beyond the circle that has as much area.
         let stop = &mut steps[lens.stop()];
         let stop_semi_aperture_mm = stop.semi_aperture;
         if let Some(opening) = lens.iris_opening() {
-            stop.semi_aperture = opening.extent_mm();
+            stop.semi_aperture = lens.full_stop_semi_aperture_mm();
             stop.apertures.push(Aperture::of_iris(lens.stop(), opening));
         }
         let rear = &lens.interfaces()[n_surfaces - 1].surface;
@@ -249,7 +249,7 @@ impl MonoLens {
         Some(lens)
     }
 
-    /// Half the clear diameter of a surface, mm; of a stop that blades close, as far as their corners.
+    /// Half the clear diameter of a surface, mm; of a stop that blades close, the rim that it has fully open.
     pub fn semi_aperture_mm(&self, surface: usize) -> f64 {
         self.steps[surface].semi_aperture
     }

@@ -148,7 +148,7 @@ impl Outline {
         }
     }
 
-    /// Returns how far from a place the edge is along a unit direction, mm; infinite where it never comes.
+    /// Returns how far from a place the edge is along a unit direction, mm; infinite where it never comes. Of an iris only from within.
     pub(super) fn edge_along_mm(&self, at_mm: DVec2, direction: DVec2) -> f64 {
         match self {
             Self::Circle { .. } | Self::Ellipse { .. } => {

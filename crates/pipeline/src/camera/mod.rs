@@ -71,7 +71,7 @@ pub struct Camera {
     #[serde(default)]
     pub stop: StopSpec,
     /// The blades that close the stop; those of the lens's own file if left out, and a round stop where that has none.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(default)]
     pub iris: Option<Iris>,
     /// How it is turned and moved before the film.
     #[serde(default)]
