@@ -5,9 +5,9 @@
 //! for parallel planes cos⁴θ A/z². L is the radiance along the ray that leaves the lens, 0 where the lens blocks it;
 //! along a ray L/n² stays the same, less what surfaces and glass take.
 
-use dioptric_diffraction::{AngularSpread, CircularStop, Hurb};
+use dioptric_diffraction::{AngularSpread, Hurb, StopEdge};
 use dioptric_optics::{
-    ExitPupilBounds, Lens, PupilReach, RayBatch, RayBatchF32, RayLightF32, ReversedLens, Vignetting,
+    ExitPupilBounds, Lens, PupilReach, RayBatch, RayBatchF32, RayLightF32, ReversedLens, StopPoint, Vignetting,
     glam::{DVec2, DVec3, Vec3},
 };
 use dioptric_world::Ray;
@@ -326,8 +326,7 @@ fn is_achromatic(lens: &Lens, wavelengths_nm: &[f64]) -> Result<bool, BackwardEr
 ///
 /// The first pair of normal numbers of a sample, which nearly all take, is given: it is the same for all its wavelengths.
 fn diffract(lens: &ReversedLens, rays: &mut RayBatchF32, model: Hurb, (samples, turns): (&[PixelSample], &[DVec2])) {
-    let forward = lens.forward();
-    let edge = CircularStop::new(forward.stop_semi_aperture_mm(), forward.wavelength_nm(), forward.stop_medium_index());
+    let edge = StopEdge::of(lens.forward());
     let placement = lens.stop_placement();
     let surface_from_lens = placement.rotation.transpose();
     for (i, sample) in samples.iter().enumerate() {
@@ -337,9 +336,7 @@ fn diffract(lens: &ReversedLens, rays: &mut RayBatchF32, model: Hurb, (samples, 
         let point_mm =
             placement.surface_from_lens(Vec3::new(rays.x_mm[i], rays.y_mm[i], rays.z_mm[i]).as_dvec3()).truncate();
         let before = surface_from_lens * Vec3::new(rays.l[i], rays.m[i], rays.n[i]).as_dvec3();
-        let r_mm = point_mm.length();
-        let AngularSpread { radial, across } = model.spread(r_mm, edge);
-        let axis = if r_mm > 0.0 { point_mm / r_mm } else { DVec2::X };
+        let (axis, AngularSpread { radial, across }) = model.spread_at(StopPoint { mm: point_mm }, &edge);
         // Draw again where the ray would be turned back, which only those within a wavelength of the edge can be.
         let drawn = (0..REDRAWS).find_map(|pair| {
             let normal = if pair == 0 { turns[i] } else { standard_normals(sample.random.pair(pair)) };

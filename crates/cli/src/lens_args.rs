@@ -8,7 +8,7 @@ use dioptric_pipeline::{
     CoatingSpec, FocusSpec, GlassRange, LensReadOptions, MissingGlass, SeqNumbers, StopSpec, parse_numbers,
 };
 
-use crate::{common::Common, movement_args::MovementArgs, terminal::remark};
+use crate::{common::Common, iris_args::IrisArgs, movement_args::MovementArgs, terminal::remark};
 
 /// Something to do with lenses.
 #[derive(Debug, Subcommand)]
@@ -61,6 +61,8 @@ pub(crate) struct LensStateArgs {
     #[arg(long, value_name = "D")]
     pub(crate) stop_mm: Option<f64>,
     #[command(flatten)]
+    pub(crate) iris: IrisArgs,
+    #[command(flatten)]
     pub(crate) movements: MovementArgs,
 }
 
@@ -112,7 +114,9 @@ impl LensStateArgs {
         common: &Common,
     ) -> anyhow::Result<LensDefaults> {
         let n_told = used.notes.len();
-        let placed = used.placed(self.stop().unwrap_or_default(), self.movements.movements(), wavelength_nm)?;
+        let mut iris = used.lens.iris().copied();
+        self.iris.change(&mut iris)?;
+        let placed = used.placed(self.stop().unwrap_or_default(), iris, self.movements.movements(), wavelength_nm)?;
         placed.notes[n_told..].iter().for_each(|note| remark(common.quiet, note));
         Ok(placed)
     }

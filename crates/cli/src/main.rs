@@ -12,6 +12,7 @@ mod develop;
 mod examples;
 mod filter;
 mod glass;
+mod iris_args;
 mod lens;
 mod lens_args;
 mod lens_compare;

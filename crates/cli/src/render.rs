@@ -91,7 +91,7 @@ pub(crate) fn run(arguments: &RenderArgs, common: &Common) -> anyhow::Result<()>
             RenderingSummary::of(rendering, notes, spec)
         });
     }
-    change_lens(&mut camera, arguments);
+    change_lens(&mut camera, arguments)?;
     change_film(&mut camera, arguments)?;
     camera.focus = match arguments.place.focus() {
         Some(focus) => focus,
@@ -194,24 +194,26 @@ fn effort(arguments: &RenderArgs) -> RenderEffort {
 fn check_lens(camera: &Camera, arguments: &RenderArgs) -> anyhow::Result<()> {
     if arguments.lens.is_some() {
         let mut camera = camera.clone();
-        change_lens(&mut camera, arguments);
+        change_lens(&mut camera, arguments)?;
         camera.lens.open(&camera.lens_reading)?;
     }
     Ok(())
 }
 
-fn change_lens(camera: &mut Camera, arguments: &RenderArgs) {
+fn change_lens(camera: &mut Camera, arguments: &RenderArgs) -> anyhow::Result<()> {
     if let Some(lens) = &arguments.lens {
         camera.lens = LensSpec::named(lens);
-        camera.stop = StopSpec::AsGiven;
+        (camera.stop, camera.iris) = (StopSpec::AsGiven, None);
         camera.lens_reading = LensReadOptions::default();
     }
     arguments.state.reading.change(&mut camera.lens_reading);
     camera.stop = arguments.state.stop().unwrap_or(camera.stop);
+    arguments.state.iris.change(&mut camera.iris)?;
     arguments.state.movements.change(&mut camera.movements);
     if let Some(kind) = arguments.diffraction {
         camera.diffraction = kind.into();
     }
+    Ok(())
 }
 
 /// Changes the pixels of the film; its width stays unless another is given.

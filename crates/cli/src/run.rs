@@ -235,12 +235,13 @@ fn change_lens(camera: &mut Camera, arguments: &RunArgs) -> anyhow::Result<()> {
     if let Some(lens) = &arguments.lens {
         camera.lens = LensSpec::named(lens);
         // The f-number in the file was meant for another lens, and so was what it says of glasses.
-        camera.stop = StopSpec::AsGiven;
+        (camera.stop, camera.iris) = (StopSpec::AsGiven, None);
         camera.lens_reading = LensReadOptions::default();
     }
     arguments.state.reading.change(&mut camera.lens_reading);
     camera.stop = arguments.state.stop().unwrap_or(camera.stop);
     camera.focus = arguments.place.focus().unwrap_or(camera.focus);
+    arguments.state.iris.change(&mut camera.iris)?;
     arguments.state.movements.change(&mut camera.movements);
     camera.crop = arguments.crop.or(camera.crop);
     if let Some(kind) = arguments.diffraction {

@@ -15,6 +15,7 @@ mod hurb;
 mod huygens;
 mod opd;
 mod sampled_hurb;
+mod stop_edge;
 mod stop_ray;
 mod wave;
 mod wavefront;
@@ -27,6 +28,7 @@ pub use hurb::{AngularSpread, CircularStop, Hurb};
 pub use huygens::HuygensSources;
 pub use opd::{best_wavefront_film_mm, opd_waves_at};
 pub use sampled_hurb::{HurbForm, SampledHurb};
+pub use stop_edge::StopEdge;
 pub use stop_ray::{StopRay, trace_stop_rays};
 pub use wave::{
     Encircled, LineSpread, Peak, PhaseRange, Propagation, PupilFunctionFit, PupilGrid, PupilOutline, PupilSamples,

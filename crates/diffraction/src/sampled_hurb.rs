@@ -1,12 +1,12 @@
 //! HURB by random deviations of single rays, in the two forms that are in use.
 
-use dioptric_optics::{Placement, RayBatch};
-use glam::{DVec2, DVec3};
+use dioptric_optics::{Placement, RayBatch, StopPoint};
+use glam::DVec3;
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
-use crate::{CircularStop, Hurb};
+use crate::{Hurb, StopEdge};
 
 /// Rays that share a stream of random numbers: results do not depend on how many threads share the work.
 const CHUNK: usize = 4096;
@@ -21,13 +21,13 @@ pub enum HurbForm {
     Angles,
 }
 
-/// HURB at a round edge by random Gaussian deviations, independent along the radius and across it.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// HURB at an edge by random Gaussian deviations, independent towards it (in a round one along the radius) and across that.
+#[derive(Clone, Debug, PartialEq)]
 pub struct SampledHurb {
     /// The constants of the model.
     pub model: Hurb,
     /// The edge.
-    pub edge: CircularStop,
+    pub edge: StopEdge,
     /// How a deviation changes the direction of a ray.
     pub form: HurbForm,
     /// The seed: ray `i` draws from its stream `i / 4096`.
@@ -64,9 +64,7 @@ impl SampledHurb {
         let place_mm = edge_placement.surface_from_lens(rays.point_mm(ray)).truncate();
 
         // Standard deviations along the radius and across it.
-        let r_mm = place_mm.length();
-        let spread = self.model.spread(r_mm, self.edge);
-        let radial = if r_mm > 0.0 { place_mm / r_mm } else { DVec2::X };
+        let (radial, spread) = self.model.spread_at(StopPoint { mm: place_mm }, &self.edge);
         let after = loop {
             let (a, b): (f64, f64) = (StandardNormal.sample(random), StandardNormal.sample(random));
             let (a, b) = (a * spread.radial, b * spread.across);
@@ -95,6 +93,7 @@ impl SampledHurb {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::CircularStop;
 
     fn bundle(n: usize, at: DVec3) -> RayBatch {
         RayBatch::from_points(&vec![at; n], &vec![DVec3::Z; n])
@@ -102,7 +101,7 @@ mod tests {
 
     fn in_air(seed: u64) -> SampledHurb {
         let form = HurbForm::DirectionCosines;
-        SampledHurb { model: Hurb::PAPER, edge: CircularStop::new(1.0, 550.0, 1.0), form, seed }
+        SampledHurb { model: Hurb::PAPER, edge: CircularStop::new(1.0, 550.0, 1.0).into(), form, seed }
     }
 
     fn rms(values: &[f64]) -> f64 {
@@ -115,7 +114,8 @@ mod tests {
         let n = 200_000;
         for form in [HurbForm::DirectionCosines, HurbForm::Angles] {
             let mut rays = bundle(n, DVec3::new(0.0, 0.8, 0.0));
-            SampledHurb { model: Hurb::PAPER, edge, form, seed: 7 }.apply(&mut rays, &Placement::centered(0.0));
+            SampledHurb { model: Hurb::PAPER, edge: edge.into(), form, seed: 7 }
+                .apply(&mut rays, &Placement::centered(0.0));
             let wanted = Hurb::PAPER.spread(0.8, edge);
             // Two standard errors of a width from n draws: √(1/2n) = 0.16 %.
             assert!((rms(&rays.m) / wanted.radial - 1.0).abs() < 0.0032);

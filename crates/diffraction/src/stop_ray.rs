@@ -141,7 +141,7 @@ mod tests {
             let (lens, mut rays, edge, unit) = figure_2(n_rays, 550.0);
             lens.trace_surfaces(0..lens.stop() + 1, &mut rays, Vignetting::On);
             let form = HurbForm::DirectionCosines;
-            SampledHurb { model, edge, form, seed: 3 }.apply(&mut rays, &lens.stop_placement());
+            SampledHurb { model, edge: edge.into(), form, seed: 3 }.apply(&mut rays, &lens.stop_placement());
             lens.to_film(&mut rays, FILM_MM);
             let share = |limit: f64| rays.x_mm.iter().filter(|x| x.abs() < limit * unit).count() as f64 / n_rays as f64;
             for limit in [0.25 * width, 0.5 * width, width, 3.0] {

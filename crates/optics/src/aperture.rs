@@ -1,15 +1,25 @@
 //! Openings and obscurations of surfaces that are no circles about the axis.
 
+mod iris;
+mod outline;
+mod stop_edges;
+
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
 use crate::OpticsError;
 
+pub use self::{
+    iris::{Iris, IrisOpening},
+    outline::Outline,
+    stop_edges::{EdgeNearby, StopEdges},
+};
+
 /// An opening of a surface beside its round rim, or something that stands before it.
 ///
 /// It is stated in the surface's own frame, by where rays meet the surface: by x and y alone. A ray passes a surface
 /// inside its rim where every aperture of the surface lets it.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Aperture {
     /// The surface, counted from 0.
@@ -24,61 +34,6 @@ pub struct Aperture {
     pub is_obscuration: bool,
 }
 
-/// The shape of an aperture.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub enum Outline {
-    /// A circle.
-    Circle {
-        /// Its radius, mm.
-        radius_mm: f64,
-    },
-    /// An ellipse with its axes along x and y.
-    Ellipse {
-        /// Half its width along x, mm.
-        half_x_mm: f64,
-        /// Half its width along y, mm.
-        half_y_mm: f64,
-    },
-    /// A rectangle with its sides along x and y.
-    Rectangle {
-        /// Half its width along x, mm.
-        half_x_mm: f64,
-        /// Half its width along y, mm.
-        half_y_mm: f64,
-    },
-}
-
-impl Outline {
-    /// Half the widths along x and y, mm.
-    pub fn half_widths_mm(&self) -> DVec2 {
-        match *self {
-            Self::Circle { radius_mm } => DVec2::splat(radius_mm),
-            Self::Ellipse { half_x_mm, half_y_mm } | Self::Rectangle { half_x_mm, half_y_mm } => {
-                DVec2::new(half_x_mm, half_y_mm)
-            }
-        }
-    }
-
-    /// The radius of a circle, also of one that is stated as an ellipse, mm.
-    fn radius_mm(&self) -> Option<f64> {
-        match *self {
-            Self::Circle { radius_mm } => Some(radius_mm),
-            Self::Ellipse { half_x_mm, half_y_mm } if half_x_mm == half_y_mm => Some(half_x_mm),
-            Self::Ellipse { .. } | Self::Rectangle { .. } => None,
-        }
-    }
-
-    /// Returns the point of the edge in this direction from the middle, mm, at an angle from x.
-    fn edge_mm(&self, angle_rad: f64) -> DVec2 {
-        let (half, direction) = (self.half_widths_mm(), DVec2::from_angle(angle_rad));
-        match self {
-            Self::Rectangle { .. } => direction * (half / direction.abs()).min_element(),
-            _ => half * direction,
-        }
-    }
-}
-
 impl Aperture {
     /// Whether it is a circle about the surface's axis.
     pub fn is_rotational(&self) -> bool {
@@ -90,15 +45,23 @@ impl Aperture {
         self.outline.radius_mm().filter(|_| !self.is_obscuration && self.center_mm == [0.0; 2])
     }
 
+    /// The opening of an iris, in a stop on this surface.
+    pub(crate) fn of_iris(surface: usize, opening: IrisOpening) -> Self {
+        Self { surface, outline: Outline::Iris(opening), center_mm: [0.0; 2], is_obscuration: false }
+    }
+
+    /// Whether it is the opening of an iris.
+    pub(crate) fn is_iris(&self) -> bool {
+        matches!(self.outline, Outline::Iris(_))
+    }
+
+    fn from_center_mm(&self, x_mm: f64, y_mm: f64) -> DVec2 {
+        DVec2::new(x_mm, y_mm) - DVec2::from_array(self.center_mm)
+    }
+
     /// Whether a ray passes that meets the surface here.
     pub fn is_clear_at(&self, x_mm: f64, y_mm: f64) -> bool {
-        let from_center = DVec2::new(x_mm, y_mm) - DVec2::from_array(self.center_mm);
-        let share = from_center / self.outline.half_widths_mm();
-        let is_inside = match self.outline {
-            Outline::Rectangle { .. } => share.abs().max_element() <= 1.0,
-            _ => share.length_squared() <= 1.0,
-        };
-        is_inside != self.is_obscuration
+        self.outline.is_inside(self.from_center_mm(x_mm, y_mm)) != self.is_obscuration
     }
 
     /// How far inside the opening a place is, mm: 0 at the edge, negative outside. Of an ellipse it is only of the right
@@ -107,37 +70,38 @@ impl Aperture {
         self.clearance_of_side_mm(x_mm, y_mm).0
     }
 
-    /// The same, and which of a rectangle's four sides it counts from; 0 of others.
+    /// The same, and which part of the edge it counts from: of a rectangle, a polygon or an iris one of their sides; 0 of others.
     pub(crate) fn clearance_of_side_mm(&self, x_mm: f64, y_mm: f64) -> (f64, usize) {
         if self.is_obscuration {
             return (f64::INFINITY, 0);
         }
-        let from_center = DVec2::new(x_mm, y_mm) - DVec2::from_array(self.center_mm);
-        let half = self.outline.half_widths_mm();
-        match self.outline {
-            Outline::Rectangle { .. } => {
-                let inside = half - from_center.abs();
-                let (least, side) = if inside.x < inside.y { (inside.x, 0) } else { (inside.y, 1) };
-                (least, 2 * side + usize::from(from_center[side] < 0.0))
-            }
-            _ => ((1.0 - (from_center / half).length()) * half.min_element(), 0),
-        }
+        let nearest = self.outline.nearest_edge(self.from_center_mm(x_mm, y_mm));
+        (nearest.clearance_mm, nearest.part)
     }
 
     /// The radius of the circle about the axis that holds the opening, mm.
     pub(crate) fn extent_mm(&self) -> f64 {
-        let (half, center) = (self.outline.half_widths_mm(), DVec2::from_array(self.center_mm));
+        let center = DVec2::from_array(self.center_mm);
         match self.outline {
-            Outline::Rectangle { .. } => (center.abs() + half).length(),
-            _ => center.length() + half.max_element(),
+            Outline::Rectangle { .. } => (center.abs() + self.outline.bounds_mm()[1]).length(),
+            _ => center.length() + self.outline.reach_mm(),
         }
     }
 
-    /// Places on the edge, mm, from the axis.
-    pub(crate) fn edge_mm(&self) -> impl Iterator<Item = DVec2> {
+    /// The box that holds it, mm from the axis: its lower left and upper right corner.
+    pub fn bounds_mm(&self) -> [DVec2; 2] {
+        self.outline.bounds_mm().map(|corner| corner + DVec2::from_array(self.center_mm))
+    }
+
+    /// Returns places on the edge in turn, mm from the axis.
+    pub fn edge_mm(&self) -> impl Iterator<Item = DVec2> {
         let center = DVec2::from_array(self.center_mm);
-        (0..N_ON_EDGE)
-            .map(move |i| center + self.outline.edge_mm(std::f64::consts::TAU * f64::from(i) / f64::from(N_ON_EDGE)))
+        self.outline.edge_mm().into_iter().map(move |place| center + place)
+    }
+
+    /// Whether it is its own mirror image when x changes its sign (axis 0), or y.
+    pub(crate) fn is_mirrored_along(&self, axis: usize) -> bool {
+        self.center_mm[axis] == 0.0 && self.outline.is_mirrored_along(axis)
     }
 
     pub(crate) fn check(&self, n_surfaces: usize) -> Result<(), OpticsError> {
@@ -146,9 +110,8 @@ impl Aperture {
         if surface >= n_surfaces {
             return wrong("surface of an aperture", surface as f64, "a surface that the lens has, counted from 0");
         }
-        let half = self.outline.half_widths_mm();
-        if let Some(found) = half.to_array().into_iter().find(|v| !(*v > 0.0 && v.is_finite())) {
-            return wrong("half the width of an aperture", found, "a finite number above 0");
+        if let Some((key, found, expected)) = self.outline.wrong() {
+            return wrong(key, found, expected);
         }
         match self.center_mm.into_iter().find(|v| v.is_nan() || v.abs() > 1e9) {
             Some(found) => wrong("middle of an aperture", found, "numbers below 1e9"),
@@ -156,9 +119,6 @@ impl Aperture {
         }
     }
 }
-
-/// Places of an edge at which a surface is looked at: a multiple of 8, so that the corners of a square are among them.
-const N_ON_EDGE: u32 = 64;
 
 #[cfg(test)]
 mod tests {
@@ -168,36 +128,78 @@ mod tests {
         Aperture { surface: 0, outline, center_mm: [1.0, -2.0], is_obscuration: false }
     }
 
+    /// An arrowhead: not convex, and its area.
+    fn arrow() -> (Outline, f64) {
+        let corners_mm = vec![[2.0, 0.0], [-1.0, 1.5], [-0.25, 0.0], [-1.0, -1.5]];
+        (Outline::Polygon { corners_mm }, 3.375)
+    }
+
     #[test]
     fn clearance_has_the_sign_of_clear() {
         let (half_x_mm, half_y_mm) = (3.0, 1.5);
-        for outline in [
-            Outline::Circle { radius_mm: 2.0 },
-            Outline::Ellipse { half_x_mm, half_y_mm },
-            Outline::Rectangle { half_x_mm, half_y_mm },
+        let (ellipse, rectangle) =
+            (Outline::Ellipse { half_x_mm, half_y_mm }, Outline::Rectangle { half_x_mm, half_y_mm });
+        let turned = |outline: &Outline| Outline::Turned { by_deg: 27.0, outline: Box::new(outline.clone()) };
+        let pi = std::f64::consts::PI;
+        let hexagon = Iris { blades: 6, rotation_deg: 10.0, curvature: 0.5 }.opening(2.0, 4.0).unwrap();
+        for (outline, area_mm2) in [
+            (Outline::Circle { radius_mm: 2.0 }, 4.0 * pi),
+            (turned(&ellipse), pi * half_x_mm * half_y_mm),
+            (ellipse, pi * half_x_mm * half_y_mm),
+            (turned(&rectangle), 4.0 * half_x_mm * half_y_mm),
+            (rectangle, 4.0 * half_x_mm * half_y_mm),
+            (turned(&arrow().0), arrow().1),
+            (Outline::Iris(hexagon), 4.0 * pi),
         ] {
-            let aperture = of(outline);
+            let aperture = of(outline.clone());
+            let inverted = Aperture { is_obscuration: true, ..aperture.clone() };
+            let [low, high] = aperture.bounds_mm();
             let mut n_clear = 0;
             for i in -50..=50 {
                 for j in -50..=50 {
                     let (x, y) = (0.0987 * f64::from(i), 0.0987 * f64::from(j));
                     let is_clear = aperture.is_clear_at(x, y);
-                    assert_eq!(is_clear, aperture.clearance_mm(x, y) >= 0.0, "{outline:?} {x} {y}");
-                    assert_ne!(is_clear, Aperture { is_obscuration: true, ..aperture }.is_clear_at(x, y));
-                    assert!(!is_clear || x.hypot(y) <= aperture.extent_mm());
+                    let (clearance_mm, _) = aperture.clearance_of_side_mm(x, y);
+                    assert_eq!(is_clear, clearance_mm >= 0.0, "{outline:?} {x} {y}");
+                    assert_ne!(is_clear, inverted.is_clear_at(x, y));
+                    let at = DVec2::new(x, y);
+                    let is_held = at.cmpge(low - 0.02).all() && at.cmple(high + 0.02).all();
+                    assert!(!is_clear || (x.hypot(y) <= aperture.extent_mm() && is_held), "{outline:?} {x} {y}");
                     n_clear += usize::from(is_clear);
+                    if aperture.is_iris() && !is_clear {
+                        continue;
+                    }
+                    // Along a line the edge is where it ends to be clear, or begins; of an iris from within.
+                    let own = at - DVec2::from_array(aperture.center_mm);
+                    let direction = DVec2::from_angle(f64::from(7 * i + j));
+                    let way_mm = aperture.outline.edge_along_mm(own, direction);
+                    if way_mm.is_finite() {
+                        let beyond = own + direction * (way_mm + 1e-9);
+                        assert!(aperture.outline.nearest_edge(beyond).clearance_mm.abs() < 1e-8);
+                        assert_eq!(aperture.outline.is_inside(own + direction * (way_mm - 1e-9)), is_clear);
+                    } else {
+                        assert!(!is_clear);
+                    }
                 }
             }
-            let area_mm2 = match outline {
-                Outline::Circle { radius_mm } => std::f64::consts::PI * radius_mm * radius_mm,
-                Outline::Ellipse { .. } => std::f64::consts::PI * half_x_mm * half_y_mm,
-                Outline::Rectangle { .. } => 4.0 * half_x_mm * half_y_mm,
-            };
             // A grid counts an area to about the cells along its edge over its cells.
-            assert!((n_clear as f64 * 0.0987 * 0.0987 / area_mm2 - 1.0).abs() < 0.02, "{outline:?}");
+            let counted_mm2 = n_clear as f64 * 0.0987 * 0.0987;
+            assert!((counted_mm2 / area_mm2 - 1.0).abs() < 0.02, "{outline:?} {counted_mm2}");
             for place in aperture.edge_mm() {
                 assert!(aperture.clearance_mm(place.x, place.y).abs() < 1e-12);
             }
         }
+    }
+
+    #[test]
+    fn polygons_that_make_no_sense_are_refused() {
+        let message = |corners_mm: &[[f64; 2]]| {
+            of(Outline::Polygon { corners_mm: corners_mm.to_vec() }).check(1).unwrap_err().to_string()
+        };
+        assert!(message(&[[0.0, 0.0], [1.0, 0.0]]).contains("the number of corners of an aperture is 2, expected 3"));
+        let crossed = [[0.0, 0.0], [1.0, 1.0], [1.0, 0.0], [0.0, 1.0]];
+        assert!(message(&crossed).contains("crosses another, counted from 0, is 0, expected none"));
+        assert!(message(&[[0.0, 0.0], [1.0, 1.0], [2.0, 2.0]]).contains("the area of an aperture is 0"));
+        assert!(of(arrow().0).check(1).is_ok());
     }
 }

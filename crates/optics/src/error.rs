@@ -78,6 +78,24 @@ pub enum OpticsError {
         /// What should stand there.
         expected: &'static str,
     },
+    /// A number of an iris that makes no sense.
+    #[error("the iris: {key} is {found}, expected {expected}")]
+    Iris {
+        /// Which number.
+        key: &'static str,
+        /// What stood there.
+        found: f64,
+        /// What should stand there.
+        expected: &'static str,
+    },
+    /// A lens that has no iris to close.
+    #[error("{lens} has no iris: {reason}")]
+    NoIris {
+        /// The lens's name.
+        lens: String,
+        /// Why it has none.
+        reason: &'static str,
+    },
     /// A surface that cannot be diffractive, or a task that does not know of such.
     #[error("{lens}: {reason}")]
     Diffractive {

@@ -65,6 +65,7 @@ impl Lens {
         }
         stop(self, &frame, &mut svg);
         aperture::obscurations(self, &frame, &mut svg);
+        aperture::iris(self, &frame, &mut svg);
         film(self, layout, &fans, &frame, &mut svg);
         let first = self.at(reference_nm)?.first_order();
         let words = match first.power_per_mm == 0.0 {

@@ -2,14 +2,15 @@
 
 mod changes;
 mod coatings;
+mod iris;
 mod media;
 mod scale;
 
 use glam::DVec2;
 
 use crate::{
-    Aperture, Coating, CoordinateBreak, DiffractiveSurface, Glass, GlassRange, Interface, OpticsError, PhaseProfile,
-    Placement, Shape, Surface, placement,
+    Aperture, Coating, CoordinateBreak, DiffractiveSurface, Glass, GlassRange, Interface, Iris, OpticsError,
+    PhaseProfile, Placement, Shape, Surface, placement,
 };
 
 pub use self::changes::SurfaceChange;
@@ -26,6 +27,7 @@ pub struct Lens {
     interfaces: Vec<Interface>,
     stop: usize,
     full_stop_semi_aperture_mm: f64,
+    iris: Option<Iris>,
     moves: Vec<CoordinateBreak>,
     apertures: Vec<Aperture>,
     mirrors: Vec<usize>,
@@ -124,6 +126,7 @@ impl Lens {
             interfaces,
             stop,
             full_stop_semi_aperture_mm,
+            iris: None,
             moves: Vec::new(),
             apertures,
             mirrors: Vec::new(),
@@ -283,7 +286,8 @@ impl Lens {
             let (first, last) = step.surfaces;
             CoordinateBreak { surfaces: (first, if last == n { n + 1 } else { last }), ..*step }
         };
-        let lens = Self::new_with_apertures(&self.name, &self.source, interfaces, self.stop, self.apertures.clone())?;
+        let lens = Self::new_with_apertures(&self.name, &self.source, interfaces, self.stop, self.apertures.clone())?
+            .with_stop_of(self);
         Self { coatings: self.coatings.clone(), other_coating: self.other_coating.clone(), ..lens }
             .with_object_medium(self.object_medium.clone())?
             .with_mirrors(self.mirrors.clone())?
@@ -385,7 +389,9 @@ impl Lens {
     /// Whether every surface is one of revolution about the lens's axis: whether nothing is tilted, decentered or
     /// curved differently along x and y, and all apertures are circles about it.
     pub fn is_rotational(&self) -> bool {
-        self.apertures.iter().all(Aperture::is_rotational) && self.is_centered_and_rotational()
+        self.apertures.iter().all(Aperture::is_rotational)
+            && self.iris_opening().is_none()
+            && self.is_centered_and_rotational()
     }
 
     /// Whether every surface is one of revolution about the lens's axis, whatever apertures bound the light: what first- and
@@ -404,8 +410,9 @@ impl Lens {
     pub fn mirror_symmetries(&self) -> [bool; 2] {
         let mut places = self.placements();
         places.push(self.film_motion());
+        let iris = self.iris_opening().map(|opening| Aperture::of_iris(self.stop, opening));
         [0, 1].map(|axis| {
-            self.apertures.iter().all(|aperture| aperture.center_mm[axis] == 0.0)
+            self.apertures.iter().chain(&iris).all(|aperture| aperture.is_mirrored_along(axis))
                 && self.diffractive.iter().all(|phase| phase.profile.is_mirrored_along(axis))
                 && places.iter().all(|place| place.is_mirrored_along(axis))
         })
@@ -460,7 +467,7 @@ impl Lens {
         self.interfaces[0].surface.semi_aperture_mm
     }
 
-    /// Half the diameter of the stop, mm.
+    /// Half the diameter of the stop, mm; of one that blades close, of the circle with as much area.
     pub fn stop_semi_aperture_mm(&self) -> f64 {
         self.interfaces[self.stop].surface.semi_aperture_mm
     }

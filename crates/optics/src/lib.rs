@@ -47,7 +47,7 @@ mod wavefront_error;
 pub mod zernike;
 
 pub use air::Air;
-pub use aperture::{Aperture, Outline};
+pub use aperture::{Aperture, EdgeNearby, Iris, IrisOpening, Outline, StopEdges};
 pub use beam::{Beam, rays_over_front};
 pub use bundle::{ObjectPoint, rays_towards};
 pub use coating::{Amplitudes, COATING_CENTER_NM, Coating, CoatingLayer, Film, MGF2_INDEX, ReflectanceTable, Shares};

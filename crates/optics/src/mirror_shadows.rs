@@ -74,15 +74,19 @@ impl Lens {
             }
         };
         let now = |surface: usize| places.iter().position(|place| *place == Place::Surface(surface)).unwrap_or(surface);
-        let mut apertures: Vec<Aperture> =
-            self.apertures().iter().map(|aperture| Aperture { surface: now(aperture.surface), ..*aperture }).collect();
+        let mut apertures: Vec<Aperture> = self
+            .apertures()
+            .iter()
+            .map(|aperture| Aperture { surface: now(aperture.surface), ..aperture.clone() })
+            .collect();
         apertures.extend(places.iter().enumerate().filter_map(|(surface, place)| {
             let Place::Shadow(MirrorShadow { mirror, .. }) = *place else { return None };
             let outline = Outline::Circle { radius_mm: interfaces[mirror].surface.semi_aperture_mm };
             Some(Aperture { surface, outline, center_mm: [0.0; 2], is_obscuration: true })
         }));
         let rows = places.iter().enumerate().map(row).collect();
-        let lens = Self::new_with_apertures(self.name(), self.source(), rows, now(self.stop()), apertures)?;
+        let lens =
+            Self::new_with_apertures(self.name(), self.source(), rows, now(self.stop()), apertures)?.with_stop_of(self);
         let phase = |phase: &DiffractiveSurface| DiffractiveSurface { surface: now(phase.surface), ..phase.clone() };
         let coatings = self.coatings().iter().map(|(surface, coating)| (now(*surface), coating.clone())).collect();
         let lens = lens.with_coatings(coatings)?.with_light_loss(self.other_coating().cloned())?;

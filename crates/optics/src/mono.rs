@@ -32,6 +32,8 @@ pub struct MonoLens {
     /// The share of light that the orders of its diffractive surfaces have.
     diffraction_efficiency: f64,
     stop: usize,
+    /// Of the circle that has the area of the blades' opening, where blades close the stop.
+    stop_semi_aperture_mm: f64,
     front: Surface,
     rear: Surface,
     image_surface: ImageSurface,
@@ -131,7 +133,7 @@ impl MonoLens {
             let is_window = surface.curvature_per_mm == 0.0 && index_before == index_after && !is_mirror;
             let kind = kind_of(surface, is_window);
             let (curvature, semi_aperture) = (surface.curvature_per_mm, surface.semi_aperture_mm);
-            let apertures = lens.apertures_of(i).copied().collect();
+            let apertures = lens.apertures_of(i).cloned().collect();
             let way_mm = vertices_z_mm[i] - before_z_mm;
             vertex_z += if is_backward { -way_mm } else { way_mm };
             before_z_mm = vertices_z_mm[i];
@@ -159,6 +161,13 @@ impl MonoLens {
                 (!is_clear).then(|| Losses { surfaces: losses, per_mm, transmission: OnceLock::new() })
             }
         };
+        // Blades reach in from the rim, beyond the circle that has as much area.
+        let stop = &mut steps[lens.stop()];
+        let stop_semi_aperture_mm = stop.semi_aperture;
+        if let Some(opening) = lens.iris_opening() {
+            stop.semi_aperture = lens.full_stop_semi_aperture_mm();
+            stop.apertures.push(Aperture::of_iris(lens.stop(), opening));
+        }
         let rear = &lens.interfaces()[n_surfaces - 1].surface;
         let rear = if lens.is_backward_before(n_surfaces) { rear.flipped() } else { rear.clone() };
         Ok(Self {
@@ -167,6 +176,7 @@ impl MonoLens {
             steps,
             diffraction_efficiency: lens.diffraction_efficiency_at(wavelength_nm)?,
             stop: lens.stop(),
+            stop_semi_aperture_mm,
             front: lens.interfaces()[0].surface.clone(),
             rear,
             image_surface: lens.image_surface(),
@@ -193,6 +203,11 @@ impl MonoLens {
     /// mirrors.
     pub fn is_film_backward(&self) -> bool {
         self.placed.as_ref().is_some_and(|placed| placed.is_film_backward)
+    }
+
+    /// Whether there are openings beside the round rims, whose edges may have corners.
+    pub fn has_openings(&self) -> bool {
+        self.steps.iter().flat_map(|step| &step.apertures).any(|aperture| !aperture.is_obscuration)
     }
 
     /// The number of obscurations, of all surfaces.
@@ -255,12 +270,25 @@ impl MonoLens {
         self.first_order.image_index
     }
 
-    /// Half the diameter of the stop, mm.
+    /// Half the diameter of the stop, mm; of one that blades close, of the circle with as much area.
     pub fn stop_semi_aperture_mm(&self) -> f64 {
-        self.steps[self.stop].semi_aperture
+        self.stop_semi_aperture_mm
     }
 
-    /// Half the clear diameter of a surface, mm.
+    /// The lens with the circle of as much area in place of the opening of blades; `None` where it has no such opening.
+    pub(crate) fn with_round_iris(&self) -> Option<Self> {
+        if !self.steps[self.stop].apertures.iter().any(Aperture::is_iris) {
+            return None;
+        }
+        let mut lens = self.clone();
+        let stop = &mut lens.steps[self.stop];
+        stop.apertures.retain(|aperture| !aperture.is_iris());
+        stop.semi_aperture = self.stop_semi_aperture_mm;
+        lens.far_beam = OnceLock::new();
+        Some(lens)
+    }
+
+    /// Half the clear diameter of a surface, mm; of a stop that blades close, the rim that it has fully open.
     pub fn semi_aperture_mm(&self, surface: usize) -> f64 {
         self.steps[surface].semi_aperture
     }

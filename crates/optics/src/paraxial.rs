@@ -87,13 +87,13 @@ impl MarginalRay {
         }
     }
 
-    /// Returns the ray from the point at `object_distance_mm` before the first vertex (infinite for a far one).
+    /// Returns the ray from the point at `object_distance_mm` before the first vertex (infinite for a far one) to the edge of the stop, so
+    /// far from its middle.
     ///
     /// Heights and slopes are infinite where no such ray reaches the stop's edge, as from a far point to the stop of a
     /// lens that is telecentric on that side.
-    pub(crate) fn of(steps: &[Step], stop: usize, object_distance_mm: f64) -> Self {
+    pub(crate) fn of(steps: &[Step], stop: usize, edge_mm: f64, object_distance_mm: f64) -> Self {
         let (front, whole) = (Matrix::up_to(steps, stop), Matrix::of(steps));
-        let edge_mm = steps[stop].semi_aperture;
         if object_distance_mm.is_infinite() {
             let height_mm = edge_mm / front.a.abs();
             return Self { reduced_slope: 0.0, height_mm, reduced_slope_after: whole.c * height_mm };

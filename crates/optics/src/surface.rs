@@ -211,7 +211,7 @@ impl Surface {
             None => self.section_that_ends_within(within),
             // A surface ends somewhere in an opening where it does at the edge of the opening and of the rim.
             Some(_) => openings
-                .flat_map(Aperture::edge_mm)
+                .flat_map(|opening| opening.edge_mm().collect::<Vec<_>>())
                 .map(|place| (place * (1.0 - 1e-9)).clamp_length_max(within))
                 .find(|place| !self.sag_at_mm(place.x, place.y).is_finite()),
         };

@@ -37,7 +37,7 @@ mod words;
 pub use ndarray;
 
 pub use dioptric_backward::{BandSampling, LightPaths, MicroArray, MicroElements, MicroLayout, Renderer, Rendering};
-pub use dioptric_optics::{GlassRange, MissingGlass, SeqNumbers, SurfaceChange};
+pub use dioptric_optics::{GlassRange, Iris, MissingGlass, SeqNumbers, SurfaceChange};
 pub use dioptric_psf::Diffraction;
 pub use dioptric_scene::{
     DepthKind, ExrSamples, FileQuantity, FileReading, FillDepth, NoData, Panorama,
@@ -49,7 +49,7 @@ pub use camera::{
     FlatSize, FocusSpec, FramesSpec, LensReadOptions, LensSpec, LightFieldSpec, Movements, PhotodiodeReads,
     Photodiodes, REFERENCE_WAVELENGTH_NM, RenderEffort, RenderMethod, RetiredBank, SceneSource, SceneSpec,
     SensorOptions, SensorSpec, StopSpec, TurnPath, VideoSpec, WavelengthSpec, WorldLamp, WorldSky, WorldSpec,
-    WorldView, nearest_to_reference_nm,
+    WorldView, nearest_to_reference_nm, with_blades,
 };
 pub use capture_files::{irradiance_files, write_capture, write_frames_and_depth, write_irradiance, write_scene};
 pub use develop::DevelopedFile;

@@ -100,11 +100,7 @@ impl FilmPointJob<'_> {
 
         // Trace the nodes of the mesh; a ray that fails at the very edge of the pupil takes the place of its neighbor inside.
         let mesh = self.mesh;
-        let node = |(i, (share, azimuth)): (usize, (f64, f64))| {
-            let j = i.saturating_sub(1) % mesh.n_azimuths;
-            polar(outline.center, share * outline.rho[2 * j], azimuth)
-        };
-        let cosines: Vec<DVec2> = mesh.nodes().enumerate().map(node).collect();
+        let cosines = outline.nodes(mesh);
         let mut rays = cone.rays(&cosines);
         let mut at_stop = if has_stop { self.at_stop(rays.clone()) } else { vec![] };
         let mut light = RayLight::unpolarized(rays.len());
@@ -122,7 +118,7 @@ impl FilmPointJob<'_> {
         }
 
         // Weigh cells by their projected solid angle and by what surfaces, glass, obscurations and other diffraction orders leave of it.
-        let mut energies = cell_areas(mesh, &outline.rho);
+        let mut energies = cell_areas(mesh, &outline);
         if !self.lens.forward().is_lossless() {
             let of_cell = |(ring, j)| 0.25 * mesh.corners(ring, j).map(|node| shares[node]).iter().sum::<f64>();
             energies.iter_mut().zip(mesh.cells()).for_each(|(e, cell)| *e *= of_cell(cell));
@@ -147,11 +143,12 @@ impl FilmPointJob<'_> {
 
     fn outline(&self, cone: &FilmCone<'_>, seed: Option<&Outline>) -> Option<Outline> {
         let clearances = |cosines: &[DVec2]| cone.clearances(cosines);
-        seed.and_then(|seed| seed.settled(&clearances)).or_else(|| {
+        let found = seed.and_then(|seed| seed.settled(&clearances)).or_else(|| {
             let (center, rho) = cone.edge(2 * self.mesh.n_azimuths)?;
-            let found = Outline { center, rho };
+            let found = Outline::even(center, rho);
             Some(found.settled(&clearances).unwrap_or(found))
-        })
+        })?;
+        Some(if self.lens.forward().has_openings() { found.with_corners(&clearances) } else { found })
     }
 
     fn scene_rays(&self, rays: &RayBatch) -> Vec<SceneRay> {

@@ -75,7 +75,7 @@ pub fn trace_as_authors(lens: &MonoLens, rays: &mut RayBatch, film_distance_mm: 
         if let Some(AuthorsBending { model, seed }) = bending {
             let edge = CircularStop::new(lens.semi_aperture_mm(surface), lens.wavelength_nm(), 1.0);
             let seed = seed.wrapping_add(surface as u64);
-            let hurb = SampledHurb { model, edge, form: HurbForm::Angles, seed };
+            let hurb = SampledHurb { model, edge: edge.into(), form: HurbForm::Angles, seed };
             hurb.apply(rays, &lens.surface_placement(surface));
         }
     }

@@ -2,7 +2,7 @@
 //!
 //! The derivation is in `docs/hurb.md`, which comments name by its equations.
 
-use dioptric_diffraction::{CircularStop, Covariance, Hurb};
+use dioptric_diffraction::{Covariance, Hurb, StopEdge};
 use dioptric_optics::MonoLens;
 use dioptric_optics::StopPoint;
 use glam::DVec2;
@@ -36,25 +36,48 @@ const PIXEL_VARIANCE: f64 = 0.12;
 const FAN: f64 = 1.5;
 
 /// Uncertainty bending at the stop.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct StopHurb {
     pub(crate) model: Hurb,
-    pub(crate) edge: CircularStop,
+    pub(crate) edge: StopEdge,
 }
 
 /// Returns what bends rays at the stop.
 pub(crate) fn bending(lens: &MonoLens, diffraction: Diffraction) -> Option<StopHurb> {
-    let edge = || CircularStop::new(lens.stop_semi_aperture_mm(), lens.wavelength_nm(), lens.stop_medium_index());
-    diffraction.hurb().map(|model| StopHurb { model, edge: edge() })
+    diffraction.hurb().map(|model| StopHurb { model, edge: StopEdge::of(lens) })
 }
 
 impl StopHurb {
     /// Returns the Gaussian of a ray on the film, pixels².
     #[inline(always)]
-    fn covariance(self, node: &Node) -> Covariance {
+    fn covariance(&self, node: &Node) -> Covariance {
         // Project the spread at the stop onto the film: Σ = J C Jᵀ (eqs. 3 and 4).
-        let at_stop = self.model.covariance(StopPoint { mm: node.in_stop * self.edge.radius_mm }, self.edge);
+        let circle = self.edge.circle();
+        let at = StopPoint { mm: node.in_stop * circle.radius_mm };
+        let at_stop = match self.edge.is_round() {
+            true => self.model.covariance(at, circle),
+            false => self.model.covariance_at(at, &self.edge),
+        };
         at_stop.mapped(node.along_l_mm, node.along_m_mm)
+    }
+
+    /// Returns the Gaussians of eight rays on the film, pixels²: those of a round stop without a branch.
+    #[inline(always)]
+    fn covariances(&self, samples: &[Sample; LANES]) -> [Covariance; LANES] {
+        let mut found = [Covariance { xx: 0.0, xy: 0.0, yy: 0.0 }; LANES];
+        if self.edge.is_round() {
+            let (model, circle) = (self.model, self.edge.circle());
+            for i in 0..LANES {
+                let node = &samples[i].node;
+                let at_stop = model.covariance(StopPoint { mm: node.in_stop * circle.radius_mm }, circle);
+                found[i] = at_stop.mapped(node.along_l_mm, node.along_m_mm);
+            }
+        } else {
+            for i in 0..LANES {
+                found[i] = self.covariance(&samples[i].node);
+            }
+        }
+        found
     }
 }
 
@@ -63,7 +86,7 @@ pub(crate) struct HurbSplatter<'a> {
     pub(crate) mesh: Mesh,
     /// In pixels.
     pub(crate) nodes: &'a [Node],
-    pub(crate) bending: StopHurb,
+    pub(crate) bending: &'a StopHurb,
     /// Rows and columns of the picture.
     pub(crate) size: (usize, usize),
 }
@@ -174,7 +197,7 @@ impl SpreadCells {
 
     /// Draws the parts as splats side by side around, each as wide as its Gaussian is long or narrow enough for it.
     #[inline(always)]
-    fn draw(&mut self, bending: StopHurb, splats: &mut Splats) {
+    fn draw(&mut self, bending: &StopHurb, splats: &mut Splats) {
         // Parts no longer around than their Gaussians are wide, and those to be cut around.
         for parts in self.parts.chunks(LANES) {
             let samples = samples(&self.cells, parts);
@@ -253,7 +276,7 @@ impl Cell {
     /// Whether next to nothing of the cell's light, bent as at its middle, with the variance given, and as near its outer
     /// side, meets the picture.
     #[inline(always)]
-    fn is_beyond(&self, wide2: f64, (rows, columns): (usize, usize), bending: StopHurb) -> bool {
+    fn is_beyond(&self, wide2: f64, (rows, columns): (usize, usize), bending: &StopHurb) -> bool {
         let [a, b, c, d] = self.corners.map(|node| node.at_mm);
         let (low, high) = (a.min(b).min(c.min(d)), a.max(b).max(c.max(d)));
         let end = DVec2::new(columns as f64, rows as f64);
@@ -282,13 +305,13 @@ struct Looks {
 
 impl Looks {
     #[inline(always)]
-    fn new(samples: &[Sample; LANES], bending: StopHurb) -> Self {
+    fn new(samples: &[Sample; LANES], bending: &StopHurb) -> Self {
         let none = [0.0; LANES];
         let (mut covariance, mut wide2) = ([none; 3], none);
         let (mut out2, mut around2, mut out_in_sigmas2, mut around_in_sigmas2) = (none, none, none, none);
+        let covariances = bending.covariances(samples);
         for i in 0..LANES {
-            let Sample { node, out, around } = samples[i];
-            let c = bending.covariance(&node);
+            let (Sample { out, around, .. }, c) = (samples[i], covariances[i]);
             let widened = Covariance { xx: c.xx + PIXEL_VARIANCE, yy: c.yy + PIXEL_VARIANCE, ..c };
             (covariance[0][i], covariance[1][i], covariance[2][i]) = (c.xx, c.xy, c.yy);
             wide2[i] = c.axes().1;

@@ -9,7 +9,6 @@ use crate::{
     ImageSettings, Kernel, ModelUse, PsfError,
     bundle::RIM_OVER_RMS,
     hurb_splatter::bending,
-    mesh::polar,
     pupil::Outline,
     render::{Layout, wave_energies},
     spots::{Node, Spots, cell_areas, clear_shares},
@@ -69,15 +68,12 @@ impl PointImage {
         let boundary = PupilBoundary::find(&lens, &point, n_azimuths)?;
         let plane = boundary.plane();
         let clearances = |targets: &[DVec2]| lens.clearances_mm(plane.rays(&lens, &point, targets));
-        let found = Outline { center: boundary.center_mm(), rho: boundary.rho_at_azimuths_mm().to_vec() };
+        let found = Outline::even(boundary.center_mm(), boundary.rho_at_azimuths_mm().to_vec());
         let outline = found.settled(&clearances).unwrap_or(found);
+        let outline = if lens.has_openings() { outline.with_corners(&clearances) } else { outline };
 
         // Trace the nodes of the mesh.
-        let node = |(i, (share, azimuth)): (usize, (f64, f64))| {
-            let j = i.saturating_sub(1) % mesh.n_azimuths;
-            polar(outline.center, share * outline.rho[2 * j], azimuth)
-        };
-        let targets: Vec<DVec2> = mesh.nodes().enumerate().map(node).collect();
+        let targets = outline.nodes(mesh);
         let nodes = landed(&lens, (&point, plane), &settings, &targets)?;
 
         // Weigh cells by the solid angle that they take up, seen from the point, and by what surfaces, glass and obscurations leave of it.
@@ -87,7 +83,7 @@ impl PointImage {
         let cell = |((ring, j), area): ((usize, usize), f64)| {
             area * mesh.corners(ring, j).map(|node| weights[node]).iter().sum::<f64>() / 4.0
         };
-        let mut energies: Vec<f64> = mesh.cells().zip(cell_areas(mesh, &outline.rho)).map(cell).collect();
+        let mut energies: Vec<f64> = mesh.cells().zip(cell_areas(mesh, &outline)).map(cell).collect();
         if lens.n_obscurations() > 0 {
             let whole = lens.with_obscurations_inverted(&[]);
             let passed = |targets: &[DVec2], with_obscurations: bool| {

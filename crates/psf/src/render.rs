@@ -80,7 +80,7 @@ impl<'a> Layout<'a> {
         let reach = [low, high].map(|corner| (corner * per_mm - middle).abs().max_element());
         let reach = reach[0].max(reach[1]).max(0.0);
         let radius = nodes.iter().map(|node| node.at_mm.length()).fold(0.0, f64::max);
-        let lambda_n_px = bending.map_or(0.0, |bending| lambda_n(&nodes[0], bending));
+        let lambda_n_px = bending.as_ref().map_or(0.0, |bending| lambda_n(&nodes[0], bending));
         let side = 2 * (reach + TAILS * lambda_n_px - 0.5).ceil().clamp(0.0, MOST_PIXELS) as usize + 1;
         Self { spots, nodes, bending, middle_px, reach, radius, lambda_n_px, side, natural_side: side }
     }
@@ -114,7 +114,7 @@ impl<'a> Layout<'a> {
         let mut raster = Raster::new(self.side, self.side);
         let (mesh, mut energies) = (self.spots.mesh, self.spots.energies.clone());
         // Deposit what diffraction spreads as Gaussians, the rest as polygons.
-        if let Some(bending) = self.bending {
+        if let Some(bending) = &self.bending {
             let bent = HurbSplatter { mesh, nodes: &nodes, bending, size: raster.size() };
             bent.deposit(&mut energies, &mut raster);
         }
@@ -208,8 +208,8 @@ fn per_mm(pitch_um: f64) -> DVec2 {
 }
 
 /// Returns λN in pixels: what the Gaussian of a ray through the middle of the pupil would give.
-fn lambda_n(center: &Node, bending: StopHurb) -> f64 {
+fn lambda_n(center: &Node, bending: &StopHurb) -> f64 {
     let per_cosine = center.along_l_mm.length().max(center.along_m_mm.length());
-    let CircularStop { radius_mm, wave_number_per_mm } = bending.edge;
+    let CircularStop { radius_mm, wave_number_per_mm } = bending.edge.circle();
     per_cosine * std::f64::consts::PI / (wave_number_per_mm * radius_mm)
 }

@@ -94,13 +94,16 @@ impl Spots {
 
 /// Returns the areas of the cells of an outline's mesh, by Simpson's rule around it: its radii are known at each azimuth of the mesh and once
 /// between two.
-pub(crate) fn cell_areas(mesh: Mesh, rho: &[f64]) -> Vec<f64> {
-    let n = rho.len();
-    let wedge = mesh.azimuth(1.0);
+pub(crate) fn cell_areas(mesh: Mesh, outline: &Outline) -> Vec<f64> {
+    let (rho, n) = (&outline.rho, outline.rho.len());
     let ring = |ring: usize| {
         let (inner, outer) = (mesh.share(ring as f64), mesh.share((ring + 1) as f64));
-        let sector = 0.5 * wedge * (outer * outer - inner * inner);
         (0..mesh.n_azimuths).map(move |j| {
+            let wedge = match outline.is_even() {
+                true => mesh.azimuth(1.0),
+                false => outline.wedge(mesh, j)[1] - outline.wedge(mesh, j)[0],
+            };
+            let sector = 0.5 * wedge * (outer * outer - inner * inner);
             let [from, between, to] = [2 * j, 2 * j + 1, (2 * j + 2) % n].map(|i| rho[i] * rho[i]);
             sector * (from + 4.0 * between + to) / 6.0
         })
@@ -119,7 +122,14 @@ pub(crate) fn clear_shares(mesh: Mesh, outline: &Outline, passed: &dyn Fn(&[DVec
         let [inner, outer] = [ring, ring + 1].map(|ring| mesh.share(ring as f64).powi(2));
         // Even in area.
         let share = (inner + (outer - inner) * out).sqrt();
-        polar(outline.center, share * (rho(j) + (rho(j + 1) - rho(j)) * around), mesh.azimuth(j as f64 + around))
+        let azimuth = match outline.is_even() {
+            true => mesh.azimuth(j as f64 + around),
+            false => {
+                let [from, to] = outline.wedge(mesh, j);
+                from + (to - from) * around
+            }
+        };
+        polar(outline.center, share * (rho(j) + (rho(j + 1) - rho(j)) * around), azimuth)
     };
     let places: Vec<DVec2> = mesh.cells().flat_map(|(ring, j)| (0..N * N).map(move |k| place(ring, j, k))).collect();
     let n_passed = |passed: &[bool]| passed.iter().filter(|passed| **passed).count() as f64;

@@ -63,7 +63,7 @@ fn difference(
     for round in 0..n_rounds {
         let mut rays = behind.clone();
         let form = HurbForm::DirectionCosines;
-        let hurb = SampledHurb { model: Hurb::with_gamma(gamma), edge, form, seed: round };
+        let hurb = SampledHurb { model: Hurb::with_gamma(gamma), edge: edge.into(), form, seed: round };
         hurb.apply(&mut rays, &mono.stop_placement());
         for at in land(rays) {
             let at = (at - centroid) * (1e3 / PITCH_UM);

@@ -101,6 +101,9 @@ impl Camera {
     ///     How far the stop is open.
     /// coating : str
     ///     What covers all surfaces between air and glass: "bare", "mgf2", "vcoat", "bbar", a file, or "ideal" for no loss of light.
+    /// blades, blade_rotation_deg, blade_curvature : int, float, float
+    ///     The blades that close the stop, 3 to 64; the turn of their opening from one with a corner at its top; 0 for straight edges to 1
+    ///     for edges as curved as the rim.
     /// focus_mm : float, or "near"
     ///     Distance in focus before the first vertex; "near" for the near part of the scene.
     /// film_mm : float

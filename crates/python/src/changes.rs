@@ -2,9 +2,9 @@
 
 use dioptric_optics::{Lens as OpticsLens, LensFile};
 use dioptric_pipeline::{
-    Camera, CoatingSpec, Crop, FilmSpec, FocusSpec, FramesSpec, Given, GivenParts, KeptCamera, LensReadOptions,
+    Camera, CoatingSpec, Crop, FilmSpec, FocusSpec, FramesSpec, Given, GivenParts, Iris, KeptCamera, LensReadOptions,
     LensSpec, PICTURE, RetiredBank, SceneSpec, SensorOptions, SensorSpec, StopSpec, WavelengthSpec, with_auto_exposure,
-    with_exposure_s,
+    with_blades, with_exposure_s,
 };
 use dioptric_sensor::Processing;
 use pyo3::{
@@ -39,6 +39,9 @@ const ALL: &[&str] = &[
     "f_number",
     "stop_mm",
     "coating",
+    "blades",
+    "blade_rotation_deg",
+    "blade_curvature",
     "focus_mm",
     "film_mm",
     "tilt_deg",
@@ -120,7 +123,7 @@ pub(crate) fn changed(
     let mut changed = kept.clone();
     let mut checks_lens = false;
     each_option(function, options, known, |key, value| {
-        checks_lens |= matches!(key, "lens" | "f_number" | "stop_mm" | "coating");
+        checks_lens |= matches!(key, "lens" | "f_number" | "stop_mm" | "coating" | "blades");
         match key {
             "lens" => set_lens(&mut changed, value),
             "scene" => set_scene(&mut changed, value),
@@ -153,7 +156,7 @@ pub(crate) fn open_lens(kept: &KeptCamera) -> PyResult<OpticsLens> {
         Some(lens) => (**lens).clone(),
         None => camera.lens.open(&camera.lens_reading).map_err(exception)?.lens,
     };
-    camera.stop.apply(lens).map_err(exception)
+    with_blades(lens, camera.iris).and_then(|lens| camera.stop.apply(lens)).map_err(exception)
 }
 
 /// Covers the surfaces of the lens, the camera file's or a given one.
@@ -183,6 +186,7 @@ fn set_lens(kept: &mut KeptCamera, value: &Bound<'_, PyAny>) -> PyResult<()> {
     let camera = Camera {
         lens: LensSpec::named(&text),
         stop: StopSpec::AsGiven,
+        iris: None,
         lens_reading: LensReadOptions::default(),
         ..kept.camera().clone()
     };
@@ -233,6 +237,17 @@ fn set_optics(camera: &mut Camera, key: &str, value: &Bound<'_, PyAny>) -> PyRes
         "name" => camera.name = word(key, value)?,
         "f_number" => camera.stop = StopSpec::FNumber(number(key, value)?),
         "stop_mm" => camera.stop = StopSpec::DiameterMm(number(key, value)?),
+        "blades" => {
+            let expected = "a whole number of 3 to 64, or None for a round stop";
+            let blades: u32 = value.extract().map_err(|_| wrong_type(key, type_name(value), expected))?;
+            let old = camera.iris.unwrap_or(Iris { blades, rotation_deg: 0.0, curvature: 0.0 });
+            camera.iris = Some(Iris { blades, ..old });
+        }
+        "blade_rotation_deg" | "blade_curvature" => {
+            let number = number(key, value)?;
+            let iris = camera.iris.as_mut().ok_or_else(|| wrong(key, number, "'blades' with it"))?;
+            *(if key == "blade_curvature" { &mut iris.curvature } else { &mut iris.rotation_deg }) = number;
+        }
         "focus_mm" if value.is_instance_of::<PyString>() => match word(key, value)?.as_str() {
             "near" => camera.focus = FocusSpec::NearObject,
             other => return Err(wrong(key, format!("'{other}'"), "a distance in mm, or 'near' for the near object")),

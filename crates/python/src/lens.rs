@@ -8,7 +8,7 @@ use std::{
 use dioptric_analysis::{LensData, LensDefaults, LensInfoRequest, built_in_lenses, surface_rows};
 use dioptric_optics::{Layout, LensFile, MonoLens, ReadOptions, Vignetting};
 use dioptric_pipeline::{
-    Camera, CoatingSpec, Given, GlassRange, KeptCamera, LensReadOptions, LensSpec, MissingGlass,
+    Camera, CoatingSpec, Given, GlassRange, Iris, KeptCamera, LensReadOptions, LensSpec, MissingGlass,
     REFERENCE_WAVELENGTH_NM, StopSpec,
 };
 use ndarray::{ArrayD, IxDyn};
@@ -43,13 +43,15 @@ pub(crate) struct Lens {
     /// What a camera file says of it, where it can.
     choice: Option<(LensSpec, LensReadOptions)>,
     stop: StopSpec,
+    /// The blades that it was given.
+    iris: Option<Iris>,
     /// The lens at the wavelength of the last trace.
     mono: Mutex<Option<Arc<MonoLens>>>,
 }
 
 impl Lens {
     fn new(file: LensFile, choice: Option<(LensSpec, LensReadOptions)>) -> Self {
-        Self { file, choice, stop: StopSpec::AsGiven, mono: Mutex::default() }
+        Self { file, choice, stop: StopSpec::AsGiven, iris: None, mono: Mutex::default() }
     }
 
     fn of_choice(choice: LensSpec, reading: LensReadOptions) -> PyResult<Self> {
@@ -64,7 +66,20 @@ impl Lens {
             Some(lens) => Self::new(LensFile::from((**lens).clone()), None),
             None => Self::of_choice(camera.lens.clone(), camera.lens_reading.clone())?,
         };
+        let lens = if camera.iris.is_some() { lens.bladed(camera.iris)? } else { lens };
         lens.stopped(camera.stop)
+    }
+
+    fn bladed(&self, iris: Option<Iris>) -> PyResult<Self> {
+        let lens = self.file.lens.clone().with_iris(iris).map_err(exception)?;
+        Ok(Self {
+            file: LensFile { lens, ..self.file.clone() },
+            // What a file's own blades are taken from, no camera file says.
+            choice: self.choice.clone().filter(|_| iris.is_some()),
+            stop: self.stop,
+            iris,
+            mono: Mutex::default(),
+        })
     }
 
     fn stopped(&self, stop: StopSpec) -> PyResult<Self> {
@@ -74,6 +89,7 @@ impl Lens {
             file: LensFile { lens, ..self.file.clone() },
             choice: self.choice.clone(),
             stop,
+            iris: self.iris,
             mono: Mutex::default(),
         })
     }
@@ -85,8 +101,13 @@ impl Lens {
         };
         let mut given = kept.given().clone();
         given.lens = None;
-        let camera =
-            Camera { lens: lens.clone(), lens_reading: reading.clone(), stop: self.stop, ..kept.camera().clone() };
+        let camera = Camera {
+            lens: lens.clone(),
+            lens_reading: reading.clone(),
+            stop: self.stop,
+            iris: self.iris,
+            ..kept.camera().clone()
+        };
         kept.with_camera(camera, given)
     }
 
@@ -246,6 +267,7 @@ impl Lens {
             file: LensFile { lens, ..self.file.clone() },
             choice: self.choice.as_ref().map(of_range),
             stop: self.stop,
+            iris: self.iris,
             mono: Mutex::default(),
         })
     }
@@ -282,6 +304,15 @@ impl Lens {
             _ => return Err(wrong("the stop", "given twice", "f_number or diameter_mm")),
         };
         guarded(|| self.stopped(stop))
+    }
+
+    /// Returns the lens with its stop closed by blades, 3 to 64, or by none: round only where it is fully open.
+    ///
+    /// `rotation_deg` turns the opening from one with a corner at its top; `curvature` is that of the blades' edges, 0 for straight ones to
+    /// 1 for the rim's.
+    #[pyo3(signature = (blades, *, rotation_deg=0.0, curvature=0.0))]
+    fn with_iris(&self, blades: Option<u32>, rotation_deg: f64, curvature: f64) -> PyResult<Self> {
+        guarded(|| self.bladed(blades.map(|blades| Iris { blades, rotation_deg, curvature })))
     }
 
     /// What the lens is called.

@@ -72,7 +72,7 @@ impl ItemKey {
         let of = |part: &dyn fmt::Debug| short(&hash(&format!("{part:?}")));
         let stages = [
             of(&(&scene.source, scene.field_of_view_deg, scene.depth_m, scene.flat, &camera.wavelengths)),
-            of(&(&camera.lens, &camera.lens_reading, camera.stop, camera.movements)),
+            of(&((&camera.lens, &camera.lens_reading), (camera.stop, camera.iris), camera.movements)),
             of(&((camera.focus, camera.film, camera.crop), sensor, camera.diffraction)),
             of(&(camera.blur, camera.border, &camera.light_field)),
             of(&(&scene.illuminant, scene.illuminance_lux, &scene.light, (scene.mean_luminance_cd_m2, scene.mean_lux))),

@@ -1,10 +1,11 @@
 //! A lens and how it is meant to be used, as far as its file says: the defaults of commands.
 
-use dioptric_optics::{Field, Lens, LensFile, glam::DVec2};
+use dioptric_optics::{Field, Iris, Lens, LensFile, glam::DVec2};
 
 use crate::{AnalysisFields, AnalysisFilm, ConfigurationData};
 use dioptric_pipeline::{
     LensReadOptions, LensSpec, Movements, PipelineError, REFERENCE_WAVELENGTH_NM, StopSpec, nearest_to_reference_nm,
+    with_blades,
 };
 
 /// A lens, and what its file says of its use.
@@ -44,15 +45,23 @@ impl LensDefaults {
         Ok(used)
     }
 
-    /// Returns it with the stop of the lens set and the lens turned and moved; an f-number is that at this wavelength, nm. What is to
+    /// Returns it with the stop of the lens set, with blades where there are any, and the lens turned and moved; an f-number is that at this wavelength, nm. What is to
     /// be noted about the stop is added to the notes.
     ///
     /// # Errors
     /// When the stop does not open so far, a movement is not finite, or a glass is not known at the wavelength.
-    pub fn placed(self, stop: StopSpec, movements: Movements, wavelength_nm: f64) -> Result<Self, PipelineError> {
+    pub fn placed(
+        self,
+        stop: StopSpec,
+        iris: Option<Iris>,
+        movements: Movements,
+        wavelength_nm: f64,
+    ) -> Result<Self, PipelineError> {
         let mut notes = self.notes;
         notes.extend(stop.note_at(&self.lens, wavelength_nm));
-        let lens = movements.apply_at(stop.apply_at(self.lens, wavelength_nm)?, wavelength_nm)?;
+        let lens = stop.apply_at(with_blades(self.lens, iris)?, wavelength_nm)?;
+        notes.extend(lens.note_on_iris());
+        let lens = movements.apply_at(lens, wavelength_nm)?;
         notes.extend(lens.at(wavelength_nm)?.note_on_limit(self.distance_mm));
         Ok(Self { lens, notes, ..self })
     }

@@ -1,6 +1,6 @@
 //! Footprints: where the light of each field meets the surfaces of a lens.
 
-use dioptric_optics::{Aperture, Lens, Outline, Placement, PupilBoundary, Vignetting, glam::DVec2};
+use dioptric_optics::{Aperture, Lens, Placement, PupilBoundary, Vignetting, glam::DVec2};
 
 use super::{
     request::Field,
@@ -87,13 +87,9 @@ fn ellipse(half_mm: DVec2, center_mm: DVec2) -> Vec<(f64, f64)> {
 }
 
 fn edge_of(aperture: &Aperture) -> Vec<(f64, f64)> {
-    let (half_mm, center_mm) = (aperture.outline.half_widths_mm(), DVec2::from_array(aperture.center_mm));
-    match aperture.outline {
-        Outline::Rectangle { .. } => [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0), (1.0, 1.0)]
-            .map(|(x, y)| (center_mm.x + x * half_mm.x, center_mm.y + y * half_mm.y))
-            .to_vec(),
-        _ => ellipse(half_mm, center_mm),
-    }
+    let mut edge: Vec<(f64, f64)> = aperture.edge_mm().map(|place| place.into()).collect();
+    edge.extend(edge.first().copied());
+    edge
 }
 
 #[cfg(test)]

@@ -153,15 +153,7 @@ fn openings_summary(lens: &Lens, surface: usize) -> Vec<String> {
     let of_surface = lens.apertures().iter().filter(|aperture| aperture.surface == surface);
     let summary = |aperture: &dioptric_optics::Aperture| {
         let what = if aperture.is_obscuration { "obscuration" } else { "opening" };
-        let outline = match aperture.outline {
-            Outline::Circle { radius_mm } => format!("circle of {} mm across", 2.0 * radius_mm),
-            Outline::Ellipse { half_x_mm, half_y_mm } => {
-                format!("ellipse of {} by {} mm", 2.0 * half_x_mm, 2.0 * half_y_mm)
-            }
-            Outline::Rectangle { half_x_mm, half_y_mm } => {
-                format!("rectangle of {} by {} mm", 2.0 * half_x_mm, 2.0 * half_y_mm)
-            }
-        };
+        let outline = outline_summary(&aperture.outline);
         let place = match aperture.center_mm {
             [0.0, 0.0] => String::new(),
             [x_mm, y_mm] => format!(" about {x_mm}, {y_mm} mm"),
@@ -169,6 +161,21 @@ fn openings_summary(lens: &Lens, surface: usize) -> Vec<String> {
         format!("{what}: {outline}{place}")
     };
     of_surface.map(summary).collect()
+}
+
+fn outline_summary(outline: &Outline) -> String {
+    match outline {
+        Outline::Circle { radius_mm } => format!("circle of {} mm across", 2.0 * radius_mm),
+        Outline::Ellipse { half_x_mm, half_y_mm } => {
+            format!("ellipse of {} by {} mm", 2.0 * half_x_mm, 2.0 * half_y_mm)
+        }
+        Outline::Rectangle { half_x_mm, half_y_mm } => {
+            format!("rectangle of {} by {} mm", 2.0 * half_x_mm, 2.0 * half_y_mm)
+        }
+        Outline::Polygon { corners_mm } => format!("polygon of {} corners", corners_mm.len()),
+        Outline::Turned { by_deg, outline } => format!("{}, turned by {by_deg}°", outline_summary(outline)),
+        Outline::Iris(opening) => format!("iris of {:.4} mm inscribed", 2.0 * opening.inscribed_radius_mm()),
+    }
 }
 
 #[cfg(test)]

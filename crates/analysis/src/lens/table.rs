@@ -80,6 +80,9 @@ pub struct LensData {
     /// The f-number of a lens without losses that has as much light: the f-number (of the light, where that is another) over the square
     /// root of the transmission.
     pub t_number: Option<f64>,
+    /// The f-number of the largest round beam within the blades of a stop that they close.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub f_number_inscribed: Option<f64>,
     /// Whether the stop limits the light of the point on the axis at the object's distance. Where it does not, f-number and
     /// diameters of pupils are those of the beam that the rims let through.
     pub stop_limits: bool,
@@ -224,7 +227,8 @@ impl LensData {
             });
         }
         let mono = lens.at(wavelength_nm)?;
-        let x_plane = (!lens.is_rotational()).then(|| PlaneData::of_x(&mono));
+        let is_round_but_for_blades = lens.clone().with_iris(None).is_ok_and(|lens| lens.is_rotational());
+        let x_plane = (!is_round_but_for_blades).then(|| PlaneData::of_x(&mono));
         let colors_nm = question.colors_nm(lens);
         let settings = SeidelSettings {
             wavelength_nm,
@@ -259,6 +263,9 @@ impl LensData {
             f_number_of_light,
             transmission,
             t_number,
+            f_number_inscribed: lens
+                .iris_opening()
+                .map(|opening| first.f_number * lens.stop_semi_aperture_mm() / opening.inscribed_radius_mm()),
             stop_limits: limit.is_none_or(|beam| beam.limiting_surface == mono.stop()),
             limiting_surface: limit.map_or(mono.stop(), |beam| beam.limiting_surface),
             angular_magnification: angular_magnification(lens, &mono),

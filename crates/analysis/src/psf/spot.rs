@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use dioptric_diffraction::{CircularStop, Covariance, Hurb, HurbForm, SampledHurb};
+use dioptric_diffraction::{Covariance, Hurb, HurbForm, SampledHurb, StopEdge};
 use dioptric_optics::{
     FilmPoint, MonoLens, ObjectPoint, PupilRegion, Vignetting,
     analysis::{PupilLight, PupilRule},
@@ -60,7 +60,7 @@ impl Spot {
         let stop = mono.stop();
         mono.trace_surfaces(0..stop + 1, &mut rays, Vignetting::On);
         if let Some(model) = paper.bending {
-            let edge = CircularStop::new(mono.stop_semi_aperture_mm(), mono.wavelength_nm(), mono.stop_medium_index());
+            let edge = StopEdge::of(mono);
             let hurb = SampledHurb { model, edge, form: HurbForm::Angles, seed: paper.seed };
             hurb.apply(&mut rays, &mono.stop_placement());
         }

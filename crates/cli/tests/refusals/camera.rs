@@ -250,6 +250,10 @@ pub(crate) const ADDED: &[(&str, &str)] = &[
         "light_field: Some(Array((elements: Lenses(focal_length_mm: 0.4), pitch_mm: 0.1, gap_mm: 0.4)))",
         "light_field: only rays from the film go through its",
     ),
+    ("iris: Some((blades: 2))", "blades is 2, expected 3 to 64 blades"),
+    ("iris: Some((blades: 6, curvature: -0.1))", "curvature is -0.1, expected 0 to 1"),
+    ("iris: Some((blades: 6, rotation_deg: NaN))", "rotation_deg is NaN, expected -360 to 360"),
+    ("iris: Some((blades: 6, roundness: 1.0))", "Unexpected field named `roundness` in `Iris`"),
     ("lens_reading: (slope_per_nm: NaN)", "slope_per_nm is NaN, expected "),
     (r#"lens_reading: (glasses: ["none.agf"])"#, "none.agf: No such file or directory (os error 2)"),
 ];

@@ -14,6 +14,14 @@ pub(crate) const CHANGED: &[(&str, &str, &str, &str)] = &[
     ("ron", "thickness_mm: 4.0", "thickness_mm: inf", "surface 0: thickness_mm is inf, expected a finite number"),
     ("ron", "semi_aperture_mm: 8.0", "semi_aperture_mm: 0.0", "surface 0: semi_aperture_mm is 0, expected a finite"),
     ("ron", "semi_aperture_mm: 8.0", "semi_aperture_mm: -8.0", "surface 0: semi_aperture_mm is -8, expected a finite"),
+    ("ron", "surfaces: [", "iris: (blades: 2), surfaces: [", "the iris: blades is 2, expected 3 to 64 blades"),
+    ("ron", "surfaces: [", "iris: (blades: 6, curvature: 2.0), surfaces: [", "the iris: curvature is 2, expected 0"),
+    (
+        "ron",
+        "surfaces: [",
+        "apertures: [(surface: 2, outline: Polygon(corners_mm: [(0.0, 1.0), (1.0, 0.0)]))], surfaces: [",
+        "surface 2: the number of corners of an aperture is 2, expected 3 to 1000",
+    ),
     ("ron", "stop: true, ", "", "a lens has exactly one stop, but 0 surfaces are marked"),
     (
         "ron",

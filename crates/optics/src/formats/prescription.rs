@@ -6,8 +6,8 @@ use ron::extensions::Extensions;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    Aperture, Coating, CoordinateBreak, DiffractiveSurface, Glass, ImageSurface, Interface, Lens, OpticsError, Shape,
-    Surface,
+    Aperture, Coating, CoordinateBreak, DiffractiveSurface, Glass, ImageSurface, Interface, Iris, Lens, OpticsError,
+    Shape, Surface,
 };
 
 use self::configuration_row::ConfigurationRow;
@@ -34,6 +34,9 @@ pub(super) struct Prescription {
     /// Openings and obscurations beside the round rims.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(super) apertures: Vec<Aperture>,
+    /// Blades that close the stop.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) iris: Option<Iris>,
     /// Gratings and diffractive surfaces.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(super) diffractive: Vec<DiffractiveSurface>,
@@ -176,6 +179,7 @@ fn file_of(prescription: Prescription) -> Result<LensFile, TextError> {
     let lens =
         Lens::new_with_apertures(prescription.name, prescription.source, interfaces, stop, prescription.apertures)?;
     let lens = lens.with_object_medium(prescription.object_medium)?.with_mirrors(mirrors)?;
+    let lens = lens.with_iris(prescription.iris)?;
     let lens = lens.with_diffractive(prescription.diffractive)?.with_coatings(coatings)?;
     let lens = lens.with_moves(prescription.moves)?.with_image_surface(image_surface)?;
     let positive = |key: &str, found: Option<f64>| match found.filter(|mm| !(mm.is_finite() && *mm > 0.0)) {
@@ -264,6 +268,7 @@ impl Lens {
             surfaces: self.interfaces().iter().enumerate().map(row).collect(),
             moves: self.moves().to_vec(),
             apertures: self.apertures().to_vec(),
+            iris: self.iris().copied(),
             diffractive: self.diffractive().to_vec(),
             image_radius_mm: radius_mm(self.image_surface().curvature_per_mm),
             image_conic: self.image_surface().conic,

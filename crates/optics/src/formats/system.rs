@@ -286,7 +286,7 @@ impl System {
     /// Returns the apertures of all surfaces, each with the surface's number.
     fn apertures(&self) -> Vec<Aperture> {
         let of_surface = |(surface, stated): (usize, &SystemSurface)| {
-            stated.apertures.iter().map(move |&aperture| Aperture { surface, ..aperture }).collect::<Vec<_>>()
+            stated.apertures.iter().map(move |aperture| Aperture { surface, ..aperture.clone() }).collect::<Vec<_>>()
         };
         self.surfaces.iter().enumerate().flat_map(of_surface).collect()
     }

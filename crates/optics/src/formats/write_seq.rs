@@ -343,32 +343,40 @@ fn write_apertures(text: &mut String, lens: &Lens, i: usize) -> Result<(), Optic
             if rim_mm < reach_mm * (1.0 - 1e-9) && i != lens.stop() {
                 return Err(cannot(FORMAT, i, "has an opening off its axis that its rim cuts"));
             }
-            write_aperture(text, opening, "");
+            write_aperture(text, opening, "")?;
         }
         Some(opening) => {
             let _ = writeln!(text, "  CIR {}", written(rim_mm));
-            write_aperture(text, opening, "");
+            write_aperture(text, opening, "")?;
         }
         None => {
             let _ = writeln!(text, "  CIR {}", written(rim_mm));
         }
     }
     if let Some(obscuration) = obscurations.first() {
-        write_aperture(text, obscuration, "OBS ");
+        write_aperture(text, obscuration, "OBS ")?;
     }
     Ok(())
 }
 
-fn write_aperture(text: &mut String, aperture: &Aperture, kind: &str) {
+fn write_aperture(text: &mut String, aperture: &Aperture, kind: &str) -> Result<(), OpticsError> {
     let numbers = match aperture.outline {
         Outline::Circle { radius_mm } => vec![("CIR", radius_mm)],
         Outline::Rectangle { half_x_mm, half_y_mm } => vec![("REX", half_x_mm), ("REY", half_y_mm)],
         Outline::Ellipse { half_x_mm, half_y_mm } => vec![("ELX", half_x_mm), ("ELY", half_y_mm)],
+        Outline::Polygon { .. } | Outline::Turned { .. } | Outline::Iris(_) => {
+            return Err(cannot(
+                FORMAT,
+                aperture.surface,
+                "has an aperture that is no circle, ellipse or rectangle along x and y",
+            ));
+        }
     };
     let center = ["ADX", "ADY"].into_iter().zip(aperture.center_mm).filter(|(_, mm)| *mm != 0.0);
     for (keyword, mm) in numbers.into_iter().chain(center) {
         let _ = writeln!(text, "  {keyword} {kind}{}", written(mm));
     }
+    Ok(())
 }
 
 /// Returns the word of a glass of the catalogue: its name and its maker.

@@ -302,7 +302,7 @@ fn zmx_aperture(lens: &Lens, surface: usize) -> Result<String, OpticsError> {
         return Err(cannot("a .zmx file", surface, "has several apertures"));
     };
     let [x_mm, y_mm] = aperture.center_mm;
-    let lines = match (aperture.outline, aperture.is_obscuration) {
+    let lines = match (&aperture.outline, aperture.is_obscuration) {
         (Outline::Circle { radius_mm }, true) if aperture.center_mm == [0.0; 2] => {
             return Ok(format!("  CLAP {radius_mm:e} {rim_mm:e} 0\r\n"));
         }
@@ -313,6 +313,13 @@ fn zmx_aperture(lens: &Lens, surface: usize) -> Result<String, OpticsError> {
         (Outline::Circle { radius_mm }, false) => format!("  CLAP 0 {radius_mm:e} 0\r\n"),
         (Outline::Ellipse { half_x_mm, half_y_mm }, false) => format!("  ELAP {half_x_mm:e} {half_y_mm:e} 0\r\n"),
         (Outline::Rectangle { half_x_mm, half_y_mm }, false) => format!("  SQAP {half_x_mm:e} {half_y_mm:e} 0\r\n"),
+        (Outline::Polygon { .. } | Outline::Turned { .. } | Outline::Iris(_), false) => {
+            return Err(cannot(
+                "a .zmx file",
+                surface,
+                "has an aperture that is no circle, ellipse or rectangle along x and y",
+            ));
+        }
     };
     Ok(format!("{lines}  OBDC {x_mm:e} {y_mm:e}\r\n"))
 }

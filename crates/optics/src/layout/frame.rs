@@ -47,6 +47,11 @@ impl Frame {
         MARGIN_PX + (self.y_max_mm - y_mm) * self.px_per_mm
     }
 
+    /// The upper right corner of the room for drawings, px.
+    pub(super) fn corner_px(&self) -> DVec2 {
+        DVec2::new(self.width_px - MARGIN_PX, MARGIN_PX)
+    }
+
     pub(super) fn open(&self, name: &str) -> String {
         let (w, h) = (self.width_px, self.height_px);
         format!(

@@ -1,7 +1,7 @@
 //! Lenses made larger or smaller.
 
 use super::{ImageSurface, Lens};
-use crate::{Aperture, CoordinateBreak, Interface, OpticsError, Outline, PhaseProfile, Shape, Surface};
+use crate::{Aperture, CoordinateBreak, Interface, OpticsError, PhaseProfile, Shape, Surface};
 
 impl Lens {
     /// Returns the lens with all its lengths so many times as long, and so many times the paths that diffractive surfaces and wavefront
@@ -28,13 +28,7 @@ impl Lens {
             decenter_mm.iter_mut().for_each(|length_mm| *length_mm *= factor);
         }
         for Aperture { outline, center_mm, .. } in &mut lens.apertures {
-            match outline {
-                Outline::Circle { radius_mm } => *radius_mm *= factor,
-                Outline::Ellipse { half_x_mm, half_y_mm } | Outline::Rectangle { half_x_mm, half_y_mm } => {
-                    *half_x_mm *= factor;
-                    *half_y_mm *= factor;
-                }
-            }
+            *outline = outline.scaled(factor);
             center_mm.iter_mut().for_each(|length_mm| *length_mm *= factor);
         }
         for diffractive in &mut lens.diffractive {

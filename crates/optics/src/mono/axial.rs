@@ -41,13 +41,17 @@ impl MonoLens {
     /// y–z plane.
     ///
     /// `None` where no light gets through close to the axis, and for lenses that are tilted, decentered or not of
-    /// revolution: of those the stop is taken to limit the light. Obscurations are left out.
+    /// revolution: of those the stop is taken to limit the light. Obscurations are left out, and blades count as the circle of the area that
+    /// they leave open.
     pub fn axial_beam(&self, object_distance_mm: f64) -> Option<AxialBeam> {
         self.axial_beam_along(object_distance_mm, DVec2::Y)
     }
 
     /// The same in the plane through the axis and this direction across it.
     pub(super) fn axial_beam_along(&self, object_distance_mm: f64, direction: DVec2) -> Option<AxialBeam> {
+        if let Some(round) = self.with_round_iris() {
+            return round.axial_beam_along(object_distance_mm, direction);
+        }
         if !self.is_centered() || !self.steps().iter().all(Step::is_rotational) {
             return None;
         }

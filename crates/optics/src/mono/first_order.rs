@@ -3,7 +3,7 @@
 use glam::DVec2;
 
 use crate::{
-    Aperture, AxialBeam, Conjugate, FirstOrder, MonoLens, OpticsError,
+    AxialBeam, Conjugate, FirstOrder, MonoLens, OpticsError,
     paraxial::{self, MarginalRay, Matrix},
     trace::{Kind, Step},
 };
@@ -126,10 +126,16 @@ impl MonoLens {
     pub fn first_order_x(&self) -> FirstOrder {
         let is_toric = self.steps.iter().any(|step| matches!(step.kind, Kind::Toric(_)));
         if is_toric {
-            return paraxial::first_order(&self.steps_along_x(), self.stop, self.wavelength_nm);
+            let round = self.with_round_iris();
+            let steps = round.as_ref().unwrap_or(self).steps_along_x();
+            return paraxial::first_order(&steps, self.stop, self.wavelength_nm);
         }
         // Of surfaces of revolution only openings may differ.
-        let are_apertures_round = self.steps.iter().flat_map(|step| &step.apertures).all(Aperture::is_rotational);
+        let are_apertures_round = self
+            .steps
+            .iter()
+            .flat_map(|step| &step.apertures)
+            .all(|aperture| aperture.is_rotational() || aperture.is_iris());
         if are_apertures_round || !self.has_far_pupil() {
             return self.first_order();
         }
@@ -176,7 +182,7 @@ impl MonoLens {
 
     /// The same to the edge of the stop, whether the light gets through or not.
     pub(crate) fn marginal_ray_of_stop(&self, object_distance_mm: f64) -> MarginalRay {
-        MarginalRay::of(&self.steps, self.stop, object_distance_mm)
+        MarginalRay::of(&self.steps, self.stop, self.stop_semi_aperture_mm, object_distance_mm)
     }
 
     /// z from the first vertex of the point that fields and depths are counted from, mm: the center of the paraxial

@@ -7,15 +7,15 @@ use glam::DVec2;
 use super::{EDGE_MM, PupilBoundary, Search, edge::EdgeSearch};
 use crate::{MonoLens, ObjectPoint, Vignetting};
 
-/// What bounds a pupil in some direction: a surface and the part of its openings, 0 for the round rim.
-type Limit = (usize, usize);
+/// What bounds a pupil in some direction: a surface, one of its openings, 0 for the round rim, and the part of that.
+type Limit = (usize, usize, usize);
 
 /// How near two rims must be to a ray to be held for one, mm.
 const SAME_MM: f64 = 1e-8;
 /// Halvings of the angle between two azimuths: a corner is found to 1e-4 of that, the area beside it to 1e-8.
 const HALVINGS: usize = 14;
 /// With more corners than this an edge is taken as smooth: it is one of rims that lie upon one another.
-const MOST_CORNERS: usize = 24;
+const MOST_CORNERS: usize = 72;
 
 impl PupilBoundary {
     /// Returns the azimuths in [0, 2π) at which the edge has corners, ascending: where it passes from one rim to another
@@ -89,7 +89,7 @@ struct Bracket {
 impl Search<'_> {
     /// Returns what each ray comes nearest to.
     fn limits(&self, targets_mm: &[DVec2]) -> Vec<Limit> {
-        let mut nearest = vec![(f64::INFINITY, (0, 0)); targets_mm.len()];
+        let mut nearest = vec![(f64::INFINITY, (0, 0, 0)); targets_mm.len()];
         let mut rays = self.plane.rays(self.lens, self.point, targets_mm);
         for (surface, step) in self.lens.steps().iter().enumerate() {
             self.lens.trace_surfaces(surface..surface + 1, &mut rays, Vignetting::Off);
@@ -100,15 +100,15 @@ impl Search<'_> {
                     .placements()
                     .map_or(point, |placements| placements[surface].surface_from_lens(point))
                     .truncate();
-                let mut note = |clearance_mm: f64, part: usize| {
+                let mut note = |clearance_mm: f64, number: usize, part: usize| {
                     if clearance_mm < nearest.0 - SAME_MM {
-                        *nearest = (clearance_mm, (surface, part));
+                        *nearest = (clearance_mm, (surface, number, part));
                     }
                 };
-                note(step.semi_aperture - at.length(), 0);
+                note(step.semi_aperture - at.length(), 0, 0);
                 for (number, aperture) in step.apertures.iter().enumerate() {
                     let (clearance_mm, side) = aperture.clearance_of_side_mm(at.x, at.y);
-                    note(clearance_mm, 1 + 4 * number + side);
+                    note(clearance_mm, 1 + number, side);
                 }
             }
         }

@@ -70,7 +70,12 @@ mod tests {
 
     fn lens(apertures: &[(Outline, [f64; 2])]) -> MonoLens {
         let thin = Lens::thin(50.0, 10.0).unwrap();
-        let aperture = |&(outline, center_mm)| Aperture { surface: 0, outline, center_mm, is_obscuration: true };
+        let aperture = |(outline, center_mm): &(Outline, [f64; 2])| Aperture {
+            surface: 0,
+            outline: outline.clone(),
+            center_mm: *center_mm,
+            is_obscuration: true,
+        };
         let apertures = apertures.iter().map(aperture).collect();
         let lens = Lens::new_with_apertures("holed", "test", thin.interfaces().to_vec(), 0, apertures);
         lens.unwrap().at(550.0).unwrap()

@@ -3,13 +3,13 @@
 use std::path::{Path, PathBuf};
 
 use dioptric_optics::{
-    COATING_CENTER_NM, Coating, GlassCatalogue, GlassRange, IdealLens, Lens, LensFile, MissingGlass, ReadOptions,
+    COATING_CENTER_NM, Coating, GlassCatalogue, GlassRange, IdealLens, Iris, Lens, LensFile, MissingGlass, ReadOptions,
     SchematicEye, SeqNumbers, SurfaceChange,
 };
 use dioptric_sensor::Sensor;
 use serde::{Deserialize, Serialize};
 
-use crate::{LensSpec, PipelineError, SensorSpec, StopSpec};
+use crate::{Camera, LensSpec, PipelineError, SensorSpec, StopSpec};
 
 /// The wavelength of f-numbers, fields and focus where nothing else is said, nm.
 pub const REFERENCE_WAVELENGTH_NM: f64 = 550.0;
@@ -189,6 +189,24 @@ impl StopSpec {
             Self::DiameterMm(d) => lens.with_stop_diameter_mm(d)?,
         })
     }
+}
+
+impl Camera {
+    /// Returns the lens with its blades and its stop set, not yet moved before the film.
+    ///
+    /// # Errors
+    /// When there is none of that name, its file cannot be read, it has no iris, or the stop does not open so far.
+    pub fn stopped_lens(&self) -> Result<Lens, PipelineError> {
+        self.stop.apply(with_blades(self.lens.open(&self.lens_reading)?.lens, self.iris)?)
+    }
+}
+
+/// Returns a lens with these blades, or with its own where there are none.
+///
+/// # Errors
+/// When their numbers make no sense, or the lens is a pinhole.
+pub fn with_blades(lens: Lens, iris: Option<Iris>) -> Result<Lens, PipelineError> {
+    Ok(if iris.is_some() { lens.with_iris(iris)? } else { lens })
 }
 
 impl SensorSpec {

@@ -22,7 +22,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use dioptric_optics::SurfaceChange;
+use dioptric_optics::{Iris, SurfaceChange};
 use dioptric_psf::{Diffraction, PsfError};
 use dioptric_sensor::{AutoExposure, ExposureControl, Metering, NoiseSources, Processing};
 use dioptric_spectrum::WavelengthGrid;
@@ -37,7 +37,7 @@ pub use dual_pixel::DualPixelSpec;
 pub use filters::FilterSpec;
 pub(crate) use frames::at_rest;
 pub use frames::{Exposed, FramesSpec, PhotodiodeReads};
-pub use lens::{CoatingSpec, LensReadOptions, REFERENCE_WAVELENGTH_NM, nearest_to_reference_nm};
+pub use lens::{CoatingSpec, LensReadOptions, REFERENCE_WAVELENGTH_NM, nearest_to_reference_nm, with_blades};
 pub use light_field::LightFieldSpec;
 pub use movements::Movements;
 pub use photodiodes::Photodiodes;
@@ -70,6 +70,9 @@ pub struct Camera {
     /// How far its stop is open.
     #[serde(default)]
     pub stop: StopSpec,
+    /// The blades that close the stop; those of the lens's own file if left out, and a round stop where that has none.
+    #[serde(default)]
+    pub iris: Option<Iris>,
     /// How it is turned and moved before the film.
     #[serde(default)]
     pub movements: Movements,
@@ -392,6 +395,11 @@ impl Camera {
             StopSpec::FNumber(n) => checker.number("FNumber", n)?,
             StopSpec::DiameterMm(d) => checker.number("DiameterMm", d)?,
             StopSpec::AsGiven => {}
+        }
+        if let Some(Iris { blades, rotation_deg, curvature }) = self.iris {
+            checker.number("blades", f64::from(blades))?;
+            checker.number("rotation_deg", rotation_deg)?;
+            checker.number("curvature", curvature)?;
         }
         match self.focus {
             FocusSpec::DistanceMm(d) => checker.number("DistanceMm", d)?,

@@ -4,7 +4,7 @@ use dioptric_optics::{Lens, LensFile, MonoLens};
 use dioptric_spectrum::WavelengthGrid;
 
 use super::spec::LensInputs;
-use crate::{PipelineError, REFERENCE_WAVELENGTH_NM};
+use crate::{PipelineError, REFERENCE_WAVELENGTH_NM, with_blades};
 
 /// A lens ready for use.
 #[derive(Clone, Debug)]
@@ -31,11 +31,13 @@ pub(super) fn resolve(inputs: &LensInputs) -> Result<ResolvedLens, PipelineError
         None => inputs.choice.open(&inputs.reading)?,
     };
     let note_on_stop = inputs.stop.note_at(&file.lens, REFERENCE_WAVELENGTH_NM);
-    let lens = inputs.movements.apply(inputs.stop.apply(file.lens)?)?;
+    let lens = inputs.stop.apply(with_blades(file.lens, inputs.iris)?)?;
+    let note_on_iris = lens.note_on_iris();
+    let lens = inputs.movements.apply(lens)?;
     let reference = lens.at(REFERENCE_WAVELENGTH_NM)?;
     // What limits the light is that of the lens's own object.
     let note_on_limit = reference.note_on_limit(file.object_distance_mm.unwrap_or(f64::INFINITY));
-    let notes = file.notes.into_iter().chain(note_on_stop).chain(note_on_limit).collect();
+    let notes = file.notes.into_iter().chain(note_on_stop).chain(note_on_iris).chain(note_on_limit).collect();
     Ok(ResolvedLens { lens, reference, notes })
 }
 

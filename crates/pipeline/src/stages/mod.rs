@@ -2,7 +2,7 @@
 //!
 //! | stage | made from |
 //! |---|---|
-//! | lens | lens, what its file leaves open, stop, movements |
+//! | lens | lens, what its file leaves open, stop, blades, movements |
 //! | painting | the still life of a preview: size, field of view, bands |
 //! | scene | source, field of view, depth, bands; its light |
 //! | film | lens, geometry of the scene, focus, raster |

@@ -10,7 +10,7 @@ use std::{
 
 use dioptric_backward::MicroArray;
 use dioptric_forward::Film;
-use dioptric_optics::Lens;
+use dioptric_optics::{Iris, Lens};
 use dioptric_scene::{FileReading, FillDepth, Scene, may_be_read_with};
 use dioptric_sensor::{ExposureControl, Noise, OpticalFilter, Processing, Sensor, WhiteBalance};
 use dioptric_spectrum::Illuminant;
@@ -70,6 +70,7 @@ pub(crate) struct LensInputs {
     pub(crate) choice: LensSpec,
     pub(crate) reading: LensReadOptions,
     pub(crate) stop: StopSpec,
+    pub(crate) iris: Option<Iris>,
     pub(crate) movements: Movements,
     files: Vec<FileStamp>,
 }
@@ -250,6 +251,7 @@ impl LensInputs {
             choice: camera.lens.clone(),
             reading: camera.lens_reading.clone(),
             stop: camera.stop,
+            iris: camera.iris,
             movements: camera.movements,
             files: lens_file.into_iter().chain(named).collect(),
         }

@@ -40,7 +40,7 @@ impl KeptCamera {
         let mut changed = self.with(|camera| {
             camera.lens = LensSpec::File(in_memory(lens.name()));
             camera.lens_reading = LensReadOptions::default();
-            camera.stop = StopSpec::AsGiven;
+            (camera.stop, camera.iris) = (StopSpec::AsGiven, None);
         });
         changed.given.lens = Some(lens);
         changed

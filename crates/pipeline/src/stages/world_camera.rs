@@ -38,6 +38,7 @@ impl CameraFile {
         let path = spec.file.parent().unwrap_or(Path::new("")).join(file);
         let slope_per_nm = has_dispersion.then_some(PAPER_SLOPE_PER_NM);
         self.lens_reading = LensReadOptions { slope_per_nm, ..LensReadOptions::default() };
+        self.iris = None;
         (self.lens, self.stop) = match focal_length_mm {
             Some(focal_length_mm) if file.is_empty() => {
                 let thin = LensSpec::Thin { focal_length_mm: *focal_length_mm, diameter_mm: *aperture_diameter_mm };
@@ -75,7 +76,7 @@ impl CameraFile {
     /// When the lens cannot be read, or the camera stands outside the room of the still life.
     pub fn focus_ahead(&self, world: Option<&World>) -> Result<FocusSpec, PipelineError> {
         let SceneSource::World(spec) = &self.scene.source else { return Ok(self.focus) };
-        let lens = self.stop.apply(self.lens.open(&self.lens_reading)?.lens)?.at(REFERENCE_WAVELENGTH_NM)?;
+        let lens = self.stopped_lens()?.at(REFERENCE_WAVELENGTH_NM)?;
         let ahead_m = match world {
             Some(world) => distance_ahead_m(world, &placement(world, spec, self.scene.field_of_view_deg)?),
             None => RadiantStillLife::unlit(&picture_at(spec))?.distance_ahead_m(),

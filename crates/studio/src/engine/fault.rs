@@ -81,7 +81,7 @@ fn field_of(error: &PipelineError, camera: &Camera) -> Field {
 fn field_of_key(key: &str, camera: &Camera) -> Field {
     match key {
         "lens" | "focal_length_mm" | "diameter_mm" | "slope_per_nm" | "lens_scale" => Field::Lens,
-        "FNumber" | "DiameterMm" => Field::Stop,
+        "FNumber" | "DiameterMm" | "blades" | "rotation_deg" | "curvature" => Field::Stop,
         "DistanceMm" | "FilmMm" => Field::Focus,
         "tilt_deg" | "swing_deg" | "rise_mm" | "shift_mm" => Field::Movements,
         "pitch_um" => Field::Film,
@@ -111,7 +111,10 @@ fn field_of_sensor(error: &SensorError) -> Field {
 
 fn field_of_optics(error: &OpticsError) -> Field {
     match error {
-        OpticsError::StopTooWide { .. } | OpticsError::FNumberTooSmall { .. } => Field::Stop,
+        OpticsError::StopTooWide { .. }
+        | OpticsError::FNumberTooSmall { .. }
+        | OpticsError::Iris { .. }
+        | OpticsError::NoIris { .. } => Field::Stop,
         OpticsError::NoFocus { .. } | OpticsError::FilmInLens { .. } => Field::Focus,
         OpticsError::WavelengthOutsideGlass { .. }
         | OpticsError::NotExtended { .. }

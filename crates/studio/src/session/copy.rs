@@ -1,8 +1,8 @@
 //! A camera in words for elsewhere: a camera file, a command line, Python.
 
 use dioptric_pipeline::{
-    Camera, Diffraction, FilmSpec, FocusSpec, FramesSpec, LensReadOptions, LensSpec, PICTURE, SensorSpec, StopSpec,
-    light_word, with_analog_gain, with_exposure_s,
+    Camera, Diffraction, FilmSpec, FocusSpec, FramesSpec, Iris, LensReadOptions, LensSpec, PICTURE, SensorSpec,
+    StopSpec, light_word, with_analog_gain, with_exposure_s,
 };
 use dioptric_sensor::{ExposureControl, NoiseSource, NoiseSources};
 
@@ -130,6 +130,7 @@ impl Telling {
             self.text("lens", &named);
             self.made.lens = camera.lens.clone();
             (self.made.stop, self.made.lens_reading) = (StopSpec::AsGiven, LensReadOptions::default());
+            self.made.iris = None;
         }
     }
 
@@ -141,6 +142,14 @@ impl Telling {
                 StopSpec::AsGiven => return,
             }
             self.made.stop = camera.stop;
+        }
+        if let Some(Iris { blades, rotation_deg, curvature }) = camera.iris
+            && camera.iris != self.made.iris
+        {
+            self.number("blades", f64::from(blades));
+            self.number("blade-rotation-deg", rotation_deg);
+            self.number("blade-curvature", curvature);
+            self.made.iris = camera.iris;
         }
         if camera.focus != self.made.focus {
             match camera.focus {

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use dioptric_optics::Lens;
 use dioptric_pipeline::{
-    Camera, CoatingSpec, FocusSpec, GlassRange, LensReadOptions, LensSpec, MissingGlass, SeqNumbers, StopSpec,
+    Camera, CoatingSpec, FocusSpec, GlassRange, Iris, LensReadOptions, LensSpec, MissingGlass, SeqNumbers, StopSpec,
 };
 use egui::{CollapsingHeader, Ui};
 
@@ -82,6 +82,7 @@ pub(in crate::ui) fn take_lens(camera: &mut Camera, lens: LensSpec) {
         camera.focus = FocusSpec::FilmMm(50.0);
     }
     (camera.lens, camera.stop, camera.lens_reading) = (lens, StopSpec::AsGiven, LensReadOptions::default());
+    camera.iris = None;
 }
 
 fn millimetres<'a>(label: &'a str, words: &'a str, slider: std::ops::RangeInclusive<f64>) -> NumberField<'a> {
@@ -133,6 +134,37 @@ fn stop(ui: &mut Ui, camera: &mut Camera, desk: &Desk<'_>) {
     if let StopSpec::DiameterMm(mm) = &mut camera.stop {
         millimetres("diameter of stop", "Diameter of the stop", 0.01..=100.0).show(ui, mm);
     }
+    iris(ui, camera);
+}
+
+fn iris(ui: &mut Ui, camera: &mut Camera) {
+    let mut has_blades = camera.iris.is_some();
+    let kinds = [(false, "the lens's own"), (true, "blades")];
+    if choice(
+        ui,
+        "iris",
+        "What closes the stop: what the lens's file says, else a round hole; or blades",
+        &mut has_blades,
+        &kinds,
+    ) {
+        camera.iris = has_blades.then_some(Iris { blades: 6, rotation_deg: 0.0, curvature: 0.0 });
+    }
+    let Some(Iris { blades, rotation_deg, curvature }) = &mut camera.iris else { return };
+    let field = |label, unit, range: std::ops::RangeInclusive<f64>, slider, words| NumberField {
+        label,
+        unit,
+        range,
+        slider,
+        is_logarithmic: false,
+        words,
+    };
+    let mut n = f64::from(*blades);
+    if field("blades", "", 3.0..=64.0, 3.0..=18.0, "How many blades close the stop").show(ui, &mut n) {
+        *blades = n.round() as u32;
+    }
+    field("rotation", "°", -360.0..=360.0, 0.0..=120.0, "Turn of the opening from one with a corner at its top")
+        .show(ui, rotation_deg);
+    field("curvature", "", 0.0..=1.0, 0.0..=1.0, "Of the blades' edges: 0 straight, 1 as the rim").show(ui, curvature);
 }
 
 /// How the film is placed.
