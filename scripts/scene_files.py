@@ -4,7 +4,7 @@
     python3 scripts/scene_files.py target/release/dioptric
 
 Needs numpy, h5py, scipy, tifffile, spectral and OpenEXR; files of OpenImageIO and Mitsuba are made where these are installed too. Each file
-holds the same radiance, but Mitsuba's renderings, whose truth is the array that it returns; dioptric makes spectral EXR of it, which OpenEXR
+holds the same radiance, but Mitsuba's renderings, whose truth is what OpenEXR reads and the depth that it returns; dioptric makes spectral EXR of it, which OpenEXR
 reads. Prints a line a kind with what was right, refused and wrong, and fails where anything was wrong.
 """
 
@@ -154,9 +154,10 @@ def files_of_mitsuba(folder: Path):
         film = {"type": "specfilm", "component_format": samples}
         for nm in WAVE_NM:
             film[f"{nm:.0f}nm"] = {"type": "irregular", "wavelengths": f"{nm - 5},{nm},{nm + 5}", "values": "0,1,0"}
-        pixels = rendered(film, {"type": "path"}, "a.exr")
-        # Halves are rounded by Mitsuba.
-        yield "Mitsuba", f"specfilm {samples}", folder / "a.exr", LIGHT, pixels.astype(np.float16 if samples == "float16" else np.float32)
+        rendered(film, {"type": "path"}, "a.exr")
+        with OpenEXR.File(str(folder / "a.exr"), separate_channels=True) as file:
+            pixels = np.stack([file.channels()[f"{nm:.0f}nm"].pixels for nm in WAVE_NM], axis=2)
+        yield "Mitsuba", f"specfilm {samples}", folder / "a.exr", LIGHT, pixels
     film = {"type": "hdrfilm", "component_format": "float32", "pixel_format": "rgb"}
     pixels = rendered(film, {"type": "aov", "aovs": "dd.y:depth", "img": {"type": "path"}}, "a.exr")
     yield "Mitsuba", "aov depth", folder / "a.exr", ["--fov-deg", "40"], pixels[:, :, -1]
@@ -165,8 +166,8 @@ def files_of_mitsuba(folder: Path):
 def depth_of(path: Path) -> np.ndarray:
     """Returns the distances from the camera of the samples of spectral EXR."""
     with OpenEXR.File(str(path), separate_channels=True) as file:
-        header, depth = file.header(), file.channels()["Z"].pixels.astype(float)
-    focal, x, y = (np.ravel(header[name])[0] for name in ["viewFocalPx", "viewCenterXPx", "viewCenterYPx"])
+        depth = file.channels()["Z"].pixels.astype(float)
+        focal, x, y = (float(np.ravel(file.header()[name])[0]) for name in ["viewFocalPx", "viewCenterXPx", "viewCenterYPx"])
     rows, columns = np.mgrid[: depth.shape[0], : depth.shape[1]]
     return depth * np.sqrt(1 + ((columns - x) / focal) ** 2 + ((rows - y) / focal) ** 2)
 

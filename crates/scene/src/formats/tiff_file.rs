@@ -120,6 +120,14 @@ pub(super) fn read_tiff(path: &Path) -> Result<TiffFile, SceneError> {
             ));
         }
         decoder.seek_to_image(page.index).map_err(broken)?;
+        if page.is_colored && page.n_samples > 4 {
+            // What decodes it knows of red, green, blue and opacity alone.
+            let n = page.n_samples;
+            return Err(wrong(format!(
+                "its {n} samples a pixel are marked as red, green, blue and others, which it cannot be decoded as: expected them marked as gray \
+                 (minisblack), or a page a band"
+            )));
+        }
         planes.extend(planes_of(&mut decoder, page).map_err(broken)?);
     }
     if is_linear {
