@@ -22,6 +22,9 @@ pub(crate) struct SceneFileArgs {
     /// `disparity:BASELINE_M\[,OFFSET_PX\]` [default: axial]
     #[arg(long, value_name = "KIND")]
     pub(crate) depth_kind: Option<DepthKind>,
+    /// Channel of an EXR file, or array of a MATLAB, HDF5 or .npz file, that holds the depth
+    #[arg(long, value_name = "NAME")]
+    pub(crate) depth_variable: Option<String>,
     /// Camera data of the scene: our JSON, `Open3D`'s, nerfstudio's, COLMAP's cameras.txt or `OpenCV`'s YAML
     #[arg(long, value_name = "FILE")]
     pub(crate) view: Option<PathBuf>,
@@ -83,6 +86,7 @@ impl SceneFileArgs {
             depth: self.depth.clone().or(own.depth),
             depth_unit: self.depth_unit.clone().or(own.depth_unit),
             depth_kind: self.depth_kind.or(own.depth_kind),
+            depth_variable: self.depth_variable.clone().or(own.depth_variable),
             view: self.view.clone().or(own.view),
             panorama: self.panorama.or(own.panorama),
         };

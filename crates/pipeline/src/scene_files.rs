@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use dioptric_scene::{ExrSamples, Scene, SceneLight, View, write_iset_scene, write_preview_png, write_scene_exr};
+use dioptric_scene::{ExrSamples, Part, Scene, SceneLight, View, write_iset_scene, write_preview_png, write_scene_exr};
 use dioptric_spectrum::{Observer, WavelengthGrid, Xyz};
 use serde::Serialize;
 
@@ -64,17 +64,14 @@ impl SceneRequest {
     /// # Errors
     /// When the file cannot be read, or the part reaches beyond it.
     pub fn open(&self) -> Result<Scene, PipelineError> {
+        self.opened(false)
+    }
+
+    fn opened(&self, summary: bool) -> Result<Scene, PipelineError> {
         let grid = self.wavelengths_nm.clone().map(WavelengthGrid::new).transpose()?;
-        let mut scene = self.scene.look(grid.as_ref())?;
-        if let Some(crop) = self.crop {
-            let rows = crop.y..crop.y.saturating_add(crop.rows);
-            let columns = crop.x..crop.x.saturating_add(crop.columns);
-            scene = scene.cropped(rows, columns)?;
-        }
-        if self.bin != 1 {
-            scene = scene.binned(self.bin)?;
-        }
-        Ok(scene.turned(self.quarter_turns)?)
+        let window = self.crop.map(|crop| [crop.x, crop.y, crop.columns, crop.rows]);
+        let part = (window.is_some() || self.bin != 1).then_some(Part { window, bin: self.bin });
+        Ok(self.scene.look_at(grid.as_ref(), part, summary)?.turned(self.quarter_turns)?)
     }
 
     /// Returns what the file holds, and writes a picture of it where one is wanted.
@@ -82,7 +79,7 @@ impl SceneRequest {
     /// # Errors
     /// As [`open`](Self::open), and when the picture cannot be written.
     pub fn describe(&self, picture: Option<&Path>) -> Result<SceneInfo, PipelineError> {
-        let scene = self.open()?;
+        let scene = self.opened(true)?;
         if let Some(path) = picture {
             if path.extension().is_some_and(|ending| !ending.eq_ignore_ascii_case("png")) {
                 let reason = format!("{}: the picture is written as PNG, expected the ending .png", path.display());

@@ -80,6 +80,7 @@ const ALL: &[&str] = &[
     "depth",
     "depth_unit",
     "depth_kind",
+    "depth_variable",
     "view",
     "panorama",
     "illuminant",

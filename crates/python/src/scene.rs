@@ -198,6 +198,8 @@ impl Scene {
     ///     Files of the depth and of the camera data, in place of those in the file or beside it.
     /// depth_unit, depth_kind : str, optional
     ///     What the depth's numbers are, as ``"5000/m"``, ``"radial"``, ``"inverse:0.5,20"``, ``"disparity:0.193"``.
+    /// depth_variable : str, optional
+    ///     The channel of an EXR file, or the array of another, that holds the depth.
     /// panorama : str, optional
     ///     A picture of all directions, ``"equirectangular"`` or ``"cube"``, and where a camera in it looks: ``"cube:90,0"``.
     /// illuminant : str, optional
@@ -389,6 +391,7 @@ pub(crate) const SCENE_OPTIONS: &[&str] = &[
     "depth",
     "depth_unit",
     "depth_kind",
+    "depth_variable",
     "view",
     "panorama",
     "illuminant",
@@ -427,6 +430,7 @@ pub(crate) fn set_scene_option(spec: &mut SceneSpec, key: &str, value: &Bound<'_
         "no_data" => spec.reading.no_data = Some(parsed(key, value)?),
         "depth_unit" => spec.reading.depth_unit = Some(word(key, value)?),
         "depth_kind" => spec.reading.depth_kind = Some(parsed(key, value)?),
+        "depth_variable" => spec.reading.depth_variable = Some(word(key, value)?),
         "panorama" => spec.reading.panorama = Some(parsed(key, value)?),
         "depth" | "view" => {
             let path: PathBuf = value.extract().map_err(|_| wrong_type(key, type_name(value), "a path"))?;

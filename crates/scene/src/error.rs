@@ -82,7 +82,7 @@ pub enum SceneError {
         reason: String,
     },
     /// A line of a text header that cannot be used.
-    #[error("{}: line {line}: '{key}': {reason}", file.display())]
+    #[error("{}: {}'{key}': {reason}", file.display(), of_line(*line))]
     Header {
         /// The file.
         file: PathBuf,
@@ -197,4 +197,9 @@ pub enum SceneError {
         /// What would do.
         expected: String,
     },
+}
+
+/// The words before what is wrong in a line, where there is one.
+fn of_line(line: usize) -> String {
+    if line == 0 { String::new() } else { format!("line {line}: ") }
 }

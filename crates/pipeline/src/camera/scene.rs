@@ -6,7 +6,7 @@ use std::{
 };
 
 use dioptric_scene::{
-    FileReading, FillDepth, Pattern, ReadOptions, Scene, SceneLight, StillLife, Target, TargetLight, View,
+    FileReading, FillDepth, Part, Pattern, ReadOptions, Scene, SceneLight, StillLife, Target, TargetLight, View,
     read_hidden_layer, read_scene,
 };
 use dioptric_spectrum::{DepthMap, Illuminant, WavelengthGrid};
@@ -342,18 +342,38 @@ impl SceneSpec {
     /// # Errors
     /// When the file cannot be read.
     pub fn look(&self, wanted: Option<&WavelengthGrid>) -> Result<Scene, PipelineError> {
-        let mut scene = self.read_file(wanted, None)?;
+        self.look_at(wanted, None, false)
+    }
+
+    /// As [`look`](Self::look), of a part of its samples; of a cube beyond the memory means over blocks of them where a `summary` does.
+    ///
+    /// # Errors
+    /// As [`look`](Self::look), and when the part reaches beyond the scene.
+    pub fn look_at(
+        &self,
+        wanted: Option<&WavelengthGrid>,
+        part: Option<Part>,
+        summary: bool,
+    ) -> Result<Scene, PipelineError> {
+        // A layer behind is of all samples.
+        let (early, late) = if self.hidden.is_none() { (part, None) } else { (None, part) };
+        let options = ReadOptions { part: early, summary, ..self.options(wanted, None) };
+        let scene = self.read_with(&options)?;
+        let mut scene = match late {
+            Some(part) => part.of(scene)?,
+            None => scene,
+        };
         self.light_up(&mut scene)?;
         Ok(scene)
     }
 
     /// Reads the scene of a file, a picture no finer than asked for.
     fn read_file(&self, wanted: Option<&WavelengthGrid>, finest_tangent: Option<f64>) -> Result<Scene, PipelineError> {
-        let SceneSource::File(path) = &self.source else {
-            let reason = "expected the file of a scene".to_owned();
-            return Err(PipelineError::Unsuitable { what: "scene", reason });
-        };
-        let options = ReadOptions {
+        self.read_with(&self.options(wanted, finest_tangent))
+    }
+
+    fn options(&self, wanted: Option<&WavelengthGrid>, finest_tangent: Option<f64>) -> ReadOptions {
+        ReadOptions {
             grid: wanted.cloned(),
             light: self.illuminant.clone(),
             illuminance_lux: self.illuminance_lux,
@@ -363,11 +383,20 @@ impl SceneSpec {
             // Two files of the same samples are read as they are.
             finest_tangent: finest_tangent.filter(|_| self.hidden.is_none()),
             white_level: self.white_level,
+            part: None,
+            summary: false,
             reading: self.reading.clone(),
+        }
+    }
+
+    fn read_with(&self, options: &ReadOptions) -> Result<Scene, PipelineError> {
+        let SceneSource::File(path) = &self.source else {
+            let reason = "expected the file of a scene".to_owned();
+            return Err(PipelineError::Unsuitable { what: "scene", reason });
         };
-        let mut scene = read_scene(path, &options)?;
+        let mut scene = read_scene(path, options)?;
         if let Some(hidden) = &self.hidden {
-            scene.hidden = Some(read_hidden_layer(hidden, &options, &scene)?);
+            scene.hidden = Some(read_hidden_layer(hidden, options, &scene)?);
         }
         Ok(scene)
     }

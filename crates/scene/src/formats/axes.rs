@@ -42,12 +42,15 @@ pub(super) fn planes(
     Ok((0..sides[b]).map(plane).collect())
 }
 
-/// Returns in a sentence which axis is taken for bands, where two are as long as there are bands and nothing is told.
+/// Returns in a sentence which axis is taken for bands, where others are as long as there are bands and nothing is told.
 pub(super) fn note(sides: &[usize], told: Option<&str>, n_bands: Option<usize>) -> Option<String> {
     let &[a, b, c] = sides else { return None };
-    let is_open = told.is_none() && a == c && c > 1 && n_bands == Some(c);
-    is_open
-        .then(|| format!("its sides are {a} × {b} × {c}, of which the last is taken for bands: --axes says otherwise"))
+    let n = n_bands?;
+    let is_open = told.is_none() && n > 1 && sides.iter().filter(|side| **side == n).count() > 1;
+    let taken = if c == n { "last" } else { "first" };
+    is_open.then(|| {
+        format!("its sides are {a} × {b} × {c}, of which the {taken} is taken for bands: --axes says otherwise")
+    })
 }
 
 #[cfg(test)]
@@ -80,6 +83,10 @@ mod tests {
         check(Some("xby"), [3, 4, 2], None, &|[c, b, r]| value(r, c, b));
         assert!(planes(&[2, 3, 4], None, Some(7), true, |_| 0.0).unwrap_err().contains("--axes"));
         assert!(planes(&[2, 0, 4], None, None, true, |_| 0.0).is_err());
+        for (sides, taken) in [([7, 7, 9], "first"), ([9, 7, 7], "last"), ([7, 9, 7], "last")] {
+            assert!(note(&sides, None, Some(7)).is_some_and(|note| note.contains(taken)), "{sides:?}");
+        }
+        assert!(note(&[7, 7, 9], None, Some(9)).is_none() && note(&[7, 7, 9], Some("ybx"), Some(7)).is_none());
         assert_eq!(planes(&[2, 3], None, Some(1), true, |i| i as f32).unwrap()[0][(1, 2)], 5.0);
     }
 }

@@ -55,7 +55,7 @@ pub(super) fn band_folder(folder: &Path, told_nm: Option<&[f64]>) -> Result<Cube
         return Err(unreadable(folder, reason));
     }
     let notes = note_of(folder, "picture", &unused).into_iter().collect();
-    Ok(Cube { planes, top: Some(1.0), wavelengths_nm: Some(wavelengths_nm), quantity: None, notes })
+    Ok(Cube { planes, top: Some(1.0), wavelengths_nm: Some(wavelengths_nm), quantity: None, unit: None, notes })
 }
 
 /// A picture with the number that its name ends in.

@@ -1,33 +1,18 @@
-//! Camera data in a file of its own: ours, or one of `Open3D`, nerfstudio, COLMAP or `OpenCV`.
+//! Camera data, and pictures made straight and square by it.
 
 use std::{
     fs,
     path::{Path, PathBuf},
 };
 
-use serde_json::Value;
-
 use super::{
-    stated::{Stated, name_of, short},
+    camera_files::{of_colmap, of_json, of_yaml},
+    distortion::Distortion,
+    stated::name_of,
     unusable::{check_memory, unreadable},
 };
 use crate::{SceneError, View};
 
-/// Keys that change nothing of what a scene is.
-const HARMLESS: [&str; 12] = [
-    "source",
-    "name",
-    "comment",
-    "comments",
-    "description",
-    "note",
-    "notes",
-    "license",
-    "units",
-    "camera_model",
-    "camera_angle_x",
-    "camera_angle_y",
-];
 /// Endings of a picture's stem that its camera file does not repeat.
 const PARTS: [&str; 4] = [".radiance_depth", ".radiance", ".reflectance", ".depth"];
 /// Displacements of samples below this are none.
@@ -38,33 +23,16 @@ const LEAST_SHIFT_PX: f64 = 0.05;
 pub(super) struct CameraData {
     pub(super) file: PathBuf,
     /// Columns and rows of the picture that it speaks of, where it tells.
-    size: Option<(usize, usize)>,
-    fx_px: f64,
-    fy_px: f64,
+    pub(super) size: Option<(usize, usize)>,
+    pub(super) fx_px: f64,
+    pub(super) fy_px: f64,
     /// Centers of samples are at whole numbers.
-    cx_px: f64,
-    cy_px: f64,
-    distortion: Distortion,
+    pub(super) cx_px: f64,
+    pub(super) cy_px: f64,
+    pub(super) distortion: Distortion,
     /// What one code of the depth beside the picture stands for, m.
     pub(super) depth_unit_m: Option<f64>,
     pub(super) note: Option<String>,
-}
-
-/// The distortion of a lens as `OpenCV` has it: k1, k2, p1, p2, k3, k4, k5, k6.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Distortion([f64; 8]);
-
-impl Distortion {
-    /// Returns the tangents at which a direction is pictured.
-    fn apply(self, (x, y): (f64, f64)) -> (f64, f64) {
-        let [k1, k2, p1, p2, k3, k4, k5, k6] = self.0;
-        let r2 = x * x + y * y;
-        let radial = (1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))) / (1.0 + r2 * (k4 + r2 * (k5 + r2 * k6)));
-        (
-            x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x),
-            y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y,
-        )
-    }
 }
 
 /// How a picture with a distortion, or with samples that are not square, becomes one without.
@@ -99,22 +67,28 @@ impl CameraData {
     }
 
     /// Reads camera data: JSON of ours (`width`, `height`, `fx_px`, `fy_px`, `cx_px`, `cy_px`), of `Open3D` (`intrinsic_matrix`) or of
-    /// nerfstudio (`fl_x`, …), COLMAP's `cameras.txt`, or `OpenCV`'s YAML (`camera_matrix`).
+    /// nerfstudio (`fl_x`, …), COLMAP's `cameras.txt`, or YAML of `OpenCV` and ROS (`camera_matrix`) or of Kalibr (`intrinsics`).
     ///
     /// # Errors
-    /// When it is none of these, lacks what is needed, or has a model of a lens that is not known.
+    /// When it is none of these, lacks what is needed, says a thing twice, or has a model of a lens that is not known.
     pub(super) fn read(path: &Path) -> Result<Self, SceneError> {
         let length = fs::metadata(path).map_err(|error| unreadable(path, error))?.len();
         check_memory(path, length.saturating_mul(4), length)?;
         let text = fs::read_to_string(path).map_err(|error| unreadable(path, error))?;
         let data = match text.trim_start_matches('\u{feff}').trim_start() {
             text if text.starts_with('{') => of_json(path, text),
-            text if text.contains("opencv-matrix") || text.starts_with("%YAML") => of_opencv(path, text),
+            text if text.contains("camera_matrix") || text.contains("intrinsics:") || text.starts_with("%YAML") => {
+                of_yaml(path, text)
+            }
             text => of_colmap(path, text),
         };
         let data = data.map_err(|reason| unreadable(path, reason))?;
         let numbers = [data.fx_px, data.fy_px, data.cx_px, data.cy_px];
-        if !(numbers.iter().chain(&data.distortion.0).all(|n| n.is_finite()) && data.fx_px > 0.0 && data.fy_px > 0.0) {
+        if !(numbers.iter().all(|n| n.is_finite())
+            && data.distortion.is_finite()
+            && data.fx_px > 0.0
+            && data.fy_px > 0.0)
+        {
             let reason = format!(
                 "focal lengths {} and {} px, center ({}, {}) px: expected finite numbers and focal lengths above 0",
                 data.fx_px, data.fy_px, data.cx_px, data.cy_px
@@ -229,235 +203,6 @@ impl CameraData {
     }
 }
 
-fn of_json(path: &Path, text: &str) -> Result<CameraData, String> {
-    // Maps of serde_json keep one entry a key: a second one is an error of the reader below, not silently the last.
-    let Value::Object(map) = serde_json::from_str(text).map_err(|error| error.to_string())? else {
-        return Err("expected an object".to_owned());
-    };
-    let mut keys = Stated::new("key", map.into_iter().collect());
-    // Centers of pixels are at whole numbers for OpenCV and Open3D, at halves for nerfstudio.
-    let is_nerf = keys.get("fl_x").is_some();
-    if let Some(frames) = keys.take("frames") {
-        let same = frames.as_array().is_none_or(|frames| frames.iter().all(|frame| frame.get("fl_x").is_none()));
-        if !same {
-            return Err("its frames have focal lengths of their own: expected one for all".to_owned());
-        }
-    }
-    let model = keys.get("camera_model").and_then(Value::as_str).unwrap_or("OPENCV").to_uppercase();
-    if !["OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL", "PERSPECTIVE"].contains(&model.as_str()) {
-        return Err(format!("its camera model is '{}', expected PINHOLE or OPENCV", short(&model)));
-    }
-    let mut number = |names: &[&str]| -> Result<Option<f64>, String> {
-        let Some(value) = keys.take_any(names) else { return Ok(None) };
-        match value {
-            Value::Null => Ok(None),
-            value => value.as_f64().map(Some).ok_or_else(|| format!("{} is {value}, expected a number", names[0])),
-        }
-    };
-    let [mut fx, mut fy] = [number(&["fx_px", "fl_x", "fx"])?, number(&["fy_px", "fl_y", "fy"])?];
-    let [mut cx, mut cy] = [number(&["cx_px", "cx", "ppx"])?, number(&["cy_px", "cy", "ppy"])?];
-    let side = |value: Option<f64>, name: &str| match value {
-        None => Ok(None),
-        Some(n) if n >= 1.0 && n.fract() == 0.0 && n < 1e6 => Ok(Some(n as usize)),
-        Some(n) => Err(format!("{name} is {n}, expected a number of samples")),
-    };
-    let width = side(number(&["width", "w"])?, "width")?;
-    let height = side(number(&["height", "h"])?, "height")?;
-    let depth_unit_m = number(&["depth_unit_m", "depth_unit_scale_factor"])?;
-    let depth_scale = number(&["depth_scale"])?;
-    let mut k = [0.0; 8];
-    for (place, name) in ["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"].iter().enumerate() {
-        k[place] = number(&[name])?.unwrap_or(0.0);
-    }
-    if let Some(list) = keys.take_any(&["distortion", "dist_coeffs", "distortion_coefficients"]) {
-        k = coefficients(&numbers_of(&list, "distortion")?)?;
-    }
-    if let Some(matrix) = keys.take_any(&["intrinsic_matrix", "K"]) {
-        let m = numbers_of(&matrix, "intrinsic_matrix")?;
-        // Open3D's nine numbers run down the columns, rows of rows are a table.
-        let is_table = matrix.as_array().is_some_and(|rows| rows.iter().any(Value::is_array));
-        let [a, b] = if is_table || m.get(6) == Some(&0.0) { [2, 5] } else { [6, 7] };
-        let &[first, ..] = &m[..] else { return Err("its intrinsic_matrix is empty".to_owned()) };
-        if m.len() != 9 {
-            return Err(format!("its intrinsic_matrix has {} numbers, expected 9", m.len()));
-        }
-        let rest = [m[1], m[3], m[if a == 2 { 6 } else { 2 }], m[if a == 2 { 7 } else { 5 }], m[8] - 1.0];
-        check_matrix("intrinsic_matrix", &rest)?;
-        (fx, fy, cx, cy) = (Some(first), Some(m[4]), Some(m[a]), Some(m[b]));
-    }
-    let missing = |name: &str| format!("missing {name}: expected width, height, fx_px, fy_px, cx_px and cy_px");
-    let fx = fx.ok_or_else(|| missing("fx_px"))?;
-    let fy = fy.unwrap_or(fx);
-    let size = match (width, height) {
-        (Some(width), Some(height)) => Some((width, height)),
-        (None, None) => None,
-        (None, _) => return Err(missing("width")),
-        (_, None) => return Err(missing("height")),
-    };
-    let half = if is_nerf { 0.5 } else { 0.0 };
-    let middle = |side: Option<usize>| side.map(|n| 0.5 * n as f64 - 0.5 + half);
-    let cx = cx.or_else(|| middle(width)).ok_or_else(|| missing("cx_px"))?;
-    let cy = cy.or_else(|| middle(height)).ok_or_else(|| missing("cy_px"))?;
-    let depth_unit_m = match (depth_unit_m, depth_scale) {
-        (Some(unit), _) => Some(unit),
-        (None, None) => None,
-        // So many codes a metre, as TUM and Open3D have it; small factors are metres to some and millimetres to others.
-        (None, Some(scale)) if scale >= 10.0 => Some(1.0 / scale),
-        (None, Some(scale)) => {
-            return Err(format!(
-                "depth_scale is {scale}, which is metres or millimetres a code: expected codes a metre, 10 or more, or \
-                 depth_unit_m"
-            ));
-        }
-    };
-    Ok(CameraData {
-        file: path.to_owned(),
-        size,
-        fx_px: fx,
-        fy_px: fy,
-        cx_px: cx - half,
-        cy_px: cy - half,
-        distortion: Distortion(k),
-        depth_unit_m,
-        note: keys.note(path, |name| HARMLESS.contains(&name)),
-    })
-}
-
-/// Returns all numbers of a list, or of a table row by row.
-fn numbers_of(value: &Value, name: &str) -> Result<Vec<f64>, String> {
-    let wrong = || format!("{name} is no list of numbers");
-    let mut numbers = vec![];
-    for item in value.as_array().ok_or_else(wrong)? {
-        match item {
-            Value::Array(row) => {
-                numbers.extend(row.iter().map(Value::as_f64).collect::<Option<Vec<f64>>>().ok_or_else(wrong)?);
-            }
-            item => numbers.push(item.as_f64().ok_or_else(wrong)?),
-        }
-    }
-    Ok(numbers)
-}
-
-/// Returns `OpenCV`'s list of coefficients, which may be shorter.
-fn coefficients(list: &[f64]) -> Result<[f64; 8], String> {
-    let mut k = [0.0; 8];
-    if list.iter().skip(8).any(|v| *v != 0.0) {
-        return Err("its distortion has more than 8 coefficients".to_owned());
-    }
-    k.iter_mut().zip(list).for_each(|(k, v)| *k = *v);
-    Ok(k)
-}
-
-/// Reads the first camera of COLMAP's `cameras.txt`: number, model, width, height and parameters, with centers of pixels at halves.
-fn of_colmap(path: &Path, text: &str) -> Result<CameraData, String> {
-    let expected =
-        "expected JSON, OpenCV's YAML, or a line of COLMAP's cameras.txt: number, model, width, height, parameters";
-    let mut lines = text.lines().map(str::trim).filter(|line| !line.is_empty() && !line.starts_with('#'));
-    let line = lines.next().ok_or(expected)?;
-    let words: Vec<&str> = line.split_whitespace().collect();
-    let [_, model, width, height, parameters @ ..] = &words[..] else { return Err(expected.to_owned()) };
-    let side = |word: &str| word.parse::<usize>().ok().filter(|n| *n > 0).ok_or(expected);
-    let size = (side(width)?, side(height)?);
-    let p: Vec<f64> = parameters.iter().map(|word| word.parse()).collect::<Result<_, _>>().map_err(|_| expected)?;
-    let (f, c, k) = match (*model, &p[..]) {
-        ("SIMPLE_PINHOLE", &[f, cx, cy]) => ((f, f), (cx, cy), vec![]),
-        ("PINHOLE", &[fx, fy, cx, cy]) => ((fx, fy), (cx, cy), vec![]),
-        ("SIMPLE_RADIAL", &[f, cx, cy, k]) => ((f, f), (cx, cy), vec![k]),
-        ("RADIAL", &[f, cx, cy, k1, k2]) => ((f, f), (cx, cy), vec![k1, k2]),
-        ("OPENCV", &[fx, fy, cx, cy, k1, k2, p1, p2]) => ((fx, fy), (cx, cy), vec![k1, k2, p1, p2]),
-        _ => {
-            return Err(format!(
-                "its camera model is '{}' with {} parameters, expected SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL, RADIAL or OPENCV",
-                short(model),
-                p.len()
-            ));
-        }
-    };
-    let more: Vec<String> = lines.map(short).collect();
-    Ok(CameraData {
-        file: path.to_owned(),
-        size: Some(size),
-        fx_px: f.0,
-        fy_px: f.1,
-        cx_px: c.0 - 0.5,
-        cy_px: c.1 - 0.5,
-        distortion: Distortion(coefficients(&k)?),
-        depth_unit_m: None,
-        note: super::stated::note_of(path, "line", &more),
-    })
-}
-
-/// Checks that of a camera matrix nothing is left out: what must be 0, for it to be that of a camera whose rows and columns are at right angles.
-fn check_matrix(name: &str, rest: &[f64]) -> Result<(), String> {
-    match rest.iter().all(|number| number.abs() < 1e-9) {
-        true => Ok(()),
-        false => Err(format!("its {name} has a skew or a last row other than 0, 0, 1, expected none")),
-    }
-}
-
-/// Reads `OpenCV`'s YAML of a calibration: `camera_matrix`, `distortion_coefficients`, `image_width`, `image_height`.
-fn of_opencv(path: &Path, text: &str) -> Result<CameraData, String> {
-    // `key: value` lines, in which the `data: [...]` of a matrix belongs to the key above; lists may run over lines.
-    let mut entries: Vec<(String, String)> = vec![];
-    let mut matrix: Option<String> = None;
-    let mut rest = text.lines();
-    while let Some(line) = rest.next() {
-        let trimmed = line.trim();
-        if trimmed.is_empty() || trimmed.starts_with(['%', '#']) || trimmed == "---" {
-            continue;
-        }
-        let Some((key, value)) = trimmed.split_once(':') else {
-            return Err(format!("'{}' is no key: value", short(trimmed)));
-        };
-        let mut value = value.trim().to_owned();
-        while value.starts_with('[') && !value.ends_with(']') {
-            let Some(more) = rest.next() else {
-                return Err(format!("the list of '{}' is never closed by ']'", short(key)));
-            };
-            value.push_str(more.trim());
-        }
-        match (key.trim(), &matrix) {
-            ("rows" | "cols" | "dt", Some(_)) => {}
-            ("data", Some(name)) => entries.push((name.clone(), value)),
-            (key, _) if value.contains("opencv-matrix") => matrix = Some(key.to_owned()),
-            (key, _) => {
-                matrix = None;
-                entries.push((key.to_owned(), value));
-            }
-        }
-    }
-    let mut keys = Stated::new("key", entries);
-    let list = |text: String| -> Result<Vec<f64>, String> {
-        let words = text.trim_matches(['[', ']']).split(',').map(str::trim).filter(|word| !word.is_empty());
-        words.map(|word| word.parse().map_err(|_| format!("'{}' is no number", short(word)))).collect()
-    };
-    let names = ["camera_matrix", "Camera_Matrix", "K", "cameraMatrix"];
-    let m = list(keys.take_any(&names).ok_or("it has no camera_matrix")?)?;
-    let &[fx, skew, cx, below, fy, cy, left, right, last] = &m[..] else {
-        return Err("its camera_matrix has not 9 numbers".to_owned());
-    };
-    check_matrix("camera_matrix", &[skew, below, left, right, last - 1.0])?;
-    let names = ["distortion_coefficients", "Distortion_Coefficients", "distCoeffs", "D"];
-    let k = keys.take_any(&names).map(list).transpose()?.unwrap_or_default();
-    let side = |text: Option<String>| text.and_then(|text| text.parse::<usize>().ok());
-    let size = side(keys.take_any(&["image_width", "image_Width"]))
-        .zip(side(keys.take_any(&["image_height", "image_Height"])));
-    Ok(CameraData {
-        file: path.to_owned(),
-        size,
-        fx_px: fx,
-        fy_px: fy,
-        cx_px: cx,
-        cy_px: cy,
-        distortion: Distortion(coefficients(&k)?),
-        depth_unit_m: None,
-        note: keys.note(path, |name| {
-            let ours = ["calibration_time", "nframes", "board_width", "board_height", "square_size", "flags"];
-            HARMLESS.contains(&name) || ours.contains(&name) || name.contains("error") || name == "calibration_Time"
-        }),
-    })
-}
-
 /// Returns the names beside a picture that its stem, and the part of it before the last underscore, have with these endings.
 pub(super) fn beside(picture: &Path, endings: &[&str]) -> Vec<PathBuf> {
     let stem = picture.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
@@ -496,9 +241,11 @@ mod tests {
 
     #[test]
     fn unknown_keys_are_named() {
-        let text = GOOD.replace("\"source\"", "\"shutter\": 3, \"Fx_px\": 5, \"source\"");
+        let text = GOOD.replace("\"source\"", "\"shutter\": 3, \"Fx_px\": 5, \"units\": \"mm\", \"source\"");
         let note = read(&text, 500, 741).unwrap().note.unwrap();
-        assert_eq!(note, "motor_camera.json: its keys 'Fx_px', 'shutter' are not used");
+        assert_eq!(note, "motor_camera.json: its keys 'shutter', 'Fx_px', 'units' are not used");
+        let in_samples = GOOD.replace("\"source\"", "\"units\": \"pixels\", \"source\"");
+        assert_eq!(read(&in_samples, 500, 741).unwrap().note, None);
     }
 
     #[test]
@@ -508,8 +255,9 @@ mod tests {
             assert_eq!(data.note, None, "{text}");
             let numbers = [data.fx_px, data.fy_px, data.cx_px, data.cy_px];
             assert_eq!((numbers, data.depth_unit_m), ([525.0, 526.0, 319.5, 239.5], unit), "{text}");
-            data.distortion.0
+            data.distortion
         };
+        let bent = |k: [f64; 8]| Distortion::Polynomial { k, r8: 0.0 };
         same(
             r#"{"width":640,"height":480,"intrinsic_matrix":[525.0,0,0,0,526.0,0,319.5,239.5,1],"depth_scale":1000}"#,
             Some(1e-3),
@@ -520,7 +268,7 @@ mod tests {
                 "camera_model":"OPENCV","frames":[{"file_path":"a.png"}]}"#,
             None,
         );
-        assert_eq!(k, [0.1, -0.2, 0.001, 0.002, 0.0, 0.0, 0.0, 0.0]);
+        assert_eq!(k, bent([0.1, -0.2, 0.001, 0.002, 0.0, 0.0, 0.0, 0.0]));
         same("# cameras\n1 PINHOLE 640 480 525 526 320 240\n", None);
         let k = same(
             "%YAML:1.0\n---\nimage_width: 640\nimage_height: 480\ncamera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   \
@@ -528,7 +276,19 @@ mod tests {
              !!opencv-matrix\n   rows: 5\n   cols: 1\n   dt: d\n   data: [ 0.1, -0.2, 0., 0., 0.3 ]\n",
             None,
         );
-        assert_eq!(k, [0.1, -0.2, 0.0, 0.0, 0.3, 0.0, 0.0, 0.0]);
+        assert_eq!(k, bent([0.1, -0.2, 0.0, 0.0, 0.3, 0.0, 0.0, 0.0]));
+        // The fourth coefficient of nerfstudio goes with r^8, that of OpenCV with r^2 below the line.
+        let nerf = r#"{"w":640,"h":480,"fl_x":525,"fl_y":526,"cx":320,"cy":240,"k1":0.1,"k4":0.2}"#;
+        assert_eq!(same(nerf, None), Distortion::Polynomial { k: [0.1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0], r8: 0.2 });
+        let ros = "image_width: 640\nimage_height: 480\ncamera_matrix:\n  rows: 3\n  cols: 3\n  data: [525, 0, 319.5, 0, \
+                   526, 239.5, 0, 0, 1]\ndistortion_model: equidistant\ndistortion_coefficients:\n  rows: 1\n  cols: 4\n  \
+                   data: [0.1, 0, 0.2, 0]\nrectification_matrix:\n  rows: 3\n  cols: 3\n  data: [1, 0, 0, 0, 1, 0, 0, 0, 1]\n";
+        let fisheye = Distortion::Fisheye([0.1, 0.0, 0.2, 0.0]);
+        assert_eq!(same(ros, None), fisheye);
+        assert_eq!(same("1 OPENCV_FISHEYE 640 480 525 526 320 240 0.1 0 0.2 0", None), fisheye);
+        let kalibr = "resolution: [640, 480]\nintrinsics: [525, 526, 319.5, 239.5] # fu, fv, cu, cv\ndistortion_model: \
+                      radial-tangential\ndistortion_coefficients: [0.1, -0.2, 0.001, 0.002]\n";
+        assert_eq!(same(kalibr, None), bent([0.1, -0.2, 0.001, 0.002, 0.0, 0.0, 0.0, 0.0]));
     }
 
     #[test]
@@ -557,11 +317,13 @@ mod tests {
             (&GOOD.replace("fx_px", "fx_pix"), 500, 741, "fx_px"),
             (&GOOD.replace("741", "\"wide\""), 500, 741, "width is"),
             (&GOOD.replace("\"source\"", "\"depth_scale\": 0.1, \"source\""), 500, 741, "depth_scale is 0.1"),
+            (&GOOD.replace("\"source\"", "\"camera_model\": \"FOV\", \"source\""), 500, 741, "'FOV'"),
+            (&GOOD.replace("\"source\"", "\"fx_px\": 80, \"source\""), 500, 741, "'fx_px' stands twice"),
             (
-                &GOOD.replace("\"source\"", "\"camera_model\": \"OPENCV_FISHEYE\", \"source\""),
+                &GOOD.replace("\"source\"", "\"depth_unit_m\": 1, \"depth_scale\": 1000, \"source\""),
                 500,
                 741,
-                "OPENCV_FISHEYE",
+                "depth_scale",
             ),
             (r#"{"width":741,"height":500,"intrinsic_matrix":[525.0,0,0,5,526.0,0,319.5,239.5,1]}"#, 500, 741, "skew"),
             (r#"{"K":[[525.0,0,319.5],[0,526.0,239.5],[0,0,0]]}"#, 500, 741, "skew"),

@@ -81,6 +81,7 @@ pub(super) fn read_chart(path: &Path) -> Result<Cube, SceneError> {
         top: None,
         wavelengths_nm: Some(wavelengths_nm),
         quantity: Some(FileQuantity::Reflectance),
+        unit: None,
         notes: vec![note],
     })
 }

@@ -12,8 +12,9 @@ use super::{
     light_unit::LightUnit,
     no_data::mend,
     raw_depth::RawDepth,
-    read_options::ReadOptions,
+    read_options::{Part, ReadOptions},
     reading::{FileQuantity, Frame, Panorama, Place, light_unit},
+    stated::short,
     unusable::unreadable,
 };
 use crate::{SceneError, SceneLight};
@@ -30,6 +31,10 @@ pub(super) struct Contents {
     pub(super) view: Option<CameraData>,
     /// The picture that other camera data speaks of; all of the image where `None`.
     pub(super) frame: Option<Frame>,
+    /// The part that is wanted, where the image is of it alone already.
+    pub(super) part: Option<Part>,
+    /// Whether the samples were turned upright, so that they lie otherwise than in the file.
+    pub(super) is_turned: bool,
     /// Whether the file says that its picture is one of all directions.
     pub(super) panorama: Option<Panorama>,
     pub(super) hidden: Option<(SpectralImage, Array2<f32>)>,
@@ -96,6 +101,8 @@ impl Contents {
             depth: None,
             view: None,
             frame: None,
+            part: None,
+            is_turned: false,
             panorama: None,
             hidden: None,
             light: None,
@@ -159,6 +166,8 @@ pub(super) struct Cube {
     pub(super) wavelengths_nm: Option<Vec<f64>>,
     /// What the file's names say that the numbers are.
     pub(super) quantity: Option<FileQuantity>,
+    /// The unit of light that the file states, and its words.
+    pub(super) unit: Option<(LightUnit, String)>,
     pub(super) notes: Vec<String>,
 }
 
@@ -171,7 +180,7 @@ impl Cube {
     /// # Errors
     /// When wavelengths or the quantity are missing, or there is another number of wavelengths.
     pub(super) fn into_contents(self, path: &Path, options: &ReadOptions) -> Result<Contents, SceneError> {
-        let Self { planes, top, wavelengths_nm, quantity, mut notes } = self;
+        let Self { planes, top, wavelengths_nm, quantity, unit: own_unit, mut notes } = self;
         let reading = &options.reading;
         let wavelengths_nm = match (&reading.wavelengths_nm, wavelengths_nm) {
             (Some(told), Some(own)) if *told != own => {
@@ -200,41 +209,49 @@ impl Cube {
             let reason = format!("a band lies at {nm} nm: expected wavelengths in nm, or --scene-wavelengths-nm");
             return Err(unreadable(path, reason));
         }
+        let units = |reason: &str| Err(SceneError::Units { file: path.to_owned(), reason: reason.to_owned() });
         let told_unit = reading.unit.as_deref().map(light_unit).transpose()?;
-        let unit_of_quantity = |quantity: FileQuantity| quantity.light_unit();
+        if let Some((own, words)) = &own_unit {
+            let is_other = told_unit.is_some_and(|told| told != *own)
+                || reading.quantity == Some(FileQuantity::Reflectance)
+                || options.white_level.is_some();
+            if is_other {
+                return units(&format!("its unit is '{}', which says something else than was asked for", short(words)));
+            }
+        }
+        // What a file says of its numbers holds where nothing else is said.
+        let is_own_reflectance = quantity == Some(FileQuantity::Reflectance) && reading.quantity.is_none();
+        if is_own_reflectance && told_unit.is_some() {
+            return units("it holds reflectances by its unit, which --unit contradicts");
+        }
         let quantity = reading.quantity.or(quantity);
-        let unit: Option<LightUnit> = match (quantity, told_unit) {
+        let unit: Option<LightUnit> = match (quantity, told_unit.or(own_unit.as_ref().map(|(unit, _)| *unit))) {
             (Some(FileQuantity::Reflectance), Some(_)) => {
-                let reason =
-                    "a reflectance has no unit: expected --unit or --quantity reflectance, not both".to_owned();
-                return Err(SceneError::Units { file: path.to_owned(), reason });
+                return units("a reflectance has no unit: expected --unit or --quantity reflectance, not both");
             }
             (_, Some(unit)) => Some(unit),
-            (Some(quantity), None) => unit_of_quantity(quantity),
+            (Some(quantity), None) => quantity.light_unit(),
             (None, None) => None,
         };
         let is_reflectance = unit.is_none();
         let scale = reading.scale.unwrap_or(1.0);
+        let usual_unit = match quantity {
+            Some(FileQuantity::Photons) => "photons/s/m^2/sr/nm",
+            _ => "W/m^2/sr/nm",
+        };
+        let words =
+            reading.unit.as_deref().or(own_unit.as_ref().map(|(_, words)| words.as_str())).unwrap_or(usual_unit);
         let (level, what) = match (is_reflectance, options.white_level, top) {
-            (false, ..) => (
-                1.0,
-                format!(
-                    "radiance in {}",
-                    reading.unit.as_deref().unwrap_or(match quantity {
-                        Some(FileQuantity::Photons) => "photons/s/m^2/sr/nm",
-                        _ => "W/m^2/sr/nm",
-                    })
-                ),
-            ),
+            (false, ..) => (1.0, format!("radiance in {}", short(words))),
             (true, Some(level), _) => (level, format!("reflectance, {level} being a perfect white")),
             (true, None, Some(top)) if reading.scale.is_none() => {
                 (top, format!("reflectance, {top}, its largest code, being a perfect white"))
             }
             (true, None, _) if quantity.is_some() => (1.0, "reflectance, 1 being a perfect white".to_owned()),
             (true, None, _) => {
-                let reason =
-                    "it does not tell what its numbers are: expected --quantity radiance, reflectance or photons";
-                return Err(SceneError::Units { file: path.to_owned(), reason: reason.to_owned() });
+                return units(
+                    "it does not tell what its numbers are: expected --quantity radiance, reflectance or photons",
+                );
             }
         };
         let mut order: Vec<usize> = (0..planes.len()).collect();

@@ -24,6 +24,13 @@ const NAMES: [&[&str]; 6] = [
     &["back", "nz", "negz"],
 ];
 
+/// Returns the face of the cube that a file is named after.
+fn face_of(path: &Path) -> Option<usize> {
+    let stem = path.file_stem()?.to_string_lossy().to_lowercase();
+    let word = stem.rsplit(|c: char| !c.is_ascii_alphanumeric()).next().unwrap_or_default().to_owned();
+    NAMES.iter().position(|names| names.contains(&word.as_str()))
+}
+
 /// The files of six faces, and the names of other files beside them.
 pub(super) struct CubeFolder {
     faces: [PathBuf; 6],
@@ -37,15 +44,19 @@ impl CubeFolder {
             std::fs::read_dir(folder).ok()?.filter_map(|entry| Some(entry.ok()?.path())).collect();
         paths.retain(|path| path.is_file());
         paths.sort();
-        let face_of = |path: &PathBuf| {
-            let stem = path.file_stem()?.to_string_lossy().to_lowercase();
-            let word = stem.rsplit(|c: char| !c.is_ascii_alphanumeric()).next().unwrap_or_default().to_owned();
-            NAMES.iter().position(|names| names.contains(&word.as_str()))
-        };
         let face = |number: usize| paths.iter().find(|path| face_of(path) == Some(number)).cloned();
         let faces = [face(0)?, face(1)?, face(2)?, face(3)?, face(4)?, face(5)?];
         let others = paths.iter().filter(|path| !faces.contains(path)).map(|path| name_of(path)).collect();
         Some(Self { faces, others })
+    }
+
+    /// Returns the names of faces that a folder lacks which has three or more of them, as a cube's would.
+    pub(super) fn missing(folder: &Path) -> Option<Vec<&'static str>> {
+        let paths: Vec<PathBuf> =
+            std::fs::read_dir(folder).ok()?.filter_map(|entry| Some(entry.ok()?.path())).collect();
+        let is_there = |number: &usize| paths.iter().any(|path| path.is_file() && face_of(path) == Some(*number));
+        let missing: Vec<usize> = (0..NAMES.len()).filter(|number| !is_there(number)).collect();
+        (1..=3).contains(&missing.len()).then(|| missing.into_iter().map(|number| NAMES[number][0]).collect())
     }
 
     /// Reads the faces, each by `read`, and puts them side by side as a panorama.
@@ -121,7 +132,6 @@ fn side_by_side(folder: &Path, faces: Vec<Contents>) -> Result<Image, SceneError
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use crate::{FileReading, ReadOptions, read_scene};
 
     /// Each face is of a gray of its own, and is found in its direction.
@@ -149,7 +159,8 @@ mod tests {
                 assert!((scene.mean_luminance_cd_m2() / expected - 1.0).abs() < 2e-3, "{looks}: {}", scene.notes[0]);
             }
             std::fs::remove_file(folder.path().join(format!("room_{}.png", names[2]))).unwrap();
-            assert!(CubeFolder::find(folder.path()).is_none());
+            let message = read_scene(folder.path(), &ReadOptions::default()).unwrap_err().to_string();
+            assert!(message.contains("of its six faces up are missing"), "{message}");
         }
     }
 }

@@ -5,20 +5,13 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use dioptric_pictures::DynamicImage;
-use ndarray::Array2;
-
 use super::{
     camera::beside,
-    mat::{Plane, read_plane},
-    npy::read_npy,
-    pfm::read_pfm,
-    picture::decode,
+    contents::is_of,
+    depth_numbers::{DepthNumbers, depth_numbers},
     raw_depth::{DepthWords, RawDepth},
     reading::{DepthKind, DepthUnit},
-    spectral_exr::{depth_channel, read_planes_exr},
     stated::name_of,
-    tiff_file::{TiffFile, read_tiff},
     unusable::unreadable,
 };
 use crate::SceneError;
@@ -75,7 +68,7 @@ pub(super) fn likely_beside(picture: &Path) -> Vec<String> {
     let is_likely = |path: &PathBuf| {
         let name = name_of(path).to_lowercase();
         let ending = name.rsplit('.').next().unwrap_or_default();
-        let is_map = ["png", "tif", "tiff", "exr", "pfm", "npy", "dpt", "h5", "hdf5", "mat"].contains(&ending);
+        let is_map = ["png", "tif", "tiff", "exr", "pfm", "npy", "npz", "dpt", "h5", "hdf5", "mat"].contains(&ending);
         let rest =
             name.strip_prefix(&stem).or_else(|| name.strip_suffix(ending)?.trim_end_matches('.').strip_suffix(&stem));
         let says = |rest: &str| ["depth", "disp"].iter().any(|word| rest.contains(word));
@@ -85,15 +78,6 @@ pub(super) fn likely_beside(picture: &Path) -> Vec<String> {
     let mut names: Vec<String> = paths.filter(is_likely).map(|path| name_of(&path)).collect();
     names.sort();
     names
-}
-
-/// Returns the last code of whole numbers whose largest is this: 255 and 65535 of bytes and of words, 0 of others, none of floats.
-fn codes_of_top(top: Option<f64>) -> Option<u16> {
-    top.map(|top| match top {
-        _ if top <= 255.0 => u16::from(u8::MAX),
-        65535.0 => u16::MAX,
-        _ => 0,
-    })
 }
 
 /// Whether a file is a `frame.0000.depth_meters.hdf5` of Hypersim, whose depths are distances from the camera.
@@ -109,130 +93,64 @@ fn is_of_hypersim(path: &Path) -> bool {
 /// # Errors
 /// When the file is none of these, or its unit is not known.
 pub(super) fn read_depth(path: &Path, words: DepthWords<'_>) -> Result<RawDepth, SceneError> {
-    let wrong = |reason: String| unreadable(path, reason);
-    let ending = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
-    let (mut from, mut notes) = (name_of(path), vec![]);
-    // Beyond the last code lies what is too far, or was not measured.
-    let (values, top) = match ending.as_str() {
-        "pfm" => (read_pfm(path)?.swap_remove(0), None),
-        "npy" => {
-            let array = read_npy(path)?;
-            let sides: Vec<usize> = array.sides.iter().copied().filter(|side| *side != 1).collect();
-            let &[rows, columns] = &sides[..] else {
-                return Err(wrong(format!("its sides are {:?}, expected rows and columns", array.sides)));
-            };
-            let values =
-                Array2::from_shape_vec((rows, columns), array.values).map_err(|error| wrong(error.to_string()))?;
-            (values, codes_of_top(array.top))
-        }
-        "mat" | "h5" | "hdf5" => {
-            let Plane { name, values, top, notes: more } = read_plane(path)?;
-            from = format!("'{name}' of {from}");
-            notes.extend(more);
-            (values, codes_of_top(top))
-        }
-        "exr" => {
-            let (name, plane, others) = depth_channel(read_planes_exr(path)?).ok_or_else(|| {
-                wrong("it has no channel of depth, expected 'Z', 'Depth.Z', 'distance', or a single channel".to_owned())
-            })?;
-            from = format!("channel '{name}' of {from}");
-            notes.extend(super::stated::note_of(path, "channel", &others));
-            (plane, None)
-        }
-        _ => {
-            let stack = match ending.as_str() {
-                "tif" | "tiff" => match read_tiff(path)? {
-                    TiffFile::Linear([plane, ..], more) => Some((plane, None, more)),
-                    TiffFile::Stack(mut stack) if stack.planes.len() == 1 => {
-                        let codes = stack.top.map(|_| 0);
-                        Some((stack.planes.swap_remove(0), codes, stack.notes))
-                    }
-                    TiffFile::Stack(stack) => {
-                        return Err(wrong(format!("it has {} planes, expected one of depth", stack.planes.len())));
-                    }
-                    TiffFile::Picture { notes: more } => {
-                        notes.extend(more);
-                        None
-                    }
-                },
-                _ => None,
-            };
-            match stack {
-                Some((plane, top, more)) => {
-                    notes.extend(more);
-                    (plane, top)
-                }
-                None => codes_of(path)?,
-            }
-        }
-    };
-    // Distances that are counted from the camera say so by the name of their channel.
-    let is_distance = from.contains("'distance'") || is_of_hypersim(path);
-    let kind = if is_distance { DepthKind::Radial } else { DepthKind::Axial };
-    let is_told =
-        words.unit.is_some() || words.kind.is_some_and(|kind| kind != DepthKind::Axial && kind != DepthKind::Radial);
-    let is_codes = top.is_some();
-    let unit_m = match top {
-        _ if is_told => 1.0,
-        _ if words.unit_m.is_some() => words.unit_m.unwrap_or(1.0),
-        Some(255) => {
-            let reason = "what one of its codes of 8 bits stands for is not known: expected --depth-unit, as 255/m, or --depth-kind";
-            return Err(wrong(reason.to_owned()));
-        }
-        Some(u16::MAX) => {
-            // Neither end counts: each may stand for what was not measured.
-            let inner = values.iter().copied().filter(|v| *v > 0.0 && *v < 65535.0).fold(0.0, f32::max);
-            let ends = [0.0, 65535.0].map(|end| values.iter().any(|v| *v == end));
-            if inner > STRETCHED_FROM && ends[1] {
-                let reason = "its codes are stretched to all of 16 bits, as maps of inverse depth are: expected --depth-unit, as \
-                              65535/m, or --depth-kind, as inverse:0.5,inf";
-                return Err(wrong(reason.to_owned()));
-            }
-            UNIT_M
-        }
-        Some(_) => UNIT_M,
-        None if ending == "pfm" => {
-            let reason = "whether it holds depths or disparities is not known: expected --depth-unit m, or --depth-kind, as \
-                          disparity:BASELINE_M";
-            return Err(wrong(reason.to_owned()));
-        }
-        None => 1.0,
-    };
+    let numbers = depth_numbers(path, words.variable)?;
+    // Distances that are counted from the camera say so by the name of their channel, or their file.
+    let kind = if is_of_hypersim(path) { DepthKind::Radial } else { numbers.kind };
+    let unit_m = unit_m_of(path, &numbers, words)?;
     let is_inverse = matches!(words.kind, Some(DepthKind::Inverse | DepthKind::InverseBetween { .. }));
-    let columns = values.ncols();
     let depth = RawDepth {
-        values,
         kind,
         unit: DepthUnit::Metres(unit_m),
-        top: top.filter(|top| *top == u16::MAX && !is_inverse),
-        columns,
+        is_picture: numbers.top.is_some(),
+        top: numbers.top.filter(|top| *top == u16::MAX && !is_inverse),
+        columns: numbers.values.ncols(),
+        frame: numbers.frame,
+        values: numbers.values,
         file: path.to_owned(),
-        from,
-        is_picture: is_codes,
-        notes,
+        from: numbers.from,
+        notes: numbers.notes,
     };
     depth.told(words)
 }
 
-/// Returns the codes of a gray picture and the largest that there can be.
-fn codes_of(path: &Path) -> Result<(Array2<f32>, Option<u16>), SceneError> {
-    let of = |columns: u32, rows: u32, codes: Vec<f32>| {
-        Array2::from_shape_vec((rows as usize, columns as usize), codes).expect("a code a pixel")
-    };
-    Ok(match decode(path, 4)? {
-        DynamicImage::ImageLuma16(p) => {
-            let (columns, rows) = p.dimensions();
-            (of(columns, rows, p.into_raw().into_iter().map(f32::from).collect()), Some(u16::MAX))
+/// Returns what 1 of a file's numbers is, m; 1 where something says what else they are.
+fn unit_m_of(path: &Path, numbers: &DepthNumbers, words: DepthWords<'_>) -> Result<f64, SceneError> {
+    let wrong = |reason: &str| Err(unreadable(path, reason));
+    let of_other_kind = words.kind.is_some_and(|kind| kind != DepthKind::Axial && kind != DepthKind::Radial);
+    if let Some(own_m) = numbers.unit_m {
+        let told = words.unit.map(DepthUnit::parse).transpose()?;
+        if of_other_kind || told.is_some_and(|told| told != DepthUnit::Metres(own_m)) {
+            return wrong("it states the unit of its lengths: --depth-unit or --depth-kind says something else");
         }
-        DynamicImage::ImageLuma8(p) => {
-            let (columns, rows) = p.dimensions();
-            (of(columns, rows, p.into_raw().into_iter().map(f32::from).collect()), Some(u16::from(u8::MAX)))
+        return Ok(own_m);
+    }
+    if words.unit.is_some() || of_other_kind {
+        return Ok(1.0);
+    }
+    if let Some(unit_m) = words.unit_m {
+        return Ok(unit_m);
+    }
+    match numbers.top {
+        Some(255) => wrong(
+            "what one of its codes of 8 bits stands for is not known: expected --depth-unit, as 255/m, or --depth-kind",
+        ),
+        Some(u16::MAX) => {
+            // Neither end counts: each may stand for what was not measured.
+            let inner = numbers.values.iter().copied().filter(|v| *v > 0.0 && *v < 65535.0).fold(0.0, f32::max);
+            if inner > STRETCHED_FROM && numbers.values.iter().any(|v| *v == 65535.0) {
+                return wrong(
+                    "its codes are stretched to all of 16 bits, as maps of inverse depth are: expected --depth-unit, as 65535/m, or \
+                     --depth-kind, as inverse:0.5,inf",
+                );
+            }
+            Ok(UNIT_M)
         }
-        other => {
-            let reason = format!("its samples are {:?}, expected gray ones of 8 or 16 bits", other.color());
-            return Err(unreadable(path, reason));
-        }
-    })
+        Some(_) => Ok(UNIT_M),
+        None if is_of(path, &["pfm"]) => wrong(
+            "whether it holds depths or disparities is not known: expected --depth-unit m, or --depth-kind, as disparity:BASELINE_M",
+        ),
+        None => Ok(1.0),
+    }
 }
 
 #[cfg(test)]
@@ -240,9 +158,10 @@ mod tests {
     use super::*;
     use dioptric_pictures::save;
     use image::{ImageBuffer, Luma};
+    use ndarray::Array2;
 
     fn words<'a>(unit: Option<&'a str>, kind: Option<&str>) -> DepthWords<'a> {
-        DepthWords { unit, kind: kind.map(|kind| kind.parse().unwrap()), unit_m: None }
+        DepthWords { unit, kind: kind.map(|kind| kind.parse().unwrap()), ..DepthWords::default() }
     }
 
     /// Writes codes of 16 bits and returns the depths that they are read as.

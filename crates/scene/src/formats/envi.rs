@@ -3,18 +3,21 @@
 use std::{
     fs::{self, File},
     io::Read,
+    ops::Range,
     path::{Path, PathBuf},
 };
 
 use dioptric_spectrum::{Quantity, SpectralImage, WavelengthGrid};
 
 use super::{
+    camera::CameraData,
     contents::{Contents, Image},
+    depth::files_beside,
     envi_data::{EnviFile, Meaning, Wanted},
     envi_header::{self, DataType},
     light_unit::LightUnit,
-    read_options::ReadOptions,
-    reading::{FileQuantity, NoData, light_unit},
+    read_options::{Part, ReadOptions},
+    reading::{FileQuantity, Frame, NoData, light_unit},
     reduced::reduced_size,
     stated::{name_of, note_of, short},
     unusable::{starts_with, unreadable},
@@ -59,19 +62,65 @@ pub(super) fn contents_of_envi(path: &Path, options: &ReadOptions) -> Result<Con
     let choice = options.reading.no_data.unwrap_or_default();
     let own_size = (file.header.rows, file.header.columns);
     // Rows that get the nearest of other rows need all of them.
-    let reduced = match choice {
-        NoData::Fill => None,
-        NoData::Black | NoData::Refuse => reduced_size(path, options, own_size, 4 * wanted.len() as u64),
+    let needs_all = choice == NoData::Fill;
+    let part = options.part.filter(|_| !needs_all && stands_alone(path, options));
+    let reduced = match part {
+        None if !needs_all => reduced_size(path, options, own_size, 4 * wanted.len() as u64),
+        _ => None,
     };
     notes.extend(reduced.as_ref().map(|reduced| reduced.note.clone()));
-    let size = reduced.map_or(own_size, |reduced| (reduced.rows, reduced.columns));
-    let asked = Wanted { order: &order, weights: &weights, grid: &wanted, size, choice };
+    let mut size = reduced.map_or(own_size, |reduced| (reduced.rows, reduced.columns));
+    let mut window = (0..own_size.0, 0..own_size.1);
+    if let Some(part) = part {
+        (window, size) = window_of(path, part, own_size, &mut notes)?;
+    }
+    let frame = part.map(|_| Frame {
+        columns: own_size.1,
+        rows: own_size.0,
+        x0: window.1.start as i64,
+        y0: window.0.start as i64,
+        aspect: 1.0,
+    });
+    let asked = Wanted { order: &order, weights: &weights, grid: &wanted, window, size, choice };
     let (planes, mended) = file.planes(&asked, &meaning)?;
     notes.extend(mended.note(path, choice));
     let quantity = if matches!(meaning, Meaning::Light(..)) { Quantity::Radiance } else { Quantity::Reflectance };
     let image = SpectralImage::new(quantity, wanted, planes)
         .map_err(|reason| SceneError::Values { file: path.to_owned(), reason })?;
-    Ok(Contents { notes, own_grid: Some(own), ..Contents::of(Image::Spectral(image), what) })
+    Ok(Contents { notes, own_grid: Some(own), frame, part, ..Contents::of(Image::Spectral(image), what) })
+}
+
+/// Whether all that is known of a cube's samples is in its own file and the options, so that a part of it may be read by itself.
+fn stands_alone(path: &Path, options: &ReadOptions) -> bool {
+    let reading = &options.reading;
+    let others = reading.depth.is_some() || reading.view.is_some() || reading.panorama.is_some();
+    !others && files_beside(path).is_empty() && matches!(CameraData::beside(path), Ok(None))
+}
+
+/// Rows and columns of a file.
+type Window = (Range<usize>, Range<usize>);
+
+/// Returns the rows and columns of a part, and how many of its blocks there are.
+fn window_of(
+    path: &Path,
+    part: Part,
+    (rows, columns): (usize, usize),
+    notes: &mut Vec<String>,
+) -> Result<(Window, (usize, usize)), SceneError> {
+    let [x, y, width, height] = part.window.unwrap_or([0, 0, columns, rows]);
+    let setting = |what, value: String, expected: String| SceneError::Setting { what, value, expected };
+    if width == 0 || height == 0 || x.saturating_add(width) > columns || y.saturating_add(height) > rows {
+        let value = format!("rows {y}..{}, columns {x}..{}", y.saturating_add(height), x.saturating_add(width));
+        return Err(setting("the part of the scene", value, format!("a part of 0..{rows} and 0..{columns}")));
+    }
+    let bin = part.bin;
+    if bin == 0 || height < bin || width < bin {
+        let expected = format!("1 to {}", height.min(width));
+        return Err(setting("the side of a block of samples", bin.to_string(), expected));
+    }
+    notes.extend(part.left_over(&name_of(path), width, height));
+    let (down, across) = (height / bin, width / bin);
+    Ok(((y..y + down * bin, x..x + across * bin), (down, across)))
 }
 
 /// Returns the length of the numbers of an ENVI file, by its header or themselves; `None` where it is none.
@@ -198,11 +247,18 @@ impl EnviFile {
 
     /// Returns the note of data units that are none of light, and say more than that the numbers are a share or a count.
     fn unused_unit(&self, path: &Path) -> Option<String> {
-        const PLAIN: [&str; 9] =
-            ["", "reflectance", "transmittance", "unitless", "dimensionless", "none", "unknown", "dn", "%"];
+        const PLAIN: [&str; 8] =
+            ["", "reflectance", "transmittance", "unitless", "dimensionless", "none", "unknown", "dn"];
         let unit = self.header.data_units.as_deref()?;
-        let is_plain = PLAIN.contains(&unit.to_lowercase().as_str()) || LightUnit::parse(unit).is_some();
+        let is_plain =
+            PLAIN.contains(&unit.to_lowercase().as_str()) || self.has_percent() || LightUnit::parse(unit).is_some();
         if is_plain { None } else { note_of(path, "unit", &[unit.to_owned()]) }
+    }
+
+    /// Whether its units say that a perfect white is 100.
+    fn has_percent(&self) -> bool {
+        let unit = self.header.data_units.as_deref().unwrap_or_default().to_lowercase();
+        ["%", "percent", "percent reflectance", "reflectance (%)", "reflectance %"].contains(&unit.trim())
     }
 
     /// Decides what the numbers are, and says so.
@@ -213,7 +269,8 @@ impl EnviFile {
         let own_unit = header.data_units.as_deref().and_then(LightUnit::parse);
         let own_unit = own_unit.filter(|unit| unit.quantity == Quantity::Radiance);
         let has_gains = header.gains.is_some() || header.offsets.is_some();
-        let is_reflecting = header.are_gains_of_reflectance || header.reflectance_scale.is_some();
+        let own_level = header.reflectance_scale.or(self.has_percent().then_some(100.0));
+        let is_reflecting = header.are_gains_of_reflectance || own_level.is_some();
         let told_unit = reading.unit.as_deref().map(light_unit).transpose()?;
         let wants_light = match reading.quantity {
             Some(FileQuantity::Reflectance) => Some(false),
@@ -234,10 +291,10 @@ impl EnviFile {
         if wants_light == Some(true) && is_reflecting {
             return units("its header states the number of a perfect white, so that it is a reflectance: expected it without a unit or quantity of light".to_owned());
         }
-        if let (Some(own), Some(told)) = (header.reflectance_scale, options.white_level)
+        if let (Some(own), Some(told)) = (own_level, options.white_level)
             && own != told
         {
-            return units(format!("its reflectance scale factor is {own}, which a white level of {told} contradicts"));
+            return units(format!("its header says that {own} is white, which a white level of {told} contradicts"));
         }
         // Gains without a unit are those of ENVI, W m⁻² sr⁻¹ µm⁻¹.
         let gain_unit = || LightUnit::parse("W/m^2/sr/um").filter(|_| has_gains && !is_reflecting);
@@ -257,7 +314,7 @@ impl EnviFile {
             let factors = self.wavelengths_nm.iter().map(of_band).collect();
             return Ok((Meaning::Light(factors), format!("radiance in {words}")));
         }
-        let level = options.white_level.or(header.reflectance_scale);
+        let level = options.white_level.or(own_level);
         if let Some(level) = level {
             return Ok((Meaning::Reflectance(scale / level), format!("reflectance, {level} being a perfect white")));
         }

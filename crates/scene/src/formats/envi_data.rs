@@ -24,14 +24,16 @@ use crate::SceneError;
 const AT_ONCE_BYTES: usize = 8 << 20;
 
 /// What is wanted of a cube.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 pub(super) struct Wanted<'a> {
     /// The good bands of the file by ascending wavelength.
     pub(super) order: &'a [usize],
     /// For each wanted band its places in `order`, with weights.
     pub(super) weights: &'a [Vec<(usize, f64)>],
     pub(super) grid: &'a WavelengthGrid,
-    /// The rows and columns: those of the file, or fewer.
+    /// The rows and the columns of the file that are wanted.
+    pub(super) window: (Range<usize>, Range<usize>),
+    /// As how many rows and columns: as many, or fewer.
     pub(super) size: (usize, usize),
     pub(super) choice: NoData,
 }
@@ -63,8 +65,8 @@ impl EnviFile {
         wanted: &Wanted<'_>,
         meaning: &Meaning,
     ) -> Result<(Vec<Array2<f32>>, Mended), SceneError> {
-        let Wanted { order, weights, grid, size: (rows, columns), choice } = *wanted;
-        let (own_rows, own_columns) = (self.header.rows, self.header.columns);
+        let &Wanted { order, weights, grid, ref window, size: (rows, columns), choice } = wanted;
+        let (own_rows, own_columns) = (window.0.len(), window.1.len());
         // What is wanted of it, and a few lines at a time.
         let bytes = [rows, columns, weights.len(), 4].iter().fold(1_u64, |n, &side| n.saturating_mul(side as u64));
         check_made(&self.data_path, bytes.saturating_add(2 * AT_ONCE_BYTES as u64))?;
@@ -72,14 +74,16 @@ impl EnviFile {
         needed.sort_unstable();
         needed.dedup();
         let references = match meaning {
-            Meaning::Between(pair) => Some([pair[0].lines(&needed, own_rows)?, pair[1].lines(&needed, own_rows)?]),
+            Meaning::Between(pair) => {
+                Some([pair[0].lines(&needed, self.header.rows)?, pair[1].lines(&needed, self.header.rows)?])
+            }
             _ => None,
         };
         let is_whole = (rows, columns) == (own_rows, own_columns);
         let mut planes: Vec<Array2<f32>> = weights.iter().map(|_| Array2::zeros((rows, columns))).collect();
         let mut mended = Mended::default();
         let mut file = File::open(&self.data_path).map_err(|error| unreadable(&self.data_path, error))?;
-        for lines in self.chunks(needed.len()) {
+        for lines in self.chunks(window.0.clone(), needed.len()) {
             let mut raw = self.read(&mut file, &needed, lines.clone())?;
             raw.par_iter_mut().zip(&needed).enumerate().for_each(|(index, (samples, &band))| match meaning {
                 Meaning::Light(factors) => self.convert(samples, band, factors[band]),
@@ -88,13 +92,21 @@ impl EnviFile {
                     self.convert(samples, band, 1.0);
                     let Some([white, dark]) = &references else { return };
                     for (at, sample) in samples.iter_mut().enumerate() {
-                        let (row, column) = (lines.start + at / own_columns, at % own_columns);
+                        let (row, column) = (lines.start + at / self.header.columns, at % self.header.columns);
                         let of = |lines: &[Array2<f32>]| lines[index][(row % lines[index].nrows(), column)];
                         let (white, dark) = (of(white), of(dark));
                         *sample = if white > dark { (*sample - dark) / (white - dark) } else { f32::NAN };
                     }
                 }
             });
+            if own_columns < self.header.columns {
+                raw.par_iter_mut().for_each(|samples| {
+                    let lines = samples.chunks(self.header.columns);
+                    *samples = lines.flat_map(|line| &line[window.1.clone()]).copied().collect();
+                });
+            }
+            // Counted from the first line of the window.
+            let lines = lines.start - window.0.start..lines.end - window.0.start;
             let place = |band: usize| needed.binary_search(&band).expect("it was asked for");
             let sum_of = |weights: &[(usize, f64)], part: &mut [f32]| {
                 if let [(only, 1.0)] = weights[..] {
@@ -120,7 +132,7 @@ impl EnviFile {
                 part
             };
             let mut parts: Vec<Array2<f32>> = weights.par_iter().map(of_weights).collect();
-            mended.add(mend_rows(&self.header_path, grid, &mut parts, choice, lines.start)?);
+            mended.add(mend_rows(&self.header_path, grid, &mut parts, choice, window.0.start + lines.start)?);
             planes.par_iter_mut().zip(&parts).for_each(|(plane, part)| {
                 for (line, samples) in part.rows().into_iter().enumerate() {
                     let row = block_of(lines.start + line, rows, own_rows);
@@ -131,7 +143,7 @@ impl EnviFile {
             });
         }
         if is_whole {
-            mended = mend_rows(&self.header_path, grid, &mut planes, choice, 0)?;
+            mended = mend_rows(&self.header_path, grid, &mut planes, choice, window.0.start)?;
         } else {
             let side = |block: usize, n: usize, own: usize| start_of(block + 1, n, own) - start_of(block, n, own);
             for plane in &mut planes {
@@ -149,7 +161,7 @@ impl EnviFile {
         let is_whole = rows == cube_rows;
         let mut sums = vec![Array2::<f64>::zeros((if is_whole { rows } else { 1 }, columns)); bands.len()];
         let mut file = File::open(&self.data_path).map_err(|error| unreadable(&self.data_path, error))?;
-        for lines in self.chunks(bands.len()) {
+        for lines in self.chunks(0..rows, bands.len()) {
             let mut raw = self.read(&mut file, bands, lines.clone())?;
             for ((samples, &band), sum) in raw.iter_mut().zip(bands).zip(&mut sums) {
                 self.convert(samples, band, 1.0);
@@ -174,15 +186,15 @@ impl EnviFile {
         }
     }
 
-    /// Returns ranges of lines that fit into memory.
-    fn chunks(&self, n_bands: usize) -> impl Iterator<Item = Range<usize>> + use<> {
+    /// Returns ranges of these lines that fit into memory.
+    fn chunks(&self, rows: Range<usize>, n_bands: usize) -> impl Iterator<Item = Range<usize>> + use<> {
         let line = self.header.columns
             * (4 * n_bands).max(match self.header.interleave {
                 Interleave::Bsq => 1,
                 Interleave::Bil | Interleave::Bip => self.header.bands * self.header.data_type.bytes(),
             });
-        let (rows, step) = (self.header.rows, (AT_ONCE_BYTES / line).max(1));
-        (0..rows).step_by(step).map(move |first| first..(first + step).min(rows))
+        let step = (AT_ONCE_BYTES / line).max(1);
+        rows.clone().step_by(step).map(move |first| first..(first + step).min(rows.end))
     }
 
     /// Bytes of a frame with what is skipped before and after it.

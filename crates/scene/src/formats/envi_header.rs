@@ -154,6 +154,7 @@ const USED: [&str; 23] = [
 /// Reads the text of a header.
 pub(crate) fn parse(path: &Path, text: &str) -> Result<EnviHeader, SceneError> {
     let mut entries = Entries { path, list: entries(path, text)?, used: vec![] };
+    entries.check_repeats()?;
     entries.check_kind()?;
     let bands = entries.required("bands")?;
     let reflecting =
@@ -221,18 +222,30 @@ impl Entries<'_> {
         found
     }
 
-    /// Names the keys that nothing asked for, and those that stand twice.
+    /// Names the keys that nothing asked for.
     fn note(&self) -> Option<String> {
-        let mut seen: Vec<&str> = vec![];
-        let mut left = vec![];
-        for entry in &self.list {
-            let is_known = self.used.contains(&entry.key) || HARMLESS.contains(&entry.key.as_str());
-            if !is_known || (seen.contains(&entry.key.as_str()) && self.used.contains(&entry.key)) {
-                left.push(entry.key.clone());
-            }
-            seen.push(&entry.key);
-        }
+        let is_known = |key: &String| self.used.contains(key) || HARMLESS.contains(&key.as_str());
+        let left: Vec<String> = self.list.iter().map(|entry| entry.key.clone()).filter(|key| !is_known(key)).collect();
         note_of(self.path, "key", &left)
+    }
+
+    /// Refuses a key that says two things.
+    fn check_repeats(&self) -> Result<(), SceneError> {
+        for (index, entry) in self.list.iter().enumerate() {
+            let is_used = USED.contains(&entry.key.as_str());
+            let first = self.list[..index].iter().find(|first| is_used && first.key == entry.key);
+            if let Some(first) = first.filter(|first| first.value != entry.value) {
+                let reason = format!(
+                    "'{}', but line {} has '{}': expected the key once",
+                    shown(&entry.value),
+                    first.line,
+                    shown(&first.value)
+                );
+                let (file, key) = (self.path.to_owned(), entry.key.clone());
+                return Err(SceneError::Header { file, line: entry.line, key, reason });
+            }
+        }
+        Ok(())
     }
 
     fn wrong(&self, key: &str, reason: String) -> SceneError {
@@ -448,11 +461,11 @@ mod tests {
     fn all_that_a_header_states_is_used_or_named() {
         let text = GOOD
             .replace("bands = 2", "bands=2\nbbl = {1, 0}\nDATA_GAIN_VALUES = {2, 3}\ndata ignore value = -9999")
-            + "description = { a\n b }\nfrobnicate = {1}\nsamples = 5\nmajor frame offsets = {8, 4}\n";
+            + "description = { a\n b }\nfrobnicate = {1}\nsamples = 4\nmajor frame offsets = {8, 4}\n";
         let header = parse(Path::new("folder/a.hdr"), &text).unwrap();
         assert_eq!((header.columns, header.frame_offsets, header.ignored), (4, [8, 4], Some(-9999.0)));
         assert_eq!((header.bad_bands, header.gains), (vec![false, true], Some(vec![2.0, 3.0])));
-        assert_eq!(header.note.as_deref(), Some("a.hdr: its keys 'frobnicate', 'samples' are not used"));
+        assert_eq!(header.note.as_deref(), Some("a.hdr: its key 'frobnicate' is not used"));
     }
 
     #[test]
@@ -492,6 +505,7 @@ mod tests {
             ("interleave", "radiance scale factor = 0.1\ninterleave", "--scale"),
             ("interleave", "minor frame offsets = {1, 0}\ninterleave", "expected 0"),
             ("byte order = 1", "byte order", "expected 'key = value'"),
+            ("interleave", "SAMPLES = 5\ninterleave", "line 8: 'samples': '5', but line 3 has '4'"),
         ] {
             let message = parse(Path::new("a.hdr"), &GOOD.replace(from, to)).unwrap_err().to_string();
             assert!(message.contains(words) && message.starts_with("a.hdr: "), "{message}");

@@ -1,7 +1,7 @@
 //! ENVI files of every order and type, with what their headers say.
 
 use super::*;
-use crate::{FileReading, ReadOptions};
+use crate::{FileReading, Part, ReadOptions};
 use ndarray::Array2;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -289,4 +289,57 @@ fn fine_cubes_are_read_as_means() {
             assert!((found - block.mean().unwrap()).abs() < 1e-6);
         }
     }
+}
+
+/// A part that is read by itself is that of the whole, seen in the same directions.
+#[test]
+fn parts_are_those_of_the_whole() {
+    let folder = tempfile::tempdir().unwrap();
+    let (rows, columns) = (9, 13);
+    let mut rng = ChaCha8Rng::seed_from_u64(21);
+    let values: Vec<f32> = (0..rows * columns * 3).map(|_| rng.random()).collect();
+    let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
+    for interleave in ["bsq", "bil", "bip"] {
+        let text = format!(
+            "ENVI\nsamples = {columns}\nlines = {rows}\nbands = 3\ndata type = 4\ninterleave = {interleave}\n\
+             reflectance scale factor = 1\nwavelength units = nm\nwavelength = {{450, 550, 650}}\n"
+        );
+        let path = write(folder.path(), "a", &text, &bytes);
+        let usual = ReadOptions { horizontal_fov_deg: Some(30.0), depth_m: Some(2.0), ..ReadOptions::default() };
+        let whole = crate::read_scene(&path, &usual).unwrap();
+        for (window, bin) in [(Some([3, 2, 7, 6]), 1), (Some([1, 1, 11, 7]), 3), (None, 2), (Some([12, 8, 1, 1]), 1)] {
+            let part = Part { window, bin };
+            let found = crate::read_scene(&path, &ReadOptions { part: Some(part), ..usual.clone() }).unwrap();
+            let expected = part.of(whole.clone()).unwrap();
+            assert_eq!(found.depth, expected.depth);
+            let (view, own) = (found.view.unwrap(), expected.view.unwrap());
+            let off =
+                [view.focal_px - own.focal_px, view.center_x_px - own.center_x_px, view.center_y_px - own.center_y_px];
+            assert!(off.iter().all(|v| v.abs() < 1e-9), "{view:?} {own:?}");
+            for (a, b) in found.radiance.planes().iter().zip(expected.radiance.planes()) {
+                // Means of single floats in another order.
+                assert!(
+                    a.dim() == b.dim() && a.iter().zip(b).all(|(a, b)| (a - b).abs() <= 1e-6 * b),
+                    "{interleave} {part:?}"
+                );
+            }
+            let says = found.notes.iter().any(|note| note.contains("fill no block"));
+            assert_eq!(says, bin > 1, "{:?}", found.notes);
+        }
+        for (window, bin) in [([3, 2, 70, 6], 1), ([3, 2, 2, 2], 3), ([0, 0, 0, 2], 1), ([0, 0, 2, 2], 0)] {
+            let part = Some(Part { window: Some(window), bin });
+            assert!(crate::read_scene(&path, &ReadOptions { part, ..usual.clone() }).is_err(), "{window:?}");
+        }
+    }
+}
+
+#[test]
+fn units_of_percent_make_white_100() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = header(1, "bsq", 0) + "data units = %\n";
+    let path = write(folder.path(), "a", &text, &samples(1, "bsq", 0));
+    let (image, _) = read_with(&path, &ReadOptions::default()).unwrap();
+    assert_eq!(image.spectrum_at(0, 1), [1.01_f32, 0.01].map(f64::from));
+    let told = ReadOptions { white_level: Some(1.0), ..ReadOptions::default() };
+    assert!(read_with(&path, &told).unwrap_err().to_string().contains("contradicts"));
 }

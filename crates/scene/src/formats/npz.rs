@@ -11,7 +11,7 @@ use zip::{ZipArchive, result::ZipError};
 use super::{
     axes,
     contents::Cube,
-    mat::WAVES,
+    mat::{DEPTHS, WAVES},
     npy::{NpyArray, parse},
     read_options::ReadOptions,
     stated::{name_of, note_of, short},
@@ -19,59 +19,86 @@ use super::{
 };
 use crate::SceneError;
 
+/// An archive whose arrays are read by name.
+struct Archive<'a> {
+    path: &'a Path,
+    zip: ZipArchive<BufReader<File>>,
+    length: u64,
+    /// The names of its files.
+    names: Vec<String>,
+}
+
+impl<'a> Archive<'a> {
+    fn open(path: &'a Path) -> Result<Self, SceneError> {
+        let wrong = |reason: String| unreadable(path, reason);
+        let file = File::open(path).map_err(|error| unreadable(path, error))?;
+        let length = file.metadata().map_err(|error| unreadable(path, error))?.len();
+        let zip = ZipArchive::new(BufReader::new(file)).map_err(|error| wrong(format!("it is no archive: {error}")))?;
+        let names = zip.file_names().map(|name| Ok(name?.into_owned())).collect::<Result<Vec<String>, ZipError>>();
+        let names = names.map_err(|error| wrong(format!("it is no archive: {error}")))?;
+        Ok(Self { path, zip, length, names })
+    }
+
+    fn read(&mut self, name: &str) -> Result<NpyArray, SceneError> {
+        let (path, length) = (self.path, self.length);
+        let wrong = |reason: String| unreadable(path, format!("its '{}': {reason}", short(name)));
+        let mut entry = self.zip.by_name(name).map_err(|error| wrong(error.to_string()))?;
+        // The bytes of the array, the single floats that they become, and the planes that are made of these.
+        check_memory(path, entry.size().saturating_mul(9), length)?;
+        let mut bytes = vec![];
+        let limit = entry.size();
+        entry.by_ref().take(limit).read_to_end(&mut bytes).map_err(|error| wrong(error.to_string()))?;
+        parse(&bytes).map_err(wrong)
+    }
+
+    /// Returns the file of the array of this name.
+    fn named(&self, told: &str) -> Result<String, SceneError> {
+        self.names.iter().find(|name| bare(name) == told).cloned().ok_or_else(|| {
+            let reason = format!("it has no array '{told}', expected one of {}", shown(self.names.iter()));
+            unreadable(self.path, reason)
+        })
+    }
+
+    /// Returns the arrays whose number of sides is wanted, but for lists of wavelengths.
+    fn of_sides(&mut self, is_wanted: impl Fn(&NpyArray) -> bool) -> Result<Vec<String>, SceneError> {
+        let mut found = vec![];
+        for name in self.names.clone() {
+            if name.ends_with(".npy") && !is_list(&name) && is_wanted(&self.read(&name)?) {
+                found.push(name);
+            }
+        }
+        Ok(found)
+    }
+}
+
+fn bare(name: &str) -> &str {
+    name.trim_end_matches(".npy")
+}
+
+fn is_list(name: &str) -> bool {
+    WAVES.contains(&bare(name))
+}
+
 /// Reads the cube of an archive: the array that is told, or the only one of three axes, with the wavelengths of an array beside it.
 ///
 /// # Errors
 /// When it is no archive, an array cannot be read, or no array or several could be the cube.
 pub(super) fn read_npz(path: &Path, options: &ReadOptions) -> Result<Cube, SceneError> {
     let wrong = |reason: String| unreadable(path, reason);
-    let file = File::open(path).map_err(|error| unreadable(path, error))?;
-    let length = file.metadata().map_err(|error| unreadable(path, error))?.len();
-    let mut archive =
-        ZipArchive::new(BufReader::new(file)).map_err(|error| wrong(format!("it is no archive: {error}")))?;
-    let names = archive.file_names().map(|name| Ok(name?.into_owned())).collect::<Result<Vec<String>, ZipError>>();
-    let names = names.map_err(|error| wrong(format!("it is no archive: {error}")))?;
-    let mut read = |name: &str| -> Result<NpyArray, SceneError> {
-        let mut entry = archive.by_name(name).map_err(|error| wrong(format!("its '{}': {error}", short(name))))?;
-        // The bytes of the array, the single floats that they become, and the planes that are made of these.
-        check_memory(path, entry.size().saturating_mul(9), length)?;
-        let mut bytes = vec![];
-        let limit = entry.size();
-        entry
-            .by_ref()
-            .take(limit)
-            .read_to_end(&mut bytes)
-            .map_err(|error| wrong(format!("its '{}': {error}", short(name))))?;
-        parse(&bytes).map_err(|reason| wrong(format!("its '{}': {reason}", short(name))))
-    };
-    let bare = |name: &str| name.trim_end_matches(".npy").to_owned();
+    let mut archive = Archive::open(path)?;
     let reading = &options.reading;
-    let is_list = |name: &str| WAVES.contains(&bare(name).as_str());
     let chosen = match &reading.variable {
-        Some(told) => names.iter().find(|name| bare(name) == *told).cloned().ok_or_else(|| {
-            wrong(format!("it has no array '{told}', expected one of {}", shown(names.iter().map(|name| bare(name)))))
-        })?,
-        None => {
-            let mut cubes = vec![];
-            for name in names.iter().filter(|name| name.ends_with(".npy") && !is_list(name)) {
-                if read(name)?.sides.len() == 3 {
-                    cubes.push(name.clone());
-                }
-            }
-            match &cubes[..] {
-                [one] => one.clone(),
-                [] => return Err(wrong("it has no array of three axes: expected --variable".to_owned())),
-                _ => {
-                    let cubes = shown(cubes.iter().map(|name| bare(name)));
-                    return Err(wrong(format!("it has several cubes, {cubes}: expected --variable")));
-                }
-            }
-        }
+        Some(told) => archive.named(told)?,
+        None => match &archive.of_sides(|array| array.sides.len() == 3)?[..] {
+            [one] => one.clone(),
+            [] => return Err(wrong("it has no array of three axes: expected --variable".to_owned())),
+            cubes => return Err(wrong(format!("it has several cubes, {}: expected --variable", shown(cubes.iter())))),
+        },
     };
-    let array = read(&chosen)?;
-    let list = names.iter().find(|name| is_list(name) && **name != chosen).cloned();
+    let array = archive.read(&chosen)?;
+    let list = archive.names.iter().find(|name| is_list(name) && **name != chosen).cloned();
     let own: Option<Vec<f64>> = match &list {
-        Some(name) => Some(read(name)?.values.into_iter().map(f64::from).collect()),
+        Some(name) => Some(archive.read(name)?.values.into_iter().map(f64::from).collect()),
         None => None,
     };
     let told = reading.wavelengths_nm.as_ref().map(Vec::len);
@@ -80,14 +107,45 @@ pub(super) fn read_npz(path: &Path, options: &ReadOptions) -> Result<Cube, Scene
         .or_else(|| options.grid.as_ref().map(dioptric_spectrum::WavelengthGrid::len));
     let at = |index: usize| array.values[index];
     let planes = axes::planes(&array.sides, reading.axes.as_deref(), n_bands, true, at).map_err(wrong)?;
-    let unused: Vec<String> =
-        names.iter().filter(|name| **name != chosen && Some(*name) != list.as_ref()).map(|name| bare(name)).collect();
+    let is_depth = |name: &str| reading.depth.is_none() && reading.depth_variable.as_deref() == Some(bare(name));
+    let is_unused = |name: &&String| **name != chosen && Some(*name) != list.as_ref() && !is_depth(name);
+    let unused: Vec<String> = archive.names.iter().filter(is_unused).map(|name| bare(name).to_owned()).collect();
     let ambiguous = axes::note(&array.sides, reading.axes.as_deref(), n_bands);
     let ambiguous = ambiguous.map(|note| format!("{}: '{}': {note}", name_of(path), bare(&chosen)));
     let notes = note_of(path, "array", &unused).into_iter().chain(ambiguous).collect();
-    Ok(Cube { planes, top: array.top, wavelengths_nm: own, quantity: None, notes })
+    Ok(Cube { planes, top: array.top, wavelengths_nm: own, quantity: None, unit: None, notes })
 }
 
-fn shown(names: impl Iterator<Item = String>) -> String {
-    names.collect::<Vec<_>>().join(", ")
+/// Reads the depth of an archive: the array that is told, that which is called one, or the only one of two axes; with its name and notes.
+///
+/// # Errors
+/// When it is no archive, an array cannot be read, or no array or several could be the depth.
+pub(super) fn read_npz_plane(path: &Path, told: Option<&str>) -> Result<(String, NpyArray, Vec<String>), SceneError> {
+    let mut archive = Archive::open(path)?;
+    let chosen = match told {
+        Some(told) => archive.named(told)?,
+        None => {
+            let planes = archive.of_sides(|array| array.sides.iter().filter(|side| **side != 1).count() == 2)?;
+            let called = DEPTHS.iter().find_map(|own| planes.iter().find(|name| bare(name).eq_ignore_ascii_case(own)));
+            match (called, &planes[..]) {
+                (Some(called), _) => called.clone(),
+                (None, [one]) => one.clone(),
+                (None, _) => {
+                    let reason = format!(
+                        "it has no array of rows and columns that is called depth, expected one of {} (--depth-variable)",
+                        shown(archive.names.iter())
+                    );
+                    return Err(unreadable(path, reason));
+                }
+            }
+        }
+    };
+    let array = archive.read(&chosen)?;
+    let unused: Vec<String> =
+        archive.names.iter().filter(|name| **name != chosen).map(|name| bare(name).to_owned()).collect();
+    Ok((bare(&chosen).to_owned(), array, note_of(path, "array", &unused).into_iter().collect()))
+}
+
+fn shown<'a>(names: impl Iterator<Item = &'a String>) -> String {
+    names.map(|name| bare(name)).collect::<Vec<_>>().join(", ")
 }

@@ -37,6 +37,13 @@ pub(super) fn look(
     let fov_deg = options.horizontal_fov_deg.ok_or_else(|| {
         unreadable(path, "of a panorama a part is seen: expected a field of view (--fov-deg), below 180°")
     })?;
+    if fov_deg >= 180.0 {
+        let reason = format!(
+            "a scene is a picture on a plane, which a panorama of {fov_deg}° has none of: expected a field of view below 180°, or \
+             `dioptric render` with the panorama as its sky (--sky)"
+        );
+        return Err(unreadable(path, reason));
+    }
     if options.reading.view.is_some() || contents.hidden.is_some() {
         return Err(unreadable(path, "a panorama has neither camera data nor a hidden layer: expected it without"));
     }

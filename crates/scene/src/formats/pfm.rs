@@ -4,18 +4,27 @@ use std::path::Path;
 
 use ndarray::Array2;
 
-use super::unusable::{check_memory, unreadable};
+use super::{
+    stated::name_of,
+    unusable::{check_memory, unreadable},
+};
 use crate::SceneError;
 
-/// The planes of a portable float map: one of gray, or red, green and blue.
-pub(super) fn read_pfm(path: &Path) -> Result<Vec<Array2<f32>>, SceneError> {
+/// The planes of a portable float map: one of gray, or red, green and blue; and what of it is not used.
+///
+/// The scale in its header says by its sign in which order bytes are. Its size is what most programs write anyhow and none multiplies by (the
+/// disparities of Middlebury have 1/255): it is named.
+pub(super) fn read_pfm(path: &Path) -> Result<(Vec<Array2<f32>>, Option<String>), SceneError> {
     let length = std::fs::metadata(path).map_err(|error| unreadable(path, error))?.len();
     check_memory(path, length.saturating_mul(2), length)?;
     let bytes = std::fs::read(path).map_err(|error| unreadable(path, error))?;
-    parse(&bytes).map_err(|reason| unreadable(path, reason))
+    let (planes, unused) = parse(&bytes).map_err(|reason| unreadable(path, reason))?;
+    let note = (!unused.is_empty()).then(|| format!("{}: {} are not used", name_of(path), unused.join(" and ")));
+    Ok((planes, note))
 }
 
-fn parse(bytes: &[u8]) -> Result<Vec<Array2<f32>>, String> {
+/// Returns the planes, and in words what else there is.
+fn parse(bytes: &[u8]) -> Result<(Vec<Array2<f32>>, Vec<String>), String> {
     let mut at = 0;
     let mut word = || {
         let from = at + bytes[at..].iter().take_while(|b| b.is_ascii_whitespace()).count();
@@ -43,16 +52,18 @@ fn parse(bytes: &[u8]) -> Result<Vec<Array2<f32>>, String> {
     if data.len() / 4 / n_channels / columns < rows {
         return Err("the file ends too early (truncated)".to_owned());
     }
-    let (is_little, factor) = (scale < 0.0, scale.abs() as f32);
+    let is_little = scale < 0.0;
     let plane = |channel: usize| {
         Array2::from_shape_fn((rows, columns), |(row, column)| {
             let index = 4 * (((rows - 1 - row) * columns + column) * n_channels + channel);
             let four = [data[index], data[index + 1], data[index + 2], data[index + 3]];
-            let value = if is_little { f32::from_le_bytes(four) } else { f32::from_be_bytes(four) };
-            if factor == 1.0 { value } else { factor * value }
+            if is_little { f32::from_le_bytes(four) } else { f32::from_be_bytes(four) }
         })
     };
-    Ok((0..n_channels).map(plane).collect())
+    let n_more = data.len() - 4 * n_channels * columns * rows;
+    let scale = (scale.abs() != 1.0).then(|| format!("the size of its scale, {}", scale.abs()));
+    let more = (n_more > 0).then(|| format!("{n_more} bytes after its samples"));
+    Ok(((0..n_channels).map(plane).collect(), scale.into_iter().chain(more).collect()))
 }
 
 #[cfg(test)]
@@ -66,11 +77,18 @@ mod tests {
         let little: Vec<[u8; 4]> = values.iter().map(|v| v.to_le_bytes()).collect();
         let big: Vec<[u8; 4]> = values.iter().map(|v| v.to_be_bytes()).collect();
         let gray = ndarray::arr2(&[[3.0, 4.0, 5.0], [0.0, 1.0, 2.0]]);
-        assert_eq!(parse(&of("Pf\n3 2\n-1.0\n", &little)).unwrap(), std::slice::from_ref(&gray));
-        assert_eq!(parse(&of("Pf\n3 2\n1\n", &big)).unwrap(), std::slice::from_ref(&gray));
-        assert_eq!(parse(&of("Pf 3 2 -2\n", &little)).unwrap(), [2.0 * gray]);
-        let color = parse(&of("PF\n1 2\n-1\n", &little)).unwrap();
-        assert_eq!(color[1], ndarray::arr2(&[[4.0], [1.0]]));
+        let plain = |bytes: &[u8]| {
+            let (planes, unused) = parse(bytes).unwrap();
+            assert!(unused.is_empty(), "{unused:?}");
+            planes
+        };
+        assert_eq!(plain(&of("Pf\n3 2\n-1.0\n", &little)), std::slice::from_ref(&gray));
+        assert_eq!(plain(&of("Pf\n3 2\n1\n", &big)), std::slice::from_ref(&gray));
+        assert_eq!(plain(&of("PF\n1 2\n-1\n", &little))[1], ndarray::arr2(&[[4.0], [1.0]]));
+        // The size of the scale is named: disparities of Middlebury have 1/255 there, and are what they are.
+        let (planes, unused) = parse(&[of("Pf 3 2 -0.003922\n", &little), vec![0; 3]].concat()).unwrap();
+        assert_eq!((planes, unused.len()), (vec![gray], 2));
+        assert!(unused[0].contains("0.003922") && unused[1].contains("3 bytes"), "{unused:?}");
     }
 
     #[test]

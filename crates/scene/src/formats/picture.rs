@@ -161,6 +161,8 @@ pub(super) struct Oriented {
     pub(super) picture: DynamicImage,
     /// What its codes are, where they are not those of sRGB.
     pub(super) colors: Option<StatedColors>,
+    /// Whether it lies otherwise than in its file.
+    pub(super) is_turned: bool,
     /// What else it states, a sentence each.
     pub(super) notes: Vec<String>,
 }
@@ -187,7 +189,8 @@ pub(super) fn oriented(path: &Path, size: Option<(usize, usize)>) -> Result<Orie
     };
     let mut notes = vec![];
     let orientation = orientation_of(path);
-    if orientation != Orientation::NoTransforms {
+    let is_turned = orientation != Orientation::NoTransforms;
+    if is_turned {
         picture.apply_orientation(orientation);
         notes.push(format!("{}: it is turned upright, as its orientation says", name_of(path)));
     }
@@ -206,7 +209,7 @@ pub(super) fn oriented(path: &Path, size: Option<(usize, usize)>) -> Result<Orie
             notes.extend(note_of(path, "channel", &["opacity".to_owned()]));
         }
     }
-    Ok(Oriented { picture, colors, notes })
+    Ok(Oriented { picture, colors, is_turned, notes })
 }
 
 /// Returns the note on colors that a display cannot show, a share of all pixels.

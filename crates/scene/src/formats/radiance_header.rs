@@ -10,8 +10,8 @@ use exr::{meta::attribute::Chromaticities, prelude::Vec2};
 use ndarray::Array2;
 
 use super::{
+    exr_colors::srgb_from,
     primaries::into_srgb,
-    spectral_exr::srgb_from,
     stated::{name_of, note_of},
     unusable::unreadable,
 };

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use ndarray::Array2;
 
 use super::{
-    reading::{DepthKind, DepthUnit},
+    reading::{DepthKind, DepthUnit, Frame},
     stated::name_of,
     unusable::unreadable,
 };
@@ -23,6 +23,8 @@ pub(super) struct RawDepth {
     pub(super) top: Option<u16>,
     /// Columns of the file, which a disparity is counted in.
     pub(super) columns: usize,
+    /// The picture of which the depths are a part, where the file tells.
+    pub(super) frame: Option<Frame>,
     pub(super) file: PathBuf,
     /// Where it is in the file, for the line of what was understood.
     pub(super) from: String,
@@ -36,6 +38,8 @@ pub(super) struct RawDepth {
 pub(super) struct DepthWords<'a> {
     pub(super) kind: Option<DepthKind>,
     pub(super) unit: Option<&'a str>,
+    /// The name of the channel or array.
+    pub(super) variable: Option<&'a str>,
     /// What the camera file says.
     pub(super) unit_m: Option<f64>,
 }
@@ -45,7 +49,7 @@ impl RawDepth {
     pub(super) fn in_file(file: &Path, from: String, values: Array2<f32>, kind: DepthKind) -> Self {
         let columns = values.ncols();
         let (unit, file) = (DepthUnit::Metres(1.0), file.to_owned());
-        Self { values, kind, unit, top: None, columns, file, from, is_picture: false, notes: vec![] }
+        Self { values, kind, unit, top: None, columns, frame: None, file, from, is_picture: false, notes: vec![] }
     }
 
     /// Takes what is said of the depth in place of what is usual.
@@ -74,6 +78,30 @@ impl RawDepth {
             expected: "px or 256/px for a disparity, m or 1000/m for an inverse distance, a length for all else"
                 .to_owned(),
         })
+    }
+
+    /// Returns the depths of so many samples at a place of a picture, where the file has depths of that picture or of a part of it; those of
+    /// another picture as they are. Where the file has none they are no numbers.
+    pub(super) fn laid_on(mut self, frame: Frame, (rows, columns): (usize, usize)) -> Self {
+        let (own_rows, own_columns) = self.values.dim();
+        let own = self.frame.unwrap_or(Frame::whole(own_rows, own_columns));
+        let is_of_frame = (own.columns, own.rows) == (frame.columns, frame.rows);
+        let is_placed = (own.x0, own.y0, own_rows, own_columns) == (frame.x0, frame.y0, rows, columns);
+        // Of a picture with more or fewer samples all of it is taken.
+        let (wanted, (rows, columns)) = match is_of_frame {
+            true if is_placed => return self,
+            true => (frame, (rows, columns)),
+            false if own.is_whole(own_rows, own_columns) => return self,
+            false => (Frame { x0: 0, y0: 0, ..own }, (own.rows, own.columns)),
+        };
+        let at = |index: usize, wanted: i64, own: i64, n: usize| {
+            usize::try_from(index as i64 + wanted - own).ok().filter(|at| *at < n)
+        };
+        self.values = Array2::from_shape_fn((rows, columns), |(row, column)| {
+            let place = at(row, wanted.y0, own.y0, own_rows).zip(at(column, wanted.x0, own.x0, own_columns));
+            place.map_or(f32::NAN, |place| self.values[place])
+        });
+        self
     }
 
     /// Returns the depths on so many samples, those of the nearest of the file's: no depth is mixed of two.

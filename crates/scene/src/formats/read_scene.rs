@@ -1,8 +1,8 @@
 //! Any file of a scene, by its name and its first bytes.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use dioptric_spectrum::{DepthMap, Quantity, SpectralImage, SpectrumError, WavelengthGrid};
+use dioptric_spectrum::{Quantity, SpectralImage, SpectrumError, WavelengthGrid};
 use ndarray::Array2;
 
 use super::{
@@ -11,7 +11,7 @@ use super::{
     chart_table::read_chart,
     contents::{Contents, Cube, Heeds, Image, is_of, pad_spectral, straightened, straightened_depth},
     cube_folder::CubeFolder,
-    depth::{depth_beside, files_beside, likely_beside, read_depth},
+    depth::depth_beside,
     envi::{contents_of_envi, header_of},
     lighting::lit,
     mat::{MatScene, read_mat},
@@ -21,17 +21,18 @@ use super::{
     panorama::look,
     pfm::read_pfm,
     picture::{Oriented, oriented, picture_size_of},
+    picture_parts::unknown_parts,
     primaries::into_srgb,
     radiance_header::RadianceHeader,
-    raw_depth::{DepthWords, RawDepth},
+    raw_depth::RawDepth,
     read_options::ReadOptions,
     reading::{DepthKind, FileQuantity, FileReading, Frame, light_unit},
     reduced::reduced_size,
+    scene_depth::{behind, depth_of, raw_depth, words},
     spectral_exr::{RawFile, RawImage, read_raw_exr},
     stated::{name_of, note_of},
     tiff_file::{TiffFile, read_tiff},
     understood::{self, Sources, bands},
-    unmeasured::{self, FillDepth},
     unusable::{starts_with, unreadable},
 };
 use crate::{HiddenLayer, Scene, SceneError, View};
@@ -86,22 +87,15 @@ pub fn read_hidden_layer(path: &Path, options: &ReadOptions, first: &Scene) -> R
     Ok(hidden)
 }
 
-/// Returns the depths of a hidden layer, where nothing is known those of the first surface.
-fn behind(file: &Path, mut z_m: Array2<f32>, first: Option<&DepthMap>) -> Result<DepthMap, SceneError> {
-    if let Some(first) = first.filter(|first| first.z_m().dim() == z_m.dim()) {
-        z_m.zip_mut_with(first.z_m(), |z, first| {
-            if *z == 0.0 || z.is_nan() {
-                *z = *first;
-            }
-        });
-    }
-    DepthMap::new(z_m).map_err(|reason| SceneError::Values { file: file.to_owned(), reason })
-}
-
 fn contents_of(path: &Path, options: &ReadOptions) -> Result<Contents, SceneError> {
     if path.is_dir() {
         if let Some(cube) = CubeFolder::find(path) {
             return cube.read(path, |face| contents_of(face, options));
+        }
+        if let Some(missing) = CubeFolder::missing(path) {
+            let reason =
+                format!("it has some faces of a cube, but of its six faces {} are missing", missing.join(", "));
+            return Err(unreadable(path, reason));
         }
         return band_folder(path, options.reading.wavelengths_nm.as_deref())?.into_contents(path, options);
     }
@@ -134,10 +128,11 @@ fn of_picture(path: &Path, options: &ReadOptions, mut notes: Vec<String>) -> Res
     let (columns, rows) = picture_size_of(path)?;
     let bands = options.grid.as_ref().map_or(31, WavelengthGrid::len);
     let reduced = reduced_size(path, options, (rows, columns), 4 * bands as u64);
-    let Oriented { picture, colors, notes: more } =
+    let Oriented { picture, colors, is_turned, notes: more } =
         oriented(path, reduced.as_ref().map(|reduced| (reduced.columns, reduced.rows)))?;
     notes.extend(more);
     notes.extend(reduced.map(|reduced| reduced.note));
+    notes.extend(note_of(path, "part", &unknown_parts(path)?));
     let what = format!("a picture as a display shows it ({})", super::picture::kind_of(&picture, colors.as_ref()));
     let image = match picture {
         dioptric_pictures::DynamicImage::ImageRgb32F(_) | dioptric_pictures::DynamicImage::ImageRgba32F(_) => {
@@ -158,7 +153,7 @@ fn of_picture(path: &Path, options: &ReadOptions, mut notes: Vec<String>) -> Res
         }
         picture => Image::Codes(picture, colors),
     };
-    Ok(Contents { notes, heeds: Heeds::Nothing, ..Contents::of(image, what) })
+    Ok(Contents { is_turned, notes, heeds: Heeds::Nothing, ..Contents::of(image, what) })
 }
 
 fn linear(planes: [Array2<f32>; 3], white_cd_m2: Option<f64>, notes: Vec<String>) -> Contents {
@@ -167,10 +162,11 @@ fn linear(planes: [Array2<f32>; 3], white_cd_m2: Option<f64>, notes: Vec<String>
 }
 
 fn of_pfm(path: &Path) -> Result<Contents, SceneError> {
-    let mut planes = read_pfm(path)?.into_iter();
+    let (planes, note) = read_pfm(path)?;
+    let (mut planes, notes) = (planes.into_iter(), note.into_iter().collect());
     Ok(match (planes.next(), planes.next(), planes.next()) {
-        (Some(r), Some(g), Some(b)) => linear([r, g, b], None, vec![]),
-        (Some(gray), ..) => linear([gray.clone(), gray.clone(), gray], None, vec![]),
+        (Some(r), Some(g), Some(b)) => linear([r, g, b], None, notes),
+        (Some(gray), ..) => linear([gray.clone(), gray.clone(), gray], None, notes),
         _ => return Err(unreadable(path, "it has no samples")),
     })
 }
@@ -189,6 +185,7 @@ fn of_tiff(path: &Path, options: &ReadOptions) -> Result<Contents, SceneError> {
                 top: stack.top,
                 wavelengths_nm: stack.wavelengths_nm,
                 quantity: None,
+                unit: None,
                 notes: stack.notes,
             };
             cube.into_contents(path, options)
@@ -205,12 +202,14 @@ fn of_npy(path: &Path, options: &ReadOptions) -> Result<Contents, SceneError> {
         .map_err(|reason| unreadable(path, reason))?;
     let note = super::axes::note(&array.sides, options.reading.axes.as_deref(), n_bands);
     let notes = note.map(|note| format!("{}: {note}", name_of(path))).into_iter().collect();
-    Cube { planes, top: array.top, wavelengths_nm: None, quantity: None, notes }.into_contents(path, options)
+    Cube { planes, top: array.top, wavelengths_nm: None, quantity: None, unit: None, notes }
+        .into_contents(path, options)
 }
 
 fn of_exr(path: &Path, options: &ReadOptions) -> Result<Contents, SceneError> {
-    let RawFile { image, depth, view, frame, panorama, light, hidden, mut notes } = read_raw_exr(path)?;
     let reading = &options.reading;
+    let told_depth = reading.depth_variable.as_deref().filter(|_| reading.depth.is_none());
+    let RawFile { image, depth, view, frame, panorama, light, hidden, mut notes } = read_raw_exr(path, told_depth)?;
     let choice = reading.no_data.unwrap_or_default();
     let view = view.map(|view| CameraData::of_view(path, view));
     let (image, what, heeds) = match image {
@@ -291,17 +290,6 @@ fn of_mat(path: &Path, options: &ReadOptions) -> Result<Contents, SceneError> {
     Ok(Contents { depth, view, light: scene.light, notes, heeds: Heeds::Nothing, ..contents })
 }
 
-/// Returns what is said of a depth, and by the camera file beside the picture.
-fn words<'a>(path: &Path, options: &'a ReadOptions) -> Result<DepthWords<'a>, SceneError> {
-    let reading = &options.reading;
-    let camera = match &reading.view {
-        Some(file) => Some(CameraData::read(file)?),
-        None => CameraData::beside(path)?,
-    };
-    let unit_m = camera.and_then(|camera| camera.depth_unit_m);
-    Ok(DepthWords { kind: reading.depth_kind, unit: reading.depth_unit.as_deref(), unit_m })
-}
-
 /// Returns the camera data of the image's own samples, and notes what else there was.
 fn camera_of(
     path: &Path,
@@ -358,59 +346,6 @@ fn camera_of(
     Ok(found)
 }
 
-/// Returns the depth as it stands in its file, on the image's samples, and notes what else there was.
-fn raw_depth(
-    path: &Path,
-    contents: &mut Contents,
-    frame: Frame,
-    options: &ReadOptions,
-) -> Result<Option<RawDepth>, SceneError> {
-    let words = words(path, options)?;
-    let (rows, columns) = contents.size();
-    let own = contents.depth.take();
-    let beside = || files_beside(path).iter().map(|file| name_of(file)).collect::<Vec<_>>();
-    let mut unused = vec![];
-    let depth = match (&options.reading.depth, own) {
-        (Some(file), own) => {
-            unused.extend(own.map(|own| own.from));
-            unused.extend(beside().into_iter().filter(|name| *name != name_of(file)));
-            Some(read_depth(file, words)?)
-        }
-        (None, Some(own)) => {
-            unused = beside();
-            Some(own.told(words)?)
-        }
-        (None, None) => depth_beside(path, words)?,
-    };
-    let is_told = words.kind.is_some() || words.unit.is_some();
-    let Some(mut depth) = depth else {
-        let likely = likely_beside(path);
-        if is_told {
-            let hint = likely.first().map_or_else(String::new, |name| format!(", as {name}"));
-            let reason = format!("it has no depth that a unit or a kind could be said of: expected --depth FILE{hint}");
-            return Err(unreadable(path, reason));
-        }
-        let note = note_of(path, "likely depth file", &likely);
-        contents.notes.extend(note.map(|note| note + ": --depth FILE names one"));
-        return Ok(None);
-    };
-    contents.notes.extend(note_of(path, "depth", &unused));
-    if options.depth_m.is_some() {
-        contents.notes.push(format!("{}: --depth-m is not used, since it has {}", name_of(path), depth.from));
-    }
-    if !frame.is_whole(rows, columns) && depth.values.dim() == (frame.rows, frame.columns) {
-        let at = |row: usize, column: usize| {
-            let (row, column) = (row as i64 + frame.y0, column as i64 + frame.x0);
-            let is_within = (0..frame.rows as i64).contains(&row) && (0..frame.columns as i64).contains(&column);
-            if is_within { depth.values[(row as usize, column as usize)] } else { f32::NAN }
-        };
-        depth.values = Array2::from_shape_fn((rows, columns), |(row, column)| at(row, column));
-    }
-    let mut depth = depth.resized(rows, columns)?;
-    contents.notes.append(&mut depth.notes);
-    Ok(Some(depth))
-}
-
 /// Lights a reflectance, moves it to the bands wanted and adds what the options give.
 fn finish(path: &Path, name: String, mut contents: Contents, options: &ReadOptions) -> Result<Scene, SceneError> {
     let whole = |contents: &Contents| {
@@ -425,24 +360,26 @@ fn finish(path: &Path, name: String, mut contents: Contents, options: &ReadOptio
     let frame = whole(&contents);
     let (rows, columns) = contents.size();
     let mut camera = camera_of(path, &mut contents, frame, options)?;
+    contents.notes.extend(note_of_turned(path, &contents, depth.as_ref(), camera.as_ref()));
     let what = match (&contents.image, options.reading.quantity) {
         (Image::Spectral(_), _) | (_, None) => contents.what.clone(),
         (_, Some(_)) => format!("{}, its colors taken for those of reflectances", contents.what),
     };
     let mut sources = Sources { what, ..Sources::default() };
     if !frame.is_whole(rows, columns) {
+        let bin = contents.part.map_or(1, |part| part.bin as i64);
         sources.what += &format!(
             ", samples {}–{} × {}–{} of {} × {}",
             frame.x0,
-            frame.x0 + columns as i64 - 1,
+            frame.x0 + bin * columns as i64 - 1,
             frame.y0,
-            frame.y0 + rows as i64 - 1,
+            frame.y0 + bin * rows as i64 - 1,
             frame.columns,
             frame.rows
         );
     }
-    // Of a picture that is larger than its samples the rest is black.
-    if let Some(place) = frame.place_of(rows, columns) {
+    // Of a picture that is larger than its samples the rest is black, but where a part of it was asked for.
+    if let Some(place) = frame.place_of(rows, columns).filter(|_| contents.part.is_none()) {
         let is_black = format!("{}: what it has no samples of is black", name_of(path));
         contents.notes.push(is_black);
         contents.image.pad(place)?;
@@ -470,6 +407,9 @@ fn finish(path: &Path, name: String, mut contents: Contents, options: &ReadOptio
             depth.values = straightened_depth(&depth.values, how);
         }
     }
+    if let Some(part) = contents.part {
+        view = view.map(|view| view.binned(part.bin));
+    }
     if let Some(view) = view {
         view.check().map_err(|error| unreadable(path, error))?;
     }
@@ -494,6 +434,8 @@ fn finish(path: &Path, name: String, mut contents: Contents, options: &ReadOptio
         }
         None => None,
     };
+    notes.extend(understood::doubt_of_reflectances(&name, &contents.image));
+    let (part, is_part_already) = (options.part, contents.part.is_some());
     let (mut radiance, light) = lit(path, contents, options, &mut notes)?;
     if let Some((how, _)) = &straight {
         if hidden.is_some() {
@@ -508,45 +450,31 @@ fn finish(path: &Path, name: String, mut contents: Contents, options: &ReadOptio
         Some(depth_m) => scene.or_flat_depth_m(depth_m)?,
         None => scene,
     };
+    if let Some(part) = part.filter(|_| !is_part_already) {
+        scene = part.of(scene)?;
+    }
     scene.validate()?;
     understood::tell(&mut scene, &sources);
     Ok(scene)
 }
 
-/// Fills depths that were not measured and takes distances from the projection center for depths along the axis; `None` for
-/// distances of samples whose directions are not known.
-fn depth_of(
-    raw: RawDepth,
-    view: Option<View>,
-    fill: Option<FillDepth>,
-    notes: &mut Vec<String>,
-) -> Result<Option<DepthMap>, SceneError> {
-    let file = &raw.file;
-    let values = |reason| SceneError::Values { file: file.clone(), reason };
-    let Some(values_m) = raw.axial_m(view)? else {
-        notes.push(format!("{}: its depth {} needs the field of view and is not used", name_of(file), raw.describe()));
-        return Ok(None);
-    };
-    let n_samples = values_m.len();
-    let Some(fill) = fill.or(raw.is_picture.then_some(FillDepth::Beside)) else {
-        check_measured(file, &values_m)?;
-        return Ok(Some(DepthMap::new(values_m).map_err(values)?));
-    };
-    let Some((z_m, n_unmeasured)) = unmeasured::filled(values_m, fill) else {
-        return Err(unreadable(file, "no sample of it has a depth"));
-    };
-    if n_unmeasured > 0 {
-        notes.push(unmeasured::note(n_unmeasured, n_samples, fill));
-    }
-    Ok(Some(DepthMap::new(z_m).map_err(values)?))
-}
-
-/// Checks that every depth was measured; what is negative is another matter.
-fn check_measured(file: &Path, z_m: &Array2<f32>) -> Result<(), SceneError> {
-    let is_unmeasured = |z: f32| z == 0.0 || z.is_nan();
-    let Some(((row, column), _)) = z_m.indexed_iter().find(|(_, z)| is_unmeasured(**z)) else { return Ok(()) };
-    let n_unmeasured = z_m.iter().filter(|z| is_unmeasured(**z)).count();
-    Err(SceneError::Unmeasured { file: PathBuf::from(file), row, column, n_unmeasured, n_samples: z_m.len() })
+/// Returns what is said of a picture that was turned upright with what is counted along its sides from other files.
+fn note_of_turned(
+    path: &Path,
+    contents: &Contents,
+    depth: Option<&RawDepth>,
+    camera: Option<&(CameraData, Option<String>)>,
+) -> Option<String> {
+    let of_depth = depth.filter(|depth| depth.file != path).map(|depth| name_of(&depth.file));
+    let of_camera = camera.and_then(|(_, from)| from.clone()).filter(|from| *from != name_of(path));
+    let others: Vec<String> = of_depth.into_iter().chain(of_camera).collect();
+    (contents.is_turned && !others.is_empty()).then(|| {
+        format!(
+            "{}: it was turned upright, and {} is taken for that of the upright picture",
+            name_of(path),
+            others.join(", ")
+        )
+    })
 }
 
 /// Returns in a sentence how the bands of a file become those wanted, where they are others.

@@ -1,7 +1,7 @@
 //! Files of every kind by their names, with depth and camera data beside them.
 
 use super::*;
-use crate::{SceneLight, write_spectral_exr};
+use crate::{FillDepth, SceneLight, write_spectral_exr};
 use approx::assert_relative_eq;
 use dioptric_spectrum::Illuminant;
 use ndarray::Array2;

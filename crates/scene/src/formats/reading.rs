@@ -46,6 +46,9 @@ pub struct FileReading {
     /// What the depth's numbers are; along the axis if left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub depth_kind: Option<DepthKind>,
+    /// The channel of an EXR file, or the array of a MATLAB, HDF5 or `.npz` file, that holds the depth.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub depth_variable: Option<String>,
     /// A file of camera data, in place of one in the scene's file or beside it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub view: Option<PathBuf>,

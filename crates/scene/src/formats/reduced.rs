@@ -28,10 +28,22 @@ pub(super) fn reduced_size(
     (rows, columns): (usize, usize),
     bytes_a_sample: u64,
 ) -> Option<Reduced> {
-    let (Some(finest), Some(fov_deg)) = (options.finest_tangent, options.horizontal_fov_deg) else { return None };
     if options.reading.depth.is_some() || !files_beside(path).is_empty() {
         return None;
     }
+    let allowed = memory::file_bytes(u64::MAX) / SHARE;
+    let takes = |block: usize| ((rows / block) as u64 * (columns / block) as u64).saturating_mul(bytes_a_sample);
+    let reduced = |block: usize, why: String| {
+        let (name, (new_rows, new_columns)) = (name_of(path), (rows / block, columns / block));
+        let note =
+            format!("{name}: its {columns} × {rows} samples are read as {new_columns} × {new_rows} means, {why}");
+        (block >= 2).then_some(Reduced { rows: new_rows, columns: new_columns, note })
+    };
+    if options.summary {
+        let block = (1..=rows.min(columns)).find(|block| takes(*block) <= allowed)?;
+        return reduced(block, "as the memory allows: --memory says how much".to_owned());
+    }
+    let (Some(finest), Some(fov_deg)) = (options.finest_tangent, options.horizontal_fov_deg) else { return None };
     let own = match options.reading.panorama {
         None => 2.0 * (0.5 * fov_deg.to_radians()).tan() / columns as f64,
         Some(Panorama::Equirectangular { .. }) => std::f64::consts::TAU / columns as f64,
@@ -42,16 +54,12 @@ pub(super) fn reduced_size(
     // Whole numbers of samples, of which some blocks may have one more.
     let finer = ((finest / own) as usize).clamp(1, most);
     let coarsest = ((COARSEST * finest / own) as usize).clamp(1, most);
-    let takes = |block: usize| ((rows / block) as u64 * (columns / block) as u64).saturating_mul(bytes_a_sample);
-    let allowed = memory::file_bytes(u64::MAX) / SHARE;
     let block = (finer..=coarsest.max(finer)).find(|block| takes(*block) <= allowed).unwrap_or(coarsest.max(finer));
     let why = match (block > finer, COARSEST * finest / own / block as f64) {
         (false, _) => "finer than those of the film by far".to_owned(),
         (true, a_pixel) => format!("{a_pixel:.1} a pixel of the film, as the memory allows: --memory says how much"),
     };
-    let (name, (new_rows, new_columns)) = (name_of(path), (rows / block, columns / block));
-    let note = format!("{name}: its {columns} × {rows} samples are read as {new_columns} × {new_rows} means, {why}");
-    (block >= 2).then_some(Reduced { rows: new_rows, columns: new_columns, note })
+    reduced(block, why)
 }
 
 /// Returns the block in which a sample lies, `n` of which are made of `own` samples.

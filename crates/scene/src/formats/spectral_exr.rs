@@ -2,7 +2,7 @@
 
 use std::{collections::HashMap, fs::File, io::BufReader, path::Path};
 
-use dioptric_spectrum::{DepthMap, Quantity, SpectralImage, WavelengthGrid, Xyz, adapt_bradford};
+use dioptric_spectrum::{DepthMap, Quantity, SpectralImage, WavelengthGrid};
 use exr::{
     meta::{
         MetaData,
@@ -10,12 +10,13 @@ use exr::{
     },
     prelude::{AnyChannel, AnyChannels, FlatSamples, Layer, ReadChannels, ReadLayers, SampleType, read},
 };
-use glam::{DMat3, DVec3};
 use ndarray::Array2;
 
 use super::{
     band_name::{self, BandKind},
     exr_attributes::{self, Attributes},
+    exr_colors::{are_srgb, colors_of, srgb_from},
+    exr_depth,
     light_unit::LightUnit,
     primaries::into_srgb,
     raw_depth::RawDepth,
@@ -75,7 +76,7 @@ pub(super) fn axial(distance_m: &Array2<f32>, view: View) -> Array2<f32> {
 /// One sentence with the file's name when it is truncated, too large, without spectral bands, of mixed units, or holds
 /// a sample that is not finite or is negative.
 pub fn read_spectral_exr(path: &Path) -> Result<SpectralFile, SceneError> {
-    let RawFile { image, depth, view, hidden, panorama, .. } = read_raw_exr(path)?;
+    let RawFile { image, depth, view, hidden, panorama, .. } = read_raw_exr(path, None)?;
     if panorama.is_some() {
         return Err(unreadable(path, "it is an environment map, expected a picture in perspective"));
     }
@@ -131,9 +132,11 @@ pub(super) enum RawImage {
 
 /// Reads an EXR file of bands or, where it has none, of red, green and blue.
 ///
-/// Bands may be in a part each. The depth is `Z`, or that of the view layer whose colors are taken (`….Depth.Z`), or `distance`.
-pub(super) fn read_raw_exr(path: &Path) -> Result<RawFile, SceneError> {
+/// Bands may be in a part each. The depth is the channel told, or `Z`, or that of the view layer whose colors are taken (`….Depth.Z`), or
+/// `distance`. Of several views (stereo) the first is taken.
+pub(super) fn read_raw_exr(path: &Path, told_depth: Option<&str>) -> Result<RawFile, SceneError> {
     let (head, mut layers) = read_layers(path)?;
+    let other_views = leave_other_views(&mut layers);
     let hidden = layers.iter().position(|layer| layer.name == HIDDEN_LAYER && layer.has_bands());
     let hidden = hidden.filter(|_| layers.len() > 1).map(|index| layers.remove(index));
     let panorama = match layers.iter().find_map(|layer| layer.attributes.environment) {
@@ -141,7 +144,7 @@ pub(super) fn read_raw_exr(path: &Path) -> Result<RawFile, SceneError> {
         Some(EnvironmentMap::LatitudeLongitude) => Some(Panorama::Equirectangular { yaw_deg: 0.0, pitch_deg: 0.0 }),
         Some(EnvironmentMap::Cube) => Some(Panorama::Cube { yaw_deg: 0.0, pitch_deg: 0.0 }),
     };
-    let mut notes = vec![];
+    let mut notes: Vec<String> = note_of(path, "view", &other_views).into_iter().collect();
     if let Some(Panorama::Equirectangular { .. }) = panorama {
         let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
         notes.push(format!(
@@ -152,9 +155,8 @@ pub(super) fn read_raw_exr(path: &Path) -> Result<RawFile, SceneError> {
     let mut first = layers.remove(index.unwrap_or(0));
     let (size, position) = (first.size, first.position);
     let attributes = first.attributes.clone();
-    notes.extend(attributes.others.clone().note(path, exr_attributes::is_harmless));
     // Parts of the same samples belong to one picture; of others, and of bands that are there already, the names are told.
-    let mut unused = vec![];
+    let (mut unused, mut stated) = (vec![], attributes.others.clone());
     if index.is_none() {
         first.name_channels();
     }
@@ -166,13 +168,19 @@ pub(super) fn read_raw_exr(path: &Path) -> Result<RawFile, SceneError> {
         if repeats || (layer.size, layer.position) != (size, position) {
             unused.push(layer.name);
         } else {
+            if layer.has_bands() && layer.attributes.unit != attributes.unit {
+                let reason = format!("its part '{}' states another emissiveUnits than the first", layer.name);
+                return Err(SceneError::Units { file: path.to_owned(), reason });
+            }
+            stated.merge(layer.attributes.others.clone());
             layer.name_channels();
             first.planes.append(&mut layer.planes);
         }
     }
+    notes.extend(stated.note(path, exr_attributes::is_harmless));
     notes.extend(note_of(path, "part", &unused));
     let (rows, columns) = size;
-    let frame = Frame { x0: position.0 - head.display.0, y0: position.1 - head.display.1, ..head.frame };
+    let frame = head.frame_of(position);
     let view = attributes.view(columns, rows).map_err(|error| unreadable(path, error))?;
     let light =
         attributes.light.clone().map_err(|reason| unreadable(path, format!("its sceneLight cannot be: {reason}")))?;
@@ -197,8 +205,17 @@ pub(super) fn read_raw_exr(path: &Path) -> Result<RawFile, SceneError> {
         channels.take_all(|name| ["R", "G", "B"].contains(&name));
         (RawImage::Spectral { image, is_unit_stated }, String::new())
     };
-    let depth = depth_name(channels.names(), &prefix).and_then(|(name, kind)| {
+    let depth_name = match told_depth {
+        None => exr_depth::depth_name(channels.names(), &prefix),
+        Some(told) if channels.get(told).is_some() => Some((told.to_owned(), exr_depth::kind_of(told))),
+        Some(told) => {
+            let names = channels.names().collect::<Vec<_>>().join(", ");
+            return Err(unreadable(path, format!("it has no channel '{told}' for its depth, expected one of {names}")));
+        }
+    };
+    let depth = depth_name.and_then(|(name, kind)| {
         let values = channels.take(&name)?;
+        notes.extend(exr_depth::note_of_kind(path, &name));
         Some(RawDepth::in_file(path, format!("channel '{name}'"), values, kind))
     });
     // Opacity of 1 everywhere is none.
@@ -221,103 +238,21 @@ pub(super) fn read_raw_exr(path: &Path) -> Result<RawFile, SceneError> {
     Ok(RawFile { image, depth, view, frame, panorama, light, hidden, notes })
 }
 
-/// Takes red, green and blue: `R`, `G` and `B`, or those of a layer, Blender's `….Combined` before others; or gray, `Y`. Returns
-/// them with what stands before their letters.
-fn colors_of(channels: &mut Stated<Array2<f32>>) -> Option<(String, [Array2<f32>; 3])> {
-    let names: Vec<String> = channels.names().map(str::to_owned).collect();
-    let full =
-        |prefix: &str, letter: &str| if prefix.is_empty() { letter.to_owned() } else { format!("{prefix}.{letter}") };
-    let prefixes: Vec<&str> = names
-        .iter()
-        .filter_map(|name| match name.as_str() {
-            "R" => Some(""),
-            name => name.strip_suffix(".R"),
-        })
-        .filter(|prefix| ["G", "B"].iter().all(|letter| names.contains(&full(prefix, letter))))
-        .collect();
-    let last = |prefix: &str| prefix.rsplit('.').next().unwrap_or_default().to_ascii_lowercase();
-    let is_beauty =
-        |prefix: &&&str| ["combined", "rgb", "rgba", "color", "beauty", "image"].contains(&last(prefix).as_str());
-    let prefix = prefixes.iter().find(|prefix| prefix.is_empty()).or_else(|| prefixes.iter().find(is_beauty));
-    let prefix = prefix.or_else(|| prefixes.first().filter(|_| prefixes.len() == 1)).map(|prefix| (*prefix).to_owned());
-    if let Some(prefix) = prefix {
-        let mut take = |letter| channels.take(&full(&prefix, letter));
-        let planes = [take("R")?, take("G")?, take("B")?];
-        return Some((prefix, planes));
+/// Leaves the layers of the first view, and those of none, and returns the names of the other views.
+fn leave_other_views(layers: &mut Vec<RawLayer>) -> Vec<String> {
+    let first = layers.iter().find_map(|layer| layer.view.clone());
+    let is_other = |layer: &RawLayer| layer.view.is_some() && layer.view != first;
+    let mut others: Vec<String> =
+        layers.iter().filter(|layer| is_other(layer)).filter_map(|layer| layer.view.clone()).collect();
+    others.dedup();
+    layers.retain(|layer| !is_other(layer));
+    // Parts of a view are named after it, as `left` or `depth.left`, which its channels need not be.
+    for layer in layers.iter_mut() {
+        let Some(view) = &layer.view else { continue };
+        let rest = layer.name.strip_suffix(view.as_str()).map(|rest| rest.trim_end_matches(['.', '_']).to_owned());
+        layer.name = rest.unwrap_or_else(|| layer.name.clone());
     }
-    let has_chroma = ["RY", "BY"].iter().any(|name| channels.get(name).is_some());
-    let gray = if has_chroma { None } else { channels.take("Y") }?;
-    Some((String::new(), [gray.clone(), gray.clone(), gray]))
-}
-
-/// Returns the channel of depth that belongs to the colors of a layer, and what it counts.
-fn depth_name<'a>(names: impl Iterator<Item = &'a str>, prefix: &str) -> Option<(String, DepthKind)> {
-    let names: Vec<&str> = names.collect();
-    let mut wanted = vec![];
-    if let Some(layer) = prefix.strip_suffix("Combined") {
-        wanted.extend(["Z", "V"].map(|letter| format!("{layer}Depth.{letter}")));
-    } else if !prefix.is_empty() {
-        wanted.push(format!("{prefix}.Z"));
-    }
-    wanted.extend(["Z", "depth.Z", "Depth.Z", "depth.V", "Depth.V", "depth.Y", "Depth.Y"].map(str::to_owned));
-    if let Some(name) = wanted.into_iter().find(|name| names.contains(&name.as_str())) {
-        return Some((name, DepthKind::Axial));
-    }
-    if prefix.is_empty() {
-        let is_depth = |name: &&&str| name.ends_with(".Depth.Z") || name.ends_with(".Depth.V");
-        let found: Vec<&&str> = names.iter().filter(is_depth).collect();
-        if let [one] = found[..] {
-            return Some(((*one).to_owned(), DepthKind::Axial));
-        }
-    }
-    names.contains(&"distance").then(|| ("distance".to_owned(), DepthKind::Radial))
-}
-
-/// Returns the channel of depth of a file of depth alone, with its name and the names of the others.
-pub(super) fn depth_channel(planes: Vec<(String, Array2<f32>)>) -> Option<(String, Array2<f32>, Vec<String>)> {
-    let mut channels = Stated::new("channel", planes);
-    let only = || {
-        let names: Vec<&str> = channels.names().collect();
-        match names[..] {
-            [one] => Some(one.to_owned()),
-            // A gray picture that was saved as a colored one.
-            _ if ["R", "G", "B"].iter().all(|name| names.contains(name)) => Some("R".to_owned()),
-            _ => None,
-        }
-    };
-    let name = depth_name(channels.names(), "").map(|(name, _)| name).or_else(only)?;
-    let plane = channels.take(&name)?;
-    if name == "R" {
-        let is_same = |own: Option<&Array2<f32>>| own == Some(&plane);
-        if !(is_same(channels.get("G")) && is_same(channels.get("B"))) {
-            return None;
-        }
-        channels.take_all(|name| name == "G" || name == "B");
-    }
-    let others = channels.names().filter(|name| *name != "A").map(str::to_owned).collect();
-    Some((name, plane, others))
-}
-
-/// Returns the matrix from colors of these primaries to linear sRGB, their white adapted to D65 (Bradford).
-pub(super) fn srgb_from(own: &Chromaticities) -> Option<[[f64; 3]; 3]> {
-    let xyz = |p: exr::prelude::Vec2<f32>| {
-        let (x, y) = (f64::from(p.0), f64::from(p.1));
-        let is_color = x.is_finite() && y.is_finite() && y.abs() > 1e-6;
-        is_color.then(|| [x / y, 1.0, (1.0 - x - y) / y])
-    };
-    let [r, g, b, w] = [xyz(own.red)?, xyz(own.green)?, xyz(own.blue)?, xyz(own.white)?];
-    let primaries = DMat3::from_cols(DVec3::from(r), DVec3::from(g), DVec3::from(b));
-    if primaries.determinant().abs() < 1e-9 || w.iter().any(|v| *v <= 0.0) {
-        return None;
-    }
-    let shares = primaries.inverse() * DVec3::from(w);
-    let d65 = Xyz::from_linear_srgb([1.0; 3]);
-    let columns = [r, g, b]
-        .into_iter()
-        .zip(shares.to_array())
-        .map(|(primary, share)| adapt_bradford(Xyz(primary.map(|v| v * share)), Xyz(w), d65).to_linear_srgb());
-    let columns: Vec<[f64; 3]> = columns.collect();
-    Some([0, 1, 2].map(|i| [columns[0][i], columns[1][i], columns[2][i]]))
+    others
 }
 
 /// Reads every channel of an EXR file's first layer as single floats, by name.
@@ -342,6 +277,19 @@ pub(super) fn read_planes_and_primaries_exr(path: &Path) -> Result<PlanesAndPrim
     Ok((layer.planes, matrix))
 }
 
+/// Reads all channels of all layers as single floats, by name, each with the part of the display window that it has.
+pub(super) fn read_placed_planes(path: &Path) -> Result<Vec<(String, Array2<f32>, Frame)>, SceneError> {
+    let (head, mut layers) = read_layers(path)?;
+    if layers.len() > 1 {
+        layers.iter_mut().for_each(RawLayer::name_channels);
+    }
+    let placed = |layer: RawLayer| {
+        let frame = head.frame_of(layer.position);
+        layer.planes.into_iter().map(move |(name, plane)| (name, plane, frame))
+    };
+    Ok(layers.into_iter().flat_map(placed).collect())
+}
+
 /// What a file states of all its layers.
 struct Head {
     /// The display window's first column and row.
@@ -352,9 +300,18 @@ struct Head {
     chromaticities: Option<Chromaticities>,
 }
 
+impl Head {
+    /// The display window, and where in it samples at this position begin.
+    fn frame_of(&self, position: (i64, i64)) -> Frame {
+        Frame { x0: position.0 - self.display.0, y0: position.1 - self.display.1, ..self.frame }
+    }
+}
+
 /// A layer, its channels as single floats.
 struct RawLayer {
     name: String,
+    /// Which of several eyes sees it.
+    view: Option<String>,
     attributes: Attributes,
     planes: Vec<(String, Array2<f32>)>,
     /// Rows and columns.
@@ -368,6 +325,12 @@ impl RawLayer {
     fn name_channels(&mut self) {
         if band_name::parse(&self.name).is_some() && self.planes.len() == 1 {
             self.planes[0].0.clone_from(&self.name);
+            return;
+        }
+        // A part that is called as its channel is.
+        if let [(name, _)] = &self.planes[..]
+            && name.eq_ignore_ascii_case(&self.name)
+        {
             return;
         }
         let layer = self.name.as_str();
@@ -466,13 +429,6 @@ fn read_layers(path: &Path) -> Result<(Head, Vec<RawLayer>), SceneError> {
     Ok((head, layers))
 }
 
-/// Whether primaries and white are those of sRGB, to the digits that writers have.
-fn are_srgb(own: &Chromaticities) -> bool {
-    let pairs =
-        [(own.red, [0.64, 0.33]), (own.green, [0.30, 0.60]), (own.blue, [0.15, 0.06]), (own.white, [0.3127, 0.329])];
-    pairs.iter().all(|(own, srgb)| (own.0 - srgb[0]).abs() < 1e-3 && (own.1 - srgb[1]).abs() < 1e-3)
-}
-
 fn raw_layer(path: &Path, layer: Layer<AnyChannels<FlatSamples>>) -> Result<RawLayer, SceneError> {
     let (columns, rows) = (layer.size.0, layer.size.1);
     let planes: Result<Vec<_>, _> =
@@ -482,6 +438,7 @@ fn raw_layer(path: &Path, layer: Layer<AnyChannels<FlatSamples>>) -> Result<RawL
         size: (rows, columns),
         position: (position.0.into(), position.1.into()),
         name: layer.attributes.layer_name.as_ref().map(ToString::to_string).unwrap_or_default(),
+        view: layer.attributes.view_name.as_ref().map(ToString::to_string),
         attributes: exr_attributes::from_layer(&layer.attributes),
         planes: planes?,
     })
@@ -530,72 +487,4 @@ fn explain(error: &exr::error::Error) -> String {
         return "the file ends too early (truncated)".to_owned();
     }
     format!("no OpenEXR file that can be read ({text})")
-}
-
-#[cfg(test)]
-mod tests {
-    use approx::assert_abs_diff_eq;
-    use exr::prelude::Vec2;
-
-    use super::*;
-
-    #[test]
-    fn acescg_becomes_srgb_by_the_published_matrix() {
-        let ap1 = Chromaticities {
-            red: Vec2(0.713, 0.293),
-            green: Vec2(0.165, 0.830),
-            blue: Vec2(0.128, 0.044),
-            white: Vec2(0.32168, 0.33767),
-        };
-        // AP1 to linear Rec. 709 with Bradford's adaptation, as the ACES documents and colour-science give it.
-        let published = [[1.70505, -0.62179, -0.08326], [-0.13026, 1.14080, -0.01055], [-0.02400, -0.12897, 1.15297]];
-        for (row, expected) in srgb_from(&ap1).unwrap().iter().zip(published) {
-            for (value, expected) in row.iter().zip(expected) {
-                // Four digits of the chromaticities.
-                assert_abs_diff_eq!(*value, expected, epsilon = 3e-4);
-            }
-        }
-        let srgb = Chromaticities {
-            red: Vec2(0.64, 0.33),
-            green: Vec2(0.30, 0.60),
-            blue: Vec2(0.15, 0.06),
-            white: Vec2(0.3127, 0.3290),
-        };
-        assert!(are_srgb(&srgb) && !are_srgb(&ap1));
-        assert!(srgb_from(&Chromaticities { red: srgb.green, ..srgb }).is_none());
-    }
-
-    #[test]
-    fn depth_is_that_of_the_colors() {
-        let check = |names: &[&str], prefix: &str, expected: Option<&str>| {
-            let found = depth_name(names.iter().copied(), prefix).map(|(name, _)| name);
-            assert_eq!(found.as_deref(), expected, "{names:?}");
-        };
-        check(&["A.Depth.Z", "B.Depth.Z"], "B.Combined", Some("B.Depth.Z"));
-        check(&["A.Depth.Z", "B.Denoising Depth.Z"], "B.Combined", None);
-        check(&["V.Denoising Depth.Z", "V.Depth.V"], "V.Combined", Some("V.Depth.V"));
-        check(&["A.Depth.Z", "B.Depth.Z"], "", None);
-        check(&["A.Depth.Z", "A.Noisy.R"], "", Some("A.Depth.Z"));
-        check(&["distance", "Z"], "", Some("Z"));
-    }
-
-    #[test]
-    fn colors_are_the_picture_not_another_pass() {
-        let take = |names: &[&str]| {
-            let planes = names.iter().map(|name| ((*name).to_owned(), Array2::zeros((1, 1)))).collect();
-            let mut channels = Stated::new("channel", planes);
-            colors_of(&mut channels)
-                .map(|(prefix, _)| (prefix, channels.names().map(str::to_owned).collect::<Vec<_>>()))
-        };
-        let pass = |pass: &str| ["R", "G", "B"].map(|letter| format!("{pass}.{letter}"));
-        let both = [pass("V.Noisy Image"), pass("V.Combined")].concat();
-        let names: Vec<&str> = both.iter().map(String::as_str).collect();
-        let (prefix, left) = take(&names).unwrap();
-        assert_eq!((prefix.as_str(), left.len()), ("V.Combined", 3));
-        assert_eq!(take(&["Y"]).unwrap().0, "");
-        assert!(take(&["Y", "RY", "BY"]).is_none() && take(&["R", "G"]).is_none());
-        // Of two passes neither of which is called a picture none is chosen.
-        let two = [pass("x"), pass("y")].concat();
-        assert!(take(&two.iter().map(String::as_str).collect::<Vec<_>>()).is_none());
-    }
 }

@@ -46,6 +46,12 @@ impl<T> Stated<T> {
         taken
     }
 
+    /// Adds entries of names that it does not have.
+    pub(super) fn merge(&mut self, other: Self) {
+        let new = other.entries.into_iter().filter(|(name, _)| self.entries.iter().all(|(own, _)| own != name));
+        self.entries.extend(new.collect::<Vec<_>>());
+    }
+
     pub(super) fn get(&self, name: &str) -> Option<&T> {
         self.entries.iter().find(|(own, _)| own == name).map(|(_, value)| value)
     }

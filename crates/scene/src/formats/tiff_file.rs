@@ -72,6 +72,11 @@ pub(super) fn read_tiff(path: &Path) -> Result<TiffFile, SceneError> {
         if index > LIMIT_PAGES {
             return Err(wrong(format!("it has more than {LIMIT_PAGES} pages")));
         }
+        if page.has_inks {
+            return Err(wrong(
+                "it holds inks (CMYK), expected gray or red, green and blue; convert it to sRGB".to_owned(),
+            ));
+        }
         unknown.extend(page.unknown.iter().map(ToString::to_string));
         let is_like = pages.first().is_none_or(|first| first.size == page.size && first.n_samples == page.n_samples);
         if page.is_reduced || (!is_like && !pages[0].is_stack()) {
@@ -80,7 +85,10 @@ pub(super) fn read_tiff(path: &Path) -> Result<TiffFile, SceneError> {
             pages.push(page);
         } else {
             let of = |page: &Page| format!("{} × {} samples", page.size.0, page.size.1);
-            return Err(wrong(format!("its page {index} is {}, its first {}", of(&page), of(&pages[0]))));
+            let (own, first) = (of(&page), of(&pages[0]));
+            return Err(wrong(format!(
+                "its page {index} is {own}, its first {first}: expected pages of one size, a band each"
+            )));
         }
         if !decoder.more_images() {
             break;
@@ -112,6 +120,14 @@ pub(super) fn read_tiff(path: &Path) -> Result<TiffFile, SceneError> {
             ));
         }
         decoder.seek_to_image(page.index).map_err(broken)?;
+        if page.is_colored && page.n_samples > 4 {
+            // What decodes it knows of red, green, blue and opacity alone.
+            let n = page.n_samples;
+            return Err(wrong(format!(
+                "its {n} samples a pixel are marked as red, green, blue and others, which it cannot be decoded as: expected them marked as gray \
+                 (minisblack), or a page a band"
+            )));
+        }
         planes.extend(planes_of(&mut decoder, page).map_err(broken)?);
     }
     if is_linear {
@@ -151,6 +167,7 @@ struct Page {
     depth: SampleDepth,
     bits: u8,
     is_colored: bool,
+    has_inks: bool,
     is_reduced: bool,
     has_tiles_of_planes: bool,
     name: Option<String>,
@@ -186,7 +203,8 @@ impl Page {
                 _ => SampleDepth::Unsigned(bits),
             },
             bits,
-            is_colored: matches!(photometric, 2 | 3 | 5 | 6),
+            is_colored: matches!(photometric, 2 | 3 | 6),
+            has_inks: photometric == 5,
             is_reduced: kind & 1 != 0,
             has_tiles_of_planes,
             name,

@@ -1,9 +1,10 @@
 //! One line of what was understood of a file, and questions about scenes that cannot be.
 
-use dioptric_spectrum::{DepthMap, Observer, SpectralImage, WavelengthGrid};
+use dioptric_spectrum::{DepthMap, Observer, Quantity, SpectralImage, WavelengthGrid};
 use ndarray::Array2;
 use rayon::prelude::*;
 
+use super::contents::Image;
 use crate::{Scene, View};
 
 /// Luminances of scenes, cd/m²: starlight on a dark wall to the disc of the sun.
@@ -83,6 +84,28 @@ fn doubts(scene: &Scene, luminances: Option<[f64; 2]>) -> Vec<String> {
     doubts
 }
 
+/// Reflectances above which even a mirror or a fluorescent dye hardly is, and the share of samples of which no more are.
+const LIKELY_REFLECTANCE: f32 = 2.0;
+const LIKELY_SHARE: f64 = 0.01;
+
+/// Returns a question about reflectances that are more than white, such as those in percent.
+pub(super) fn doubt_of_reflectances(name: &str, image: &Image) -> Option<String> {
+    let Image::Spectral(image) = image else { return None };
+    if image.quantity() != Quantity::Reflectance {
+        return None;
+    }
+    let n = image.planes().iter().map(Array2::len).sum::<usize>().max(1);
+    let n_above: usize =
+        image.planes().par_iter().map(|plane| plane.iter().filter(|v| **v > LIKELY_REFLECTANCE).count()).sum();
+    let sum: f64 = image.planes().par_iter().map(|plane| plane.iter().map(|v| f64::from(*v)).sum::<f64>()).sum();
+    (n_above as f64 > LIKELY_SHARE * n as f64).then(|| {
+        format!(
+            "{name}: does it really reflect {} times as much as a perfect white, on average? Percent are --white-level 100 or --scale 0.01",
+            digits(sum / n as f64)
+        )
+    })
+}
+
 /// Returns bands in words.
 pub(super) fn bands(grid: &WavelengthGrid) -> String {
     let (first, last) = grid.range_nm();
@@ -154,9 +177,19 @@ fn digits(value: f64) -> String {
 
 #[cfg(test)]
 mod tests {
-    use dioptric_spectrum::Quantity;
-
     use super::*;
+
+    #[test]
+    fn reflectances_in_percent_are_asked_about() {
+        let of = |quantity, value: f32| {
+            let grid = WavelengthGrid::new(vec![450.0, 550.0]).unwrap();
+            Image::Spectral(SpectralImage::new(quantity, grid, vec![Array2::from_elem((4, 5), value); 2]).unwrap())
+        };
+        let doubt = doubt_of_reflectances("a.csv", &of(Quantity::Reflectance, 48.0)).unwrap();
+        assert!(doubt.contains("48.0 times") && doubt.contains("--scale 0.01"), "{doubt}");
+        assert_eq!(doubt_of_reflectances("a.csv", &of(Quantity::Reflectance, 1.2)), None);
+        assert_eq!(doubt_of_reflectances("a.csv", &of(Quantity::Radiance, 48.0)), None);
+    }
 
     fn scene(radiance: f32) -> Scene {
         let grid = WavelengthGrid::uniform(400.0, 700.0, 10.0).unwrap();

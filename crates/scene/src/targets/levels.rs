@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use ab_glyph::{Font, FontRef, PxScale, ScaleFont, point};
+use ab_glyph::{Font, FontRef, GlyphId, PxScale, ScaleFont, point};
 use ndarray::Array2;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -13,10 +13,15 @@ use crate::SceneError;
 /// Letters that a target may have: more would be written beyond any of its edges.
 const MOST_LETTERS: usize = 1000;
 
+/// Cycles a sample from which on a wave would be drawn as another, coarser one.
+const FINEST: f64 = 0.5;
+/// Lines closer than this, in samples, would be drawn as others.
+const CLOSEST_PX: f64 = 2.0;
+
 /// Returns what each sample reflects, as a share of white: the mean over its square.
 ///
-/// Waves are integrated exactly over it, but for those of a Gabor patch, a sweep and a zone plate, which are looked up at the points of
-/// the target's supersampling.
+/// Waves and lines are integrated over it; where a sweep or a zone plate changes its frequency within a sample, with that of the sample's
+/// middle. What is finer than two samples a cycle has its mean, so that it never shows as something coarser: see [`unresolved`].
 pub(super) fn reflectance(target: &Target) -> Array2<f64> {
     let (rows, columns) = (target.rows, target.columns);
     match &target.pattern {
@@ -31,6 +36,24 @@ pub(super) fn reflectance(target: &Target) -> Array2<f64> {
             Array2::from_shape_fn((rows, columns), |(row, column)| cells[(row / cell_px, column / cell_px)])
         }
         Pattern::Letters { text, height_px } => letters(text, *height_px, rows, columns),
+        Pattern::Lines { spacing_px, width_px, angle_deg } => {
+            Array2::from_shape_fn((rows, columns), |(row, column)| {
+                let (y, x) = from_center(target, row as f64, column as f64);
+                covered(across(*angle_deg, y, x), *angle_deg, [*spacing_px, *width_px])
+            })
+        }
+        Pattern::Grid { spacing_px, width_px } => Array2::from_shape_fn((rows, columns), |(row, column)| {
+            let (y, x) = from_center(target, row as f64, column as f64);
+            // Upright and level lines cover their shares of a sample independently.
+            let [upright, level] = [x, y].map(|at| covered(at, 0.0, [*spacing_px, *width_px]));
+            upright + level - upright * level
+        }),
+        Pattern::Gabor { .. } | Pattern::Sweep { .. } | Pattern::ZonePlate { .. } => {
+            Array2::from_shape_fn((rows, columns), |(row, column)| {
+                let (y, x) = from_center(target, row as f64, column as f64);
+                level(target, y, x)
+            })
+        }
         _ => Array2::from_shape_fn((rows, columns), |(row, column)| {
             let n = target.supersampling;
             let points = sample_points(n, row, column);
@@ -58,44 +81,113 @@ fn across(angle_deg: f64, y: f64, x: f64) -> f64 {
 
 /// Returns the mean of a wave over the square of a sample, times its contrast.
 fn averaged(wave: &Wave, columns: usize, y: f64, x: f64) -> f64 {
-    let turns = TAU * wave.cycles / columns as f64;
+    let cycles = wave.cycles / columns as f64;
     let (sin, cos) = wave.angle_deg.to_radians().sin_cos();
-    let sinc = |half: f64| if half == 0.0 { 1.0 } else { half.sin() / half };
-    let blur = sinc(0.5 * turns * cos) * sinc(0.5 * turns * sin);
-    wave.contrast * blur * (turns * across(wave.angle_deg, y, x) + wave.phase_deg.to_radians()).cos()
+    let phase = TAU * cycles * across(wave.angle_deg, y, x) + wave.phase_deg.to_radians();
+    wave.contrast * mean_of_wave(phase, [cycles * cos, cycles * sin])
 }
 
-/// Returns the share of white at a point.
+/// Returns the mean of a wave over the square of a sample that has a phase in its middle and so many cycles a sample across and down; 0 of one
+/// that is too fine for samples.
+fn mean_of_wave(phase: f64, cycles: [f64; 2]) -> f64 {
+    if cycles.iter().any(|cycles| cycles.abs() > FINEST) {
+        return 0.0;
+    }
+    let sinc = |cycles: f64| {
+        let half = 0.5 * TAU * cycles;
+        if half == 0.0 { 1.0 } else { half.sin() / half }
+    };
+    sinc(cycles[0]) * sinc(cycles[1]) * phase.cos()
+}
+
+/// Returns the share of a sample that lines cover whose middles are so far apart and that are so wide; the sample's middle is so far from that
+/// of one of them.
+fn covered(at_px: f64, angle_deg: f64, [spacing_px, width_px]: [f64; 2]) -> f64 {
+    if spacing_px < CLOSEST_PX {
+        return width_px / spacing_px;
+    }
+    // The square seen along the lines: a trapezoid whose half widths at its foot and at its top are the sum and the difference of these.
+    let (sin, cos) = angle_deg.to_radians().sin_cos();
+    let (long, short) = (0.5 * sin.abs().max(cos.abs()), 0.5 * sin.abs().min(cos.abs()));
+    let (foot, top) = (long + short, long - short);
+    // What of it lies before a place, of its area of 1.
+    let before = |u: f64| {
+        let inside = u.clamp(-foot, foot);
+        let half = inside.abs();
+        let area = if half <= top {
+            half / (2.0 * long)
+        } else {
+            0.5 - (foot - half).powi(2) / (8.0 * long * short).max(f64::MIN_POSITIVE)
+        };
+        0.5 + area.copysign(inside)
+    };
+    let first = ((at_px - foot - 0.5 * width_px) / spacing_px).ceil() as i64;
+    let last = ((at_px + foot + 0.5 * width_px) / spacing_px).floor() as i64;
+    let share = |line: i64| {
+        let from_middle = line as f64 * spacing_px - at_px;
+        before(from_middle + 0.5 * width_px) - before(from_middle - 0.5 * width_px)
+    };
+    (first..=last).map(share).fold(0.0, |sum, share| sum + share).clamp(0.0, 1.0)
+}
+
+/// Returns what of a pattern the samples of a target are too few for, in a sentence.
+pub(super) fn unresolved(target: &Target) -> Option<String> {
+    let columns = target.columns as f64;
+    let is_fine = |wave: &Wave| {
+        let (sin, cos) = wave.angle_deg.to_radians().sin_cos();
+        wave.contrast > 0.0 && wave.cycles * sin.abs().max(cos.abs()) > FINEST * columns
+    };
+    let needs = |cycles: f64| (cycles / FINEST).ceil();
+    let (what, wanted) = match &target.pattern {
+        Pattern::Harmonics { waves } => {
+            let finest = waves.iter().filter(|wave| is_fine(wave)).map(|wave| wave.cycles).fold(0.0, f64::max);
+            (finest > 0.0).then_some(("waves", needs(finest)))
+        }
+        Pattern::Gabor { wave, .. } => is_fine(wave).then_some(("wave", needs(wave.cycles))),
+        Pattern::Sweep { first_cycles, last_cycles, .. } => {
+            let finest = first_cycles.max(*last_cycles);
+            (finest > FINEST * columns).then_some(("finest waves", needs(finest)))
+        }
+        Pattern::ZonePlate { edge_cycles, .. } => {
+            // The frequency grows on towards the upper and lower edges of what is higher than wide.
+            let finest = edge_cycles * (target.rows as f64 / columns).max(1.0);
+            (finest > FINEST * columns).then_some(("outer rings", needs(finest)))
+        }
+        Pattern::Lines { spacing_px, .. } | Pattern::Grid { spacing_px, .. } if *spacing_px < CLOSEST_PX => {
+            let what = "lines are closer than two samples and become their mean: expected a spacing of 2 or more";
+            return Some(format!("its {what}"));
+        }
+        Pattern::Ramp { steps, .. } if *steps as f64 > columns => Some(("steps", *steps as f64)),
+        _ => None,
+    }?;
+    let columns = target.columns;
+    Some(format!(
+        "its {what} are too fine for {columns} columns and become their mean: {wanted} or more would show them"
+    ))
+}
+
+/// Returns the share of white at a point, of a wave its mean over the sample around it.
 fn level(target: &Target, y: f64, x: f64) -> f64 {
     let width = target.columns as f64;
-    let on_line = |at: f64, spacing: f64, line: f64| {
-        let from_line = (at + 0.5 * spacing).rem_euclid(spacing) - 0.5 * spacing;
-        from_line.abs() <= 0.5 * line
-    };
     // From the left edge, 0 to 1.
     let along = (x / width + 0.5).clamp(0.0, 1.0);
     match target.pattern {
         Pattern::Gabor { wave, sigma } => {
             let window = (-0.5 * (x * x + y * y) / (sigma * width).powi(2)).exp();
-            let phase = TAU * wave.cycles / width * across(wave.angle_deg, y, x) + wave.phase_deg.to_radians();
-            0.5 + 0.5 * wave.contrast * window * phase.cos()
-        }
-        Pattern::Lines { spacing_px, width_px, angle_deg } => {
-            f64::from(on_line(across(angle_deg, y, x), spacing_px, width_px))
-        }
-        Pattern::Grid { spacing_px, width_px } => {
-            f64::from(on_line(x, spacing_px, width_px) || on_line(y, spacing_px, width_px))
+            0.5 + 0.5 * window * averaged(&wave, target.columns, y, x)
         }
         Pattern::Sweep { first_cycles, last_cycles, contrast } => {
             // The integral of first · (last / first)^t.
             let growth = (last_cycles / first_cycles).ln();
             let cycles = if growth.abs() < 1e-9 { along } else { (growth * along).exp_m1() / growth };
-            0.5 + 0.5 * contrast * (TAU * first_cycles * cycles).cos()
+            let here = first_cycles * (growth * along).exp() / width;
+            0.5 + 0.5 * contrast * mean_of_wave(TAU * first_cycles * cycles, [here, 0.0])
         }
         Pattern::ZonePlate { edge_cycles, contrast } => {
             // The frequency is the derivative of the phase: edge_cycles / width at half a width.
             let cycles = edge_cycles * (x * x + y * y) / (width * width);
-            0.5 + 0.5 * contrast * (TAU * cycles).cos()
+            let here = [x, y].map(|at| 2.0 * edge_cycles * at / (width * width));
+            0.5 + 0.5 * contrast * mean_of_wave(TAU * cycles, here)
         }
         Pattern::Ramp { steps, ratio } => {
             let at = match steps {
@@ -112,10 +204,14 @@ fn level(target: &Target, y: f64, x: f64) -> f64 {
     }
 }
 
+fn font() -> FontRef<'static> {
+    FontRef::try_from_slice(dejavu::sans::regular()).expect("the built-in font is sound")
+}
+
 /// Returns how much of each sample words about the center cover.
 fn letters(text: &str, height_px: f64, rows: usize, columns: usize) -> Array2<f64> {
     let mut cover = Array2::zeros((rows, columns));
-    let font = FontRef::try_from_slice(dejavu::sans::regular()).expect("the built-in font is sound");
+    let font = font();
     // The height of an H says what scale makes capitals as high as wanted.
     let unit = PxScale::from(1000.0);
     let outline = font.outline_glyph(font.glyph_id('H').with_scale(unit));
@@ -203,6 +299,14 @@ pub(super) fn check(pattern: &Pattern) -> Result<(), SceneError> {
                 let value = format!("{n} letters");
                 return wrong("the words of the target", value, "a line of 1 to 1000 letters");
             }
+            let font = font();
+            if let Some(letter) = text.chars().find(|letter| font.glyph_id(*letter) == GlyphId(0)) {
+                return wrong(
+                    "the words of the target",
+                    format!("'{text}'"),
+                    &format!("letters that DejaVu Sans has, not '{letter}'"),
+                );
+            }
             if !(*height_px > 0.0 && *height_px <= 1e5) {
                 return wrong("the height of the target's letters", height_px.to_string(), "0 to 100000 samples");
             }
@@ -267,7 +371,7 @@ mod tests {
         let lines = of(Pattern::Lines { spacing_px: 10.0, width_px: 2.5, angle_deg: 0.0 });
         assert_abs_diff_eq!(lines.mean().unwrap(), 0.25, epsilon = 1e-12);
         let level = of(Pattern::Lines { spacing_px: 10.0, width_px: 2.5, angle_deg: 90.0 });
-        assert_eq!(level.column(3), level.column(60));
+        assert!(level.column(3).iter().zip(level.column(60)).all(|(a, b)| (a - b).abs() < 1e-12));
         let grid = of(Pattern::Grid { spacing_px: 20.0, width_px: 5.0 });
         assert_abs_diff_eq!(grid.mean().unwrap(), 1.0 - 0.75 * 0.75, epsilon = 1e-12);
     }
@@ -285,6 +389,55 @@ mod tests {
         let row = plate.row(30);
         let n = (41..80).filter(|&i| row[i - 1] > 0.5 && row[i] <= 0.5).count();
         assert_eq!(n, 4);
+    }
+
+    /// Beyond half a cycle a sample a wave has its mean, in place of a coarser one that it would show as.
+    #[test]
+    fn what_is_too_fine_has_its_mean_and_is_named() {
+        let too_fine = [
+            Pattern::Harmonics { waves: vec![wave(50.0, 1.0)] },
+            Pattern::Gabor { wave: wave(41.0, 1.0), sigma: 0.2 },
+            Pattern::Sweep { first_cycles: 45.0, last_cycles: 70.0, contrast: 1.0 },
+            Pattern::Lines { spacing_px: 1.5, width_px: 0.75, angle_deg: 20.0 },
+        ];
+        for pattern in too_fine {
+            let note =
+                unresolved(&Target { pattern: pattern.clone(), rows: 60, columns: 80, ..Target::paper_checkerboard() });
+            assert!(note.is_some_and(|note| note.contains("mean")), "{pattern:?}");
+            assert!(of(pattern.clone()).iter().all(|v| (v - 0.5).abs() < 1e-12), "{pattern:?}");
+        }
+        let plate = Pattern::ZonePlate { edge_cycles: 80.0, contrast: 1.0 };
+        let plane = of(plate);
+        // Half a cycle a sample is reached a quarter of the width from the center.
+        assert!((10..20).all(|column| plane[(30, column)] == 0.5) && plane[(30, 46)] < 0.1);
+        let fine = Target {
+            pattern: Pattern::Harmonics { waves: vec![wave(40.0, 1.0)] },
+            rows: 60,
+            columns: 80,
+            ..Target::paper_checkerboard()
+        };
+        assert_eq!(unresolved(&fine), None);
+        let on_48 = Target { columns: 48, ..fine };
+        assert!(unresolved(&on_48).unwrap().contains("80 or more"));
+        let letters = |text: &str| check(&Pattern::Letters { text: text.to_owned(), height_px: 9.0 });
+        assert!(letters("日本").unwrap_err().to_string().contains('日') && letters("Ä ß €").is_ok());
+    }
+
+    #[test]
+    fn thin_and_tilted_lines_cover_their_share() {
+        for (spacing_px, width_px, angle_deg) in
+            [(10.0, 0.1, 0.0), (7.3, 0.37, 31.0), (4.0, 3.9, 45.0), (5.5, 1.25, 90.0)]
+        {
+            // Over whole spacings the mean is the share.
+            let n = 10_000;
+            let mean = (0..n)
+                .map(|i| covered(spacing_px * (i as f64 + 0.5) / n as f64, angle_deg, [spacing_px, width_px]))
+                .sum::<f64>()
+                / n as f64;
+            assert_abs_diff_eq!(mean, width_px / spacing_px, epsilon = 1e-6);
+        }
+        // A line of a tenth through the middle of a sample turned by 45 degrees, whose diagonal lies across it.
+        assert_abs_diff_eq!(covered(0.0, 45.0, [10.0, 0.1]), 0.1 * 2.0_f64.sqrt() - 0.005, epsilon = 1e-12);
     }
 
     #[test]

@@ -297,7 +297,8 @@ impl Target {
             TargetLight::Illuminant(light) => light.clone(),
         };
         // White is a perfect diffuser.
-        let notes = self.beyond_measured(grid, &illuminant);
+        let mut notes = self.beyond_measured(grid, &illuminant);
+        notes.extend(levels::unresolved(self));
         let light = Some(SceneLight::new(illuminant, std::f64::consts::PI * self.luminance_cd_m2));
         Scene { light, notes, ..Scene::new(self.name(), radiance) }
             .or_flat_depth_m(self.distance_m)?

@@ -11,6 +11,7 @@ use super::{
     super::unusable::{check_memory, unreadable},
     elements::{LIMIT_ARRAYS, LIMIT_DEPTH, Listed},
     hdf5::Hdf5,
+    packing::Attribute,
 };
 use crate::SceneError;
 
@@ -37,7 +38,7 @@ pub(super) struct MatFile {
     /// All variables of the file.
     pub(super) listed: Vec<Listed>,
     /// What is stated of those of HDF5 besides their numbers.
-    attributes: Vec<(String, Vec<String>)>,
+    attributes: Vec<(String, Vec<Attribute>)>,
 }
 
 /// An array: its sides, and what it holds.
@@ -131,8 +132,8 @@ impl MatFile {
         Ok(Self { is_big_endian, is_row_major: false, variables, listed, attributes: vec![] })
     }
 
-    /// The names of what is stated of a variable besides its numbers.
-    pub(super) fn attributes_of(&self, name: &str) -> &[String] {
+    /// What is stated of a variable besides its numbers.
+    pub(super) fn attributes_of(&self, name: &str) -> &[Attribute] {
         self.attributes.iter().find(|(own, _)| own == name).map_or(&[], |(_, attributes)| attributes)
     }
 

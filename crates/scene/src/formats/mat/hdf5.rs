@@ -7,7 +7,10 @@
 use exr::prelude::f16;
 use hdf5_pure::{AttrValue, DType, Dataset, Datatype, DatatypeByteOrder, File, FloatingPointLayout, Group};
 
-use super::elements::{self, LIMIT_ARRAYS, LIMIT_DEPTH, Listed};
+use super::{
+    elements::{self, LIMIT_ARRAYS, LIMIT_DEPTH, Listed},
+    packing::{Attribute, Value},
+};
 
 /// Arrays of a file.
 pub(super) struct Hdf5 {
@@ -24,7 +27,7 @@ pub(super) struct Entry {
     /// Bytes of its numbers.
     pub(super) n_bytes: u64,
     /// What else is stated of it.
-    pub(super) attributes: Vec<String>,
+    pub(super) attributes: Vec<Attribute>,
 }
 
 impl Hdf5 {
@@ -34,9 +37,9 @@ impl Hdf5 {
         Ok(Self { file: File::from_bytes(bytes).map_err(broken)?, is_matlab })
     }
 
-    /// Returns the names of what the file states of itself.
-    pub(super) fn attributes(&self) -> Vec<String> {
-        self.file.root().attrs().map(|own| unknown(own.into_keys().collect())).unwrap_or_default()
+    /// Returns what the file states of itself.
+    pub(super) fn attributes(&self) -> Vec<Attribute> {
+        self.file.root().attrs().map(telling).unwrap_or_default()
     }
 
     /// Lists the variables of MATLAB, or the arrays of all groups, by their paths.
@@ -62,8 +65,8 @@ impl Hdf5 {
             let is_numeric = class_of(&dataset).is_ok_and(|class| class.is_some());
             let n_bytes = sides.iter().map(|side| *side as u64).fold(8, u64::saturating_mul);
             let listed = Listed { name: path.clone(), sides, is_numeric };
-            let stated = dataset.attrs().map(|own| own.into_keys().collect()).unwrap_or_default();
-            entries.push(Entry { listed, path, is_group: false, n_bytes, attributes: unknown(stated) });
+            let attributes = dataset.attrs().map(telling).unwrap_or_default();
+            entries.push(Entry { listed, path, is_group: false, n_bytes, attributes });
         }
         for name in group.groups().map_err(broken)? {
             // What references lead to.
@@ -144,9 +147,9 @@ impl Hdf5 {
     }
 }
 
-/// Returns the names of attributes that may change what numbers mean, in their order.
-fn unknown(mut names: Vec<String>) -> Vec<String> {
-    const HARMLESS: [&str; 9] = [
+/// Returns the attributes that may change what numbers mean, in the order of their names.
+fn telling(attributes: impl IntoIterator<Item = (String, AttrValue)>) -> Vec<Attribute> {
+    const HARMLESS: [&str; 12] = [
         "CLASS",
         "NAME",
         "REFERENCE_LIST",
@@ -156,11 +159,22 @@ fn unknown(mut names: Vec<String>) -> Vec<String> {
         "VERSION",
         "FLAVOR",
         "comment",
+        "long_name",
+        "standard_name",
+        "Conventions",
     ];
-    names
-        .retain(|name| !(HARMLESS.contains(&name.as_str()) || name.starts_with("MATLAB_") || name.starts_with("_Net")));
-    names.sort();
-    names
+    let is_telling =
+        |name: &str| !(HARMLESS.contains(&name) || name.starts_with("MATLAB_") || name.starts_with("_Net"));
+    let value_of = |value: AttrValue| match (value.to_f64s(), value.to_i64s(), value.as_str()) {
+        (Some(numbers), ..) => Value::Numbers(numbers),
+        (None, Some(numbers), _) => Value::Numbers(numbers.into_iter().map(|v| v as f64).collect()),
+        (None, None, Some(text)) => Value::Text(text.to_owned()),
+        _ => Value::Other,
+    };
+    let own = attributes.into_iter().filter(|(name, _)| is_telling(name));
+    let mut own: Vec<Attribute> = own.map(|(name, value)| Attribute { name, value: value_of(value) }).collect();
+    own.sort_by(|a, b| a.name.cmp(&b.name));
+    own
 }
 
 /// Returns the class of numbers and the type that they are stored as; `None` where they are none.

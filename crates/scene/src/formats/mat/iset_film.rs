@@ -15,34 +15,15 @@ use super::{
     },
     container::{Content, MatArray, MatFile},
     elements::{self, Listed},
-    iset_kinds::{OPTICAL_IMAGES, structure_of},
+    iset_kinds::{self, OPTICAL_IMAGES, structure_of},
     iset_write::{data, named, spectrum},
     isetcam::{Cube, ascending, light_of, white_of},
 };
 use crate::{SceneError, SceneLight};
 
-/// Fields that change nothing of what the irradiance is, since they tell how it was made.
-const HARMLESS: [&str; 19] = [
-    "name",
-    "type",
-    "filename",
-    "metadata",
-    "metaData",
-    "consistency",
-    "magnification",
-    "diffuser",
-    "data",
-    "spectrum",
-    "optics",
-    "wAngular",
-    "hfov",
-    "fov",
-    "illuminant",
-    "computeMethod",
-    "psf",
-    "wvf",
-    "rotate",
-];
+/// Fields that change nothing of what the irradiance is, beside those of all objects: how it was made.
+const HARMLESS: [&str; 10] =
+    ["diffuser", "optics", "hfov", "fov", "illuminant", "computeMethod", "psf", "wvf", "rotate", "wave"];
 
 /// The irradiance of a file of `ISETCam`.
 #[derive(Clone, Debug, PartialEq)]
@@ -111,8 +92,8 @@ pub fn read_iset_irradiance(path: &Path) -> Result<IsetIrradiance, SceneError> {
     let mut notes = vec![understood];
     notes.extend(note_of(path, "variable", &others));
     if let Content::Fields(fields) = &oi.content {
-        let left =
-            fields.iter().filter(|(own, array)| array.len() > 0 && !HARMLESS.contains(&own.as_str()) && own != "wave");
+        let is_known = |own: &str| HARMLESS.contains(&own) || iset_kinds::HARMLESS.contains(&own);
+        let left = fields.iter().filter(|(own, array)| array.len() > 0 && !is_known(own));
         notes.extend(note_of(path, "field", &left.map(|(own, _)| format!("{name}.{own}")).collect::<Vec<_>>()));
     }
     Ok(IsetIrradiance { image, light, notes })

@@ -7,6 +7,20 @@ pub(super) const OPTICAL_IMAGES: [&str; 2] = ["oi", "opticalimage"];
 /// The names under which it saves a display.
 pub(super) const DISPLAYS: [&str; 2] = ["d", "display"];
 
+/// Fields of all its objects that change nothing of what they are, or are read.
+pub(super) const HARMLESS: [&str; 10] = [
+    "name",
+    "type",
+    "filename",
+    "metadata",
+    "metaData",
+    "consistency",
+    "magnification",
+    "spectrum",
+    "data",
+    "wAngular",
+];
+
 /// Its other objects by their names in files, with what they are and where they belong.
 const OTHERS: [(&[&str], &str); 7] = [
     (&OPTICAL_IMAGES, "an optical image of ISETCam: expected as irradiance, `dioptric sense FILE.mat --sensor …`"),

@@ -12,6 +12,7 @@ use super::{
     super::{
         axes,
         contents::Cube as NumberCube,
+        light_unit::LightUnit,
         photons::joules_per_photon,
         reading::{FileQuantity, FileReading},
         stated::{name_of, note_of},
@@ -20,6 +21,7 @@ use super::{
     container::{Content, MatArray, MatFile, WHOLE},
     elements::Listed,
     iset_kinds,
+    packing::Packing,
 };
 use crate::{SceneError, SceneLight};
 
@@ -32,26 +34,9 @@ pub(in super::super) const WAVES: [&str; 9] =
 /// The most that reflectances are, and the least that photons of any lit scene are.
 const MOST_REFLECTANCE: f64 = 10.0;
 const LEAST_PHOTONS: f64 = 1e9;
-/// Fields of a scene that change nothing of what it is.
-const HARMLESS: [&str; 17] = [
-    "name",
-    "type",
-    "filename",
-    "metadata",
-    "metaData",
-    "consistency",
-    "chartP",
-    "chartparameters",
-    "cornerpoints",
-    "rect",
-    "magnification",
-    "color",
-    "spectrum",
-    "data",
-    "wAngular",
-    "vAngular",
-    "lightFieldType",
-];
+/// Fields of a scene that change nothing of what it is, beside those of all objects.
+const HARMLESS: [&str; 7] =
+    ["chartP", "chartparameters", "cornerpoints", "rect", "color", "vAngular", "lightFieldType"];
 /// The published cubes that do not list their wavelengths, by variable and bands: first and last, nm.
 const KNOWN: [(&str, usize, [f64; 2]); 4] = [
     // Chakrabarti & Zickler 2011 (Harvard).
@@ -185,19 +170,8 @@ fn last_part(path: &str) -> &str {
 fn cube_of(path: &Path, file: &MatFile, name: &str, reading: &FileReading) -> Result<NumberCube, String> {
     let array = file.array(name)?.ok_or_else(|| format!("it has no variable '{name}'"))?;
     let numbers = array.numbers().map_err(|what| format!("its '{name}' is {what}, expected numbers"))?;
-    let mut waves = None;
-    for list in WAVES {
-        let Some(own) = file.listed.iter().find(|own| last_part(&own.name) == list && own.name != name) else {
-            continue;
-        };
-        if let Some(numbers) = file.array(&own.name)?.and_then(|array| array.list()).filter(|list| !list.is_empty()) {
-            waves = Some((own.name.clone(), numbers));
-            break;
-        }
-    }
-    // A list that counts bands, or of another length, is none of wavelengths.
-    let is_bands = |list: &[f64]| array.sides.contains(&list.len()) && list.iter().all(|nm| *nm >= 100.0);
-    let waves = waves.filter(|(_, list)| is_bands(list));
+    let packing = Packing::of(file.attributes_of(name));
+    let waves = waves_of(file, name, &array.sides)?;
     // What is known by name gives way to what is told.
     let known = KNOWN
         .iter()
@@ -206,21 +180,28 @@ fn cube_of(path: &Path, file: &MatFile, name: &str, reading: &FileReading) -> Re
         .map(|(_, n, [first, last])| {
             (0..*n).map(|i| first + (last - first) * i as f64 / (*n as f64 - 1.0)).collect::<Vec<f64>>()
         });
-    let own = waves.as_ref().map(|(_, list)| list.clone()).or(known);
+    let stated = packing.wavelengths_nm(&array.sides, &WAVES).filter(|_| waves.is_none());
+    let own = waves.as_ref().map(|(_, list)| list.clone()).or(stated.map(<[f64]>::to_vec)).or(known);
     let n_bands = reading.wavelengths_nm.as_ref().or(own.as_ref()).map(Vec::len);
+    let unit = UnitOf::read(packing.unit.as_deref());
+    let percent = if matches!(unit, UnitOf::Percent) { 0.01 } else { 1.0 };
     let planes = axes::planes(&array.sides, reading.axes.as_deref(), n_bands, file.is_row_major, |index| {
-        numbers.at(index) as f32
+        (percent * packing.unpacked(numbers.at(index))) as f32
     })?;
-    let used = |own: &str| own == name || waves.as_ref().is_some_and(|(list, _)| list == own);
+    let is_depth = |own: &str| reading.depth.is_none() && reading.depth_variable.as_deref() == Some(own);
+    let used = |own: &str| own == name || is_depth(own) || waves.as_ref().is_some_and(|(list, _)| list == own);
     let unused: Vec<String> = file.listed.iter().map(|own| own.name.clone()).filter(|own| !used(own)).collect();
     let mut notes: Vec<String> = note_of(path, "variable", &unused).into_iter().collect();
     let file_name = name_of(path);
     let ambiguous = axes::note(&array.sides, reading.axes.as_deref(), n_bands);
     notes.extend(ambiguous.map(|note| format!("{file_name}: '{name}': {note}")));
-    notes.extend(note_of(path, "attribute", &[file.attributes_of(WHOLE), file.attributes_of(name)].concat()));
-    let mut quantity = None;
+    let of_file = file.attributes_of(WHOLE).iter().map(|own| own.name.clone());
+    let left = packing.left(!matches!(unit, UnitOf::Unknown), stated.is_some());
+    notes.extend(note_of(path, "attribute", &of_file.chain(left).collect::<Vec<_>>()));
+    let mut quantity = matches!(unit, UnitOf::Percent | UnitOf::Reflectance).then_some(FileQuantity::Reflectance);
+    let is_integer = numbers.is_integer && !packing.is_packed();
     let told = reading.quantity.is_some() || reading.unit.is_some();
-    if !told && !numbers.is_integer {
+    if !told && !is_integer && quantity.is_none() && !matches!(unit, UnitOf::Light(..)) {
         let most = planes.iter().flatten().copied().filter(|v| v.is_finite()).fold(0.0, f32::max);
         let most = f64::from(most);
         if most > LEAST_PHOTONS {
@@ -230,8 +211,53 @@ fn cube_of(path: &Path, file: &MatFile, name: &str, reading: &FileReading) -> Re
             quantity = Some(FileQuantity::Reflectance);
         }
     }
-    let top = numbers.is_integer.then(|| numbers.top());
-    Ok(NumberCube { planes, top, wavelengths_nm: own, quantity, notes })
+    let top = (is_integer && percent == 1.0).then(|| numbers.top());
+    let unit = if let UnitOf::Light(unit, text) = unit { Some((unit, text)) } else { None };
+    Ok(NumberCube { planes, top, wavelengths_nm: own, quantity, unit, notes })
+}
+
+/// What the unit of an array says that its numbers are.
+enum UnitOf {
+    Light(LightUnit, String),
+    Reflectance,
+    Percent,
+    /// Nothing that is known.
+    Unknown,
+}
+
+impl UnitOf {
+    fn read(text: Option<&str>) -> Self {
+        let Some(text) = text else { return Self::Unknown };
+        match text.to_lowercase().as_str() {
+            "%" | "percent" => Self::Percent,
+            "reflectance" | "transmittance" => Self::Reflectance,
+            _ => match LightUnit::parse(text).filter(|unit| unit.quantity == Quantity::Radiance) {
+                Some(unit) => Self::Light(unit, text.to_owned()),
+                None => Self::Unknown,
+            },
+        }
+    }
+}
+
+/// Returns the name of the list of wavelengths beside a cube of these sides, and the list, nm.
+fn waves_of(file: &MatFile, cube: &str, sides: &[usize]) -> Result<Option<(String, Vec<f64>)>, String> {
+    for list in WAVES {
+        let Some(own) = file.listed.iter().find(|own| last_part(&own.name) == list && own.name != cube) else {
+            continue;
+        };
+        let numbers = file.array(&own.name)?.and_then(|array| array.list()).filter(|list| !list.is_empty());
+        let Some(mut numbers) = numbers else { continue };
+        let unit = Packing::of(file.attributes_of(&own.name)).unit.unwrap_or_default().to_lowercase();
+        if ["um", "µm", "μm", "micrometer", "micrometers", "micrometre", "micrometres", "microns"]
+            .contains(&unit.as_str())
+        {
+            numbers.iter_mut().for_each(|nm| *nm *= 1000.0);
+        }
+        // A list that counts bands, or of another length, is none of wavelengths.
+        let is_bands = sides.contains(&numbers.len()) && numbers.iter().all(|nm| *nm >= 100.0);
+        return Ok(is_bands.then(|| (own.name.clone(), numbers)));
+    }
+    Ok(None)
 }
 
 /// Reads a scene of `ISETCam`.
@@ -260,7 +286,9 @@ fn unused_of(path: &Path, file: &MatFile) -> Result<Vec<String>, String> {
     if let Some(MatArray { content: Content::Fields(fields), .. }) = &scene {
         let ours = ["depthMap", "distance", "illuminant", "wave"];
         let left = fields.iter().filter(|(name, array)| {
-            array.len() > 0 && !ours.contains(&name.as_str()) && !HARMLESS.contains(&name.as_str())
+            let is_known =
+                [&ours[..], &HARMLESS, &iset_kinds::HARMLESS].iter().any(|known| known.contains(&name.as_str()));
+            array.len() > 0 && !is_known
         });
         notes.extend(note_of(path, "field", &left.map(|(name, _)| format!("scene.{name}")).collect::<Vec<_>>()));
     }

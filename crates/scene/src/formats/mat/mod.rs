@@ -10,6 +10,7 @@ mod iset_film;
 mod iset_kinds;
 mod iset_write;
 mod isetcam;
+mod packing;
 mod plane;
 #[cfg(test)]
 mod tests;
@@ -20,4 +21,4 @@ pub use iset_write::write_iset_scene;
 #[cfg(test)]
 use isetcam::IsetScene;
 pub(super) use isetcam::{MatScene, WAVES, read_mat};
-pub(super) use plane::{Plane, read_plane};
+pub(super) use plane::{DEPTHS, Plane, read_plane};

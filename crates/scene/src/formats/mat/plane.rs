@@ -8,11 +8,12 @@ use super::{
     super::{stated::note_of, unusable::unreadable},
     container::MatFile,
     elements::Listed,
+    packing::{Packing, length_m},
 };
 use crate::SceneError;
 
 /// Names of arrays of depth, those of distances from the camera first.
-const NAMES: [&str; 10] =
+pub(in super::super) const DEPTHS: [&str; 10] =
     ["distance", "depth_meters", "depth", "depths", "depthmap", "depth_map", "z", "dataset", "rawdepths", "disparity"];
 
 /// A plane of numbers.
@@ -22,28 +23,38 @@ pub(in super::super) struct Plane {
     pub(in super::super) values: Array2<f32>,
     /// The largest number that its whole numbers have.
     pub(in super::super) top: Option<f64>,
+    /// The length of 1, m, where the file states it.
+    pub(in super::super) unit_m: Option<f64>,
     pub(in super::super) notes: Vec<String>,
 }
 
-/// Reads the one plane of a file, or that whose name says that it is a depth.
+/// Reads the one plane of a file, that whose name says that it is a depth, or that of the name told.
 ///
 /// # Errors
 /// When it has none, or several of other names.
-pub(in super::super) fn read_plane(path: &Path) -> Result<Plane, SceneError> {
+pub(in super::super) fn read_plane(path: &Path, told: Option<&str>) -> Result<Plane, SceneError> {
     let sides_of = |own: &Listed| own.sides.iter().copied().filter(|side| *side != 1).collect::<Vec<usize>>();
     let is_plane = |own: &Listed| own.is_numeric && sides_of(own).len() == 2;
     let file = MatFile::read(path, &is_plane)?;
     let wrong = |reason: String| unreadable(path, reason);
     let planes: Vec<&Listed> = file.listed.iter().filter(|own| is_plane(own)).collect();
     let last = |own: &Listed| own.name.rsplit('/').next().unwrap_or_default().to_lowercase();
-    let named = NAMES.iter().find_map(|name| planes.iter().find(|own| last(own) == *name));
+    let named = match told {
+        Some(told) => planes.iter().find(|own| own.name == told),
+        None => DEPTHS.iter().find_map(|name| planes.iter().find(|own| last(own) == *name)),
+    };
     let chosen = match (named, &planes[..]) {
         (Some(named), _) => named,
+        (None, _) if told.is_some() => {
+            let names = file.listed.iter().map(|own| own.name.as_str()).collect::<Vec<_>>().join(", ");
+            let told = told.unwrap_or_default();
+            return Err(wrong(format!("it has no array '{told}' of rows and columns, expected one of {names}")));
+        }
         (None, [only]) => only,
         (None, []) => return Err(wrong("it has no array of rows and columns, expected one of depth".to_owned())),
         (None, _) => {
             let names = planes.iter().map(|own| own.name.as_str()).collect::<Vec<_>>().join(", ");
-            return Err(wrong(format!("it has several arrays, {names}: expected one, or one that is called depth")));
+            return Err(wrong(format!("it has several arrays, {names}: expected one, or its name (--depth-variable)")));
         }
     };
     let array = file.array(&chosen.name).map_err(wrong)?.ok_or_else(|| wrong("its depth is not there".to_owned()))?;
@@ -56,10 +67,15 @@ pub(in super::super) fn read_plane(path: &Path) -> Result<Plane, SceneError> {
     };
     let others: Vec<String> =
         file.listed.iter().map(|own| own.name.clone()).filter(|own| *own != chosen.name).collect();
+    let packing = Packing::of(file.attributes_of(&chosen.name));
+    let unit_m = packing.unit.as_deref().and_then(length_m);
+    let mut notes: Vec<String> = note_of(path, "array", &others).into_iter().collect();
+    notes.extend(note_of(path, "attribute", &packing.left(unit_m.is_some(), false)));
     Ok(Plane {
         name: chosen.name.clone(),
-        values: Array2::from_shape_fn((rows, columns), |place| numbers.at(at(place)) as f32),
-        top: numbers.is_integer.then(|| numbers.top()),
-        notes: note_of(path, "array", &others).into_iter().collect(),
+        values: Array2::from_shape_fn((rows, columns), |place| packing.unpacked(numbers.at(at(place))) as f32),
+        top: (numbers.is_integer && !packing.is_packed()).then(|| numbers.top()),
+        unit_m,
+        notes,
     })
 }

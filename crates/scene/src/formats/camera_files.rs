@@ -1,0 +1,399 @@
+//! Files of camera data: ours, or those of `Open3D`, nerfstudio, COLMAP, `OpenCV`, ROS and Kalibr.
+
+use std::path::Path;
+
+use serde::{
+    Deserialize, Deserializer,
+    de::{MapAccess, Visitor},
+};
+use serde_json::Value;
+
+use super::{
+    camera::CameraData,
+    distortion::Distortion,
+    stated::{Stated, short},
+};
+
+/// Keys that change nothing of what a scene is.
+const HARMLESS: [&str; 9] =
+    ["source", "name", "comment", "comments", "description", "note", "notes", "license", "camera_angle_y"];
+/// What calibrations call the polynomial of `OpenCV`, or no distortion at all.
+const POLYNOMIALS: [&str; 12] = [
+    "OPENCV",
+    "PINHOLE",
+    "SIMPLE_PINHOLE",
+    "SIMPLE_RADIAL",
+    "RADIAL",
+    "PERSPECTIVE",
+    "PLUMB_BOB",
+    "RATIONAL_POLYNOMIAL",
+    "RADTAN",
+    "RADIAL_TANGENTIAL",
+    "BROWN_CONRADY",
+    "NONE",
+];
+/// What they call a fisheye by the angle.
+const FISHEYES: [&str; 5] = ["OPENCV_FISHEYE", "FISHEYE", "EQUIDISTANT", "EQUI", "KANNALA_BRANDT"];
+
+/// Returns whether a model is a fisheye; `None` of one that is not known.
+fn is_fisheye(model: &str) -> Option<bool> {
+    let model = model.trim().trim_matches(['"', '\'']).to_uppercase().replace(['-', ' '], "_");
+    if model.is_empty() || POLYNOMIALS.contains(&model.as_str()) {
+        return Some(false);
+    }
+    FISHEYES.contains(&model.as_str()).then_some(true)
+}
+
+fn unknown_model(model: &str) -> String {
+    format!("its camera model is '{}', expected PINHOLE, OPENCV or OPENCV_FISHEYE", short(model))
+}
+
+/// An object of JSON, each of whose keys stands once.
+struct Object(Vec<(String, Value)>);
+
+impl<'de> Deserialize<'de> for Object {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Keys;
+        impl<'de> Visitor<'de> for Keys {
+            type Value = Object;
+
+            fn expecting(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                formatter.write_str("an object")
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Object, A::Error> {
+                let mut entries: Vec<(String, Value)> = vec![];
+                while let Some((key, value)) = map.next_entry::<String, Value>()? {
+                    if entries.iter().any(|(own, _)| *own == key) {
+                        return Err(serde::de::Error::custom(format!("the key '{}' stands twice", short(&key))));
+                    }
+                    entries.push((key, value));
+                }
+                Ok(Object(entries))
+            }
+        }
+        deserializer.deserialize_map(Keys)
+    }
+}
+
+/// Reads JSON of ours, `Open3D`, nerfstudio or ROS.
+pub(super) fn of_json(path: &Path, text: &str) -> Result<CameraData, String> {
+    let Object(entries) = serde_json::from_str(text).map_err(|error| error.to_string())?;
+    let mut keys = Stated::new("key", entries);
+    // Centers of pixels are at whole numbers for OpenCV and Open3D, at halves for nerfstudio.
+    let is_nerf = keys.get("fl_x").is_some() || keys.get("camera_angle_x").is_some();
+    if let Some(frames) = keys.take("frames") {
+        let same = frames.as_array().is_none_or(|frames| frames.iter().all(|frame| frame.get("fl_x").is_none()));
+        if !same {
+            return Err("its frames have focal lengths of their own: expected one for all".to_owned());
+        }
+    }
+    let mut is_fisheye_model = false;
+    for name in ["camera_model", "distortion_model", "model"] {
+        let Some(model) = keys.get(name).and_then(Value::as_str).map(str::to_owned) else { continue };
+        match is_fisheye(&model) {
+            Some(is_fisheye) => {
+                is_fisheye_model |= is_fisheye;
+                keys.take(name);
+            }
+            // Who made the camera may stand there as well, which is named.
+            None if name == "model" => {}
+            None => return Err(unknown_model(&model)),
+        }
+    }
+    if let Some(is_fisheye) = keys.get("is_fisheye").and_then(Value::as_bool) {
+        is_fisheye_model |= is_fisheye;
+        keys.take("is_fisheye");
+    }
+    if keys.get("units").and_then(Value::as_str).is_some_and(|unit| ["px", "pixel", "pixels"].contains(&unit)) {
+        keys.take("units");
+    }
+    let mut number = |names: &[&str]| -> Result<Option<f64>, String> {
+        let Some(value) = keys.take_any(names) else { return Ok(None) };
+        match value {
+            Value::Null => Ok(None),
+            value => value.as_f64().map(Some).ok_or_else(|| format!("{} is {value}, expected a number", names[0])),
+        }
+    };
+    let [mut fx, mut fy] = [number(&["fx_px", "fl_x", "fx"])?, number(&["fy_px", "fl_y", "fy"])?];
+    let [mut cx, mut cy] = [number(&["cx_px", "cx", "ppx"])?, number(&["cy_px", "cy", "ppy"])?];
+    let side = |value: Option<f64>, name: &str| match value {
+        None => Ok(None),
+        Some(n) if n >= 1.0 && n.fract() == 0.0 && n < 1e6 => Ok(Some(n as usize)),
+        Some(n) => Err(format!("{name} is {n}, expected a number of samples")),
+    };
+    let width = side(number(&["width", "w"])?, "width")?;
+    let height = side(number(&["height", "h"])?, "height")?;
+    let angle_rad = number(&["camera_angle_x"])?;
+    if let (None, Some(angle), Some(width)) = (fx, angle_rad, width) {
+        fx = Some(0.5 * width as f64 / (0.5 * angle).tan());
+    }
+    let depth_unit_m = number(&["depth_unit_m", "depth_unit_scale_factor"])?;
+    let depth_scale = number(&["depth_scale"])?;
+    let mut k = [0.0; 8];
+    for (place, name) in ["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"].iter().enumerate() {
+        k[place] = number(&[name])?.unwrap_or(0.0);
+    }
+    let [k1, k2, p1, p2, k3, k4, k5, k6] = k;
+    let mut distortion = if is_fisheye_model {
+        if [p1, p2, k5, k6].iter().any(|v| *v != 0.0) {
+            return Err("its fisheye has other coefficients than k1 to k4".to_owned());
+        }
+        Distortion::Fisheye([k1, k2, k3, k4])
+    } else if is_nerf {
+        Distortion::Polynomial { k: [k1, k2, p1, p2, k3, 0.0, k5, k6], r8: k4 }
+    } else {
+        Distortion::Polynomial { k, r8: 0.0 }
+    };
+    if let Some(list) = keys.take_any(&["distortion", "dist_coeffs", "distortion_coefficients", "D"]) {
+        if k.iter().any(|v| *v != 0.0) {
+            return Err("it states its distortion twice, as a list and by names: expected one".to_owned());
+        }
+        distortion = Distortion::of_list(&numbers_of(&list, "distortion")?, is_fisheye_model)?;
+    }
+    if let Some(matrix) = keys.take_any(&["intrinsic_matrix", "K"]) {
+        let m = numbers_of(&matrix, "intrinsic_matrix")?;
+        // Open3D's nine numbers run down the columns, rows of rows are a table.
+        let is_table = matrix.as_array().is_some_and(|rows| rows.iter().any(Value::is_array));
+        let [a, b] = if is_table || m.get(6) == Some(&0.0) { [2, 5] } else { [6, 7] };
+        let &[first, ..] = &m[..] else { return Err("its intrinsic_matrix is empty".to_owned()) };
+        if m.len() != 9 {
+            return Err(format!("its intrinsic_matrix has {} numbers, expected 9", m.len()));
+        }
+        let rest = [m[1], m[3], m[if a == 2 { 6 } else { 2 }], m[if a == 2 { 7 } else { 5 }], m[8] - 1.0];
+        check_matrix("intrinsic_matrix", &rest)?;
+        let own = [first, m[4], m[a], m[b]];
+        if [fx, fy, cx, cy].iter().zip(own).any(|(given, own)| given.is_some_and(|given| (given - own).abs() > 1e-9)) {
+            return Err("its intrinsic_matrix says something else than its focal lengths and center".to_owned());
+        }
+        [fx, fy, cx, cy] = own.map(Some);
+    }
+    let missing = |name: &str| format!("missing {name}: expected width, height, fx_px, fy_px, cx_px and cy_px");
+    let fx = fx.ok_or_else(|| missing("fx_px"))?;
+    let fy = fy.unwrap_or(fx);
+    let size = match (width, height) {
+        (Some(width), Some(height)) => Some((width, height)),
+        (None, None) => None,
+        (None, _) => return Err(missing("width")),
+        (_, None) => return Err(missing("height")),
+    };
+    let half = if is_nerf { 0.5 } else { 0.0 };
+    let middle = |side: Option<usize>| side.map(|n| 0.5 * n as f64 - 0.5 + half);
+    let cx = cx.or_else(|| middle(width)).ok_or_else(|| missing("cx_px"))?;
+    let cy = cy.or_else(|| middle(height)).ok_or_else(|| missing("cy_px"))?;
+    let of_scale = match depth_scale {
+        None => None,
+        // So many codes a metre, as TUM and Open3D have it; small factors are metres to some and millimetres to others.
+        Some(scale) if scale >= 10.0 => Some(1.0 / scale),
+        Some(scale) => {
+            return Err(format!(
+                "depth_scale is {scale}, which is metres or millimetres a code: expected codes a metre, 10 or more, or \
+                 depth_unit_m"
+            ));
+        }
+    };
+    if let (Some(unit), Some(other)) = (depth_unit_m, of_scale)
+        && (unit / other - 1.0).abs() > 1e-6
+    {
+        return Err(format!("depth_unit_m is {unit}, and depth_scale says {other}: expected one of them"));
+    }
+    Ok(CameraData {
+        file: path.to_owned(),
+        size,
+        fx_px: fx,
+        fy_px: fy,
+        cx_px: cx - half,
+        cy_px: cy - half,
+        distortion,
+        depth_unit_m: depth_unit_m.or(of_scale),
+        note: keys.note(path, |name| HARMLESS.contains(&name)),
+    })
+}
+
+/// Returns all numbers of a list, or of a table row by row.
+fn numbers_of(value: &Value, name: &str) -> Result<Vec<f64>, String> {
+    let wrong = || format!("{name} is no list of numbers");
+    let mut numbers = vec![];
+    for item in value.as_array().ok_or_else(wrong)? {
+        match item {
+            Value::Array(row) => {
+                numbers.extend(row.iter().map(Value::as_f64).collect::<Option<Vec<f64>>>().ok_or_else(wrong)?);
+            }
+            item => numbers.push(item.as_f64().ok_or_else(wrong)?),
+        }
+    }
+    Ok(numbers)
+}
+
+/// Reads the first camera of COLMAP's `cameras.txt`: number, model, width, height and parameters, with centers of pixels at halves.
+pub(super) fn of_colmap(path: &Path, text: &str) -> Result<CameraData, String> {
+    let expected = "expected JSON, YAML, or a line of COLMAP's cameras.txt: number, model, width, height, parameters";
+    let mut lines = text.lines().map(str::trim).filter(|line| !line.is_empty() && !line.starts_with('#'));
+    let line = lines.next().ok_or(expected)?;
+    let words: Vec<&str> = line.split_whitespace().collect();
+    let [_, model, width, height, parameters @ ..] = &words[..] else { return Err(expected.to_owned()) };
+    let side = |word: &str| word.parse::<usize>().ok().filter(|n| *n > 0).ok_or(expected);
+    let size = (side(width)?, side(height)?);
+    let p: Vec<f64> = parameters.iter().map(|word| word.parse()).collect::<Result<_, _>>().map_err(|_| expected)?;
+    let (f, c, k): (_, _, &[f64]) = match (*model, &p[..]) {
+        ("SIMPLE_PINHOLE", &[f, cx, cy]) => ((f, f), (cx, cy), &[]),
+        ("PINHOLE", &[fx, fy, cx, cy]) => ((fx, fy), (cx, cy), &[]),
+        ("SIMPLE_RADIAL" | "SIMPLE_RADIAL_FISHEYE", &[f, cx, cy, _]) => ((f, f), (cx, cy), &p[3..]),
+        ("RADIAL" | "RADIAL_FISHEYE", &[f, cx, cy, _, _]) => ((f, f), (cx, cy), &p[3..]),
+        ("OPENCV" | "OPENCV_FISHEYE", &[fx, fy, cx, cy, _, _, _, _]) => ((fx, fy), (cx, cy), &p[4..]),
+        ("FULL_OPENCV", &[fx, fy, cx, cy, _, _, _, _, _, _, _, _]) => ((fx, fy), (cx, cy), &p[4..]),
+        _ => {
+            return Err(format!(
+                "its camera model is '{}' with {} parameters, expected SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL, RADIAL, OPENCV, \
+                 FULL_OPENCV or a fisheye of them",
+                short(model),
+                p.len()
+            ));
+        }
+    };
+    let more: Vec<String> = lines.map(short).collect();
+    Ok(CameraData {
+        file: path.to_owned(),
+        size: Some(size),
+        fx_px: f.0,
+        fy_px: f.1,
+        cx_px: c.0 - 0.5,
+        cy_px: c.1 - 0.5,
+        distortion: Distortion::of_list(k, model.ends_with("_FISHEYE"))?,
+        depth_unit_m: None,
+        note: super::stated::note_of(path, "line", &more),
+    })
+}
+
+/// Checks that of a camera matrix nothing is left out: what must be 0, for it to be that of a camera whose rows and columns are at right angles.
+fn check_matrix(name: &str, rest: &[f64]) -> Result<(), String> {
+    match rest.iter().all(|number| number.abs() < 1e-9) {
+        true => Ok(()),
+        false => Err(format!("its {name} has a skew or a last row other than 0, 0, 1, expected none")),
+    }
+}
+
+/// Reads YAML of a calibration of `OpenCV` or ROS (`camera_matrix`, `distortion_coefficients`, `image_width`, `image_height`), or of one camera of
+/// Kalibr (`intrinsics`, `distortion_coeffs`, `resolution`).
+pub(super) fn of_yaml(path: &Path, text: &str) -> Result<CameraData, String> {
+    let mut keys = Stated::new("key", yaml_entries(text)?);
+    let list = |text: String| -> Result<Vec<f64>, String> {
+        let words = text.trim_matches(['[', ']']).split(',').map(str::trim).filter(|word| !word.is_empty());
+        words.map(|word| word.parse().map_err(|_| format!("'{}' is no number", short(word)))).collect()
+    };
+    let matrix = keys.take_any(&["camera_matrix", "Camera_Matrix", "K", "cameraMatrix"]).map(list).transpose()?;
+    let (f, c) = match (matrix, keys.take("intrinsics").map(list).transpose()?) {
+        (Some(m), None) => {
+            let &[fx, skew, cx, below, fy, cy, left, right, last] = &m[..] else {
+                return Err("its camera_matrix has not 9 numbers".to_owned());
+            };
+            check_matrix("camera_matrix", &[skew, below, left, right, last - 1.0])?;
+            ((fx, fy), (cx, cy))
+        }
+        (None, Some(numbers)) => {
+            let &[fx, fy, cx, cy] = &numbers[..] else {
+                return Err("its intrinsics are not 4 numbers, expected those of a pinhole".to_owned());
+            };
+            ((fx, fy), (cx, cy))
+        }
+        (Some(_), Some(_)) => return Err("it has a camera_matrix and intrinsics: expected one".to_owned()),
+        (None, None) => return Err("it has no camera_matrix".to_owned()),
+    };
+    let mut is_bent_as_fisheye = false;
+    for name in ["camera_model", "distortion_model"] {
+        let Some(model) = keys.take(name) else { continue };
+        is_bent_as_fisheye |= is_fisheye(&model).ok_or_else(|| unknown_model(&model))?;
+    }
+    let names = ["distortion_coefficients", "Distortion_Coefficients", "distortion_coeffs", "distCoeffs", "D"];
+    let k = keys.take_any(&names).map(list).transpose()?.unwrap_or_default();
+    let mut side = |names: &[&str]| -> Result<Option<usize>, String> {
+        let Some(text) = keys.take_any(names) else { return Ok(None) };
+        let wrong = || format!("{} is '{}', expected a number of samples", names[0], short(&text));
+        text.parse::<usize>().ok().filter(|n| *n > 0).map(Some).ok_or_else(wrong)
+    };
+    let size = match (side(&["image_width", "image_Width"])?, side(&["image_height", "image_Height"])?) {
+        (Some(width), Some(height)) => Some((width, height)),
+        (None, None) => None,
+        _ => return Err("it has one of image_width and image_height, expected both".to_owned()),
+    };
+    let size = match (size, keys.take("resolution").map(list).transpose()?.as_deref()) {
+        (None, Some(&[width, height])) if width >= 1.0 && height >= 1.0 => Some((width as usize, height as usize)),
+        (None, Some(_)) => return Err("its resolution is no width and height".to_owned()),
+        (size, _) => size,
+    };
+    // A rectification that turns nothing is none.
+    const NO_TURN: [f64; 9] = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
+    if keys.get("rectification_matrix").is_some_and(|text| list(text.clone()).is_ok_and(|own| own == NO_TURN)) {
+        keys.take("rectification_matrix");
+    }
+    Ok(CameraData {
+        file: path.to_owned(),
+        size,
+        fx_px: f.0,
+        fy_px: f.1,
+        cx_px: c.0,
+        cy_px: c.1,
+        distortion: Distortion::of_list(&k, is_bent_as_fisheye)?,
+        depth_unit_m: None,
+        note: keys.note(path, |name| {
+            const OURS: [&str; 9] = [
+                "calibration_time",
+                "calibration_Time",
+                "nframes",
+                "board_width",
+                "board_height",
+                "square_size",
+                "flags",
+                "camera_name",
+                "sensor_type",
+            ];
+            HARMLESS.contains(&name) || OURS.contains(&name) || name.contains("error")
+        }),
+    })
+}
+
+/// Returns the `key: value` lines, in which the `data: [...]` of a matrix belongs to the key above; lists may run over lines.
+fn yaml_entries(text: &str) -> Result<Vec<(String, String)>, String> {
+    let mut entries: Vec<(String, String)> = vec![];
+    // A key without a value, of which no matrix has been found yet.
+    let mut matrix: Option<String> = None;
+    let without_comment = |line: &str| line.split(" #").next().unwrap_or_default().trim().to_owned();
+    let mut rest = text.lines().map(without_comment);
+    while let Some(line) = rest.next() {
+        if line.is_empty() || line.starts_with(['%', '#']) || line == "---" || line == "..." {
+            continue;
+        }
+        let Some((key, value)) = line.split_once(':') else {
+            return Err(format!("'{}' is no key: value", short(&line)));
+        };
+        let mut value = value.trim().to_owned();
+        while value.starts_with('[') && !value.ends_with(']') {
+            let Some(more) = rest.next() else {
+                return Err(format!("the list of '{}' is never closed by ']'", short(key)));
+            };
+            value.push_str(&more);
+        }
+        let entry = match (key.trim(), &matrix) {
+            ("rows" | "cols" | "dt", Some(_)) => continue,
+            ("data", Some(name)) => {
+                let name = name.clone();
+                matrix = None;
+                (name, value)
+            }
+            (key, _) if value.is_empty() || value.contains("opencv-matrix") => {
+                entries.extend(matrix.replace(key.to_owned()).map(|name| (name, String::new())));
+                continue;
+            }
+            (key, _) => {
+                entries.extend(matrix.take().map(|name| (name, String::new())));
+                (key.to_owned(), value)
+            }
+        };
+        if entries.iter().any(|(own, value)| *own == entry.0 && *value != entry.1) {
+            return Err(format!("the key '{}' stands twice: expected it once", short(&entry.0)));
+        }
+        entries.push(entry);
+    }
+    entries.extend(matrix.map(|name| (name, String::new())));
+    Ok(entries)
+}

@@ -1,0 +1,120 @@
+//! The colors of EXR files without bands: which channels they are, and of what primaries.
+
+use dioptric_spectrum::{Xyz, adapt_bradford};
+use exr::meta::attribute::Chromaticities;
+use glam::{DMat3, DVec3};
+use ndarray::Array2;
+
+use super::stated::Stated;
+
+/// Takes red, green and blue: `R`, `G` and `B`, or those of a layer, Blender's `….Combined` before others; or gray, `Y`. Returns
+/// them with what stands before their letters.
+pub(super) fn colors_of(channels: &mut Stated<Array2<f32>>) -> Option<(String, [Array2<f32>; 3])> {
+    let names: Vec<String> = channels.names().map(str::to_owned).collect();
+    let full =
+        |prefix: &str, letter: &str| if prefix.is_empty() { letter.to_owned() } else { format!("{prefix}.{letter}") };
+    let prefixes: Vec<&str> = names
+        .iter()
+        .filter_map(|name| match name.as_str() {
+            "R" => Some(""),
+            name => name.strip_suffix(".R"),
+        })
+        .filter(|prefix| ["G", "B"].iter().all(|letter| names.contains(&full(prefix, letter))))
+        .collect();
+    let last = |prefix: &str| prefix.rsplit('.').next().unwrap_or_default().to_ascii_lowercase();
+    let is_beauty =
+        |prefix: &&&str| ["combined", "rgb", "rgba", "color", "beauty", "image"].contains(&last(prefix).as_str());
+    let prefix = prefixes.iter().find(|prefix| prefix.is_empty()).or_else(|| prefixes.iter().find(is_beauty));
+    let prefix = prefix.or_else(|| prefixes.first().filter(|_| prefixes.len() == 1)).map(|prefix| (*prefix).to_owned());
+    if let Some(prefix) = prefix {
+        let mut take = |letter| channels.take(&full(&prefix, letter));
+        let planes = [take("R")?, take("G")?, take("B")?];
+        return Some((prefix, planes));
+    }
+    let has_chroma = ["RY", "BY"].iter().any(|name| channels.get(name).is_some());
+    let gray = if has_chroma { None } else { channels.take("Y") }?;
+    Some((String::new(), [gray.clone(), gray.clone(), gray]))
+}
+
+/// Returns the matrix from colors of these primaries to linear sRGB, their white adapted to D65 (Bradford).
+pub(super) fn srgb_from(own: &Chromaticities) -> Option<[[f64; 3]; 3]> {
+    let xyz = |p: exr::prelude::Vec2<f32>| {
+        let (x, y) = (f64::from(p.0), f64::from(p.1));
+        let is_color = x.is_finite() && y.is_finite() && y.abs() > 1e-6;
+        is_color.then(|| [x / y, 1.0, (1.0 - x - y) / y])
+    };
+    let [r, g, b, w] = [xyz(own.red)?, xyz(own.green)?, xyz(own.blue)?, xyz(own.white)?];
+    let primaries = DMat3::from_cols(DVec3::from(r), DVec3::from(g), DVec3::from(b));
+    if primaries.determinant().abs() < 1e-9 || w.iter().any(|v| *v <= 0.0) {
+        return None;
+    }
+    let shares = primaries.inverse() * DVec3::from(w);
+    let d65 = Xyz::from_linear_srgb([1.0; 3]);
+    let columns = [r, g, b]
+        .into_iter()
+        .zip(shares.to_array())
+        .map(|(primary, share)| adapt_bradford(Xyz(primary.map(|v| v * share)), Xyz(w), d65).to_linear_srgb());
+    let columns: Vec<[f64; 3]> = columns.collect();
+    Some([0, 1, 2].map(|i| [columns[0][i], columns[1][i], columns[2][i]]))
+}
+
+/// Whether primaries and white are those of sRGB, to the digits that writers have.
+pub(super) fn are_srgb(own: &Chromaticities) -> bool {
+    let pairs =
+        [(own.red, [0.64, 0.33]), (own.green, [0.30, 0.60]), (own.blue, [0.15, 0.06]), (own.white, [0.3127, 0.329])];
+    pairs.iter().all(|(own, srgb)| (own.0 - srgb[0]).abs() < 1e-3 && (own.1 - srgb[1]).abs() < 1e-3)
+}
+
+#[cfg(test)]
+mod tests {
+    use approx::assert_abs_diff_eq;
+    use exr::prelude::Vec2;
+
+    use super::*;
+
+    #[test]
+    fn acescg_becomes_srgb_by_the_published_matrix() {
+        let ap1 = Chromaticities {
+            red: Vec2(0.713, 0.293),
+            green: Vec2(0.165, 0.830),
+            blue: Vec2(0.128, 0.044),
+            white: Vec2(0.32168, 0.33767),
+        };
+        // AP1 to linear Rec. 709 with Bradford's adaptation, as the ACES documents and colour-science give it.
+        let published = [[1.70505, -0.62179, -0.08326], [-0.13026, 1.14080, -0.01055], [-0.02400, -0.12897, 1.15297]];
+        for (row, expected) in srgb_from(&ap1).unwrap().iter().zip(published) {
+            for (value, expected) in row.iter().zip(expected) {
+                // Four digits of the chromaticities.
+                assert_abs_diff_eq!(*value, expected, epsilon = 3e-4);
+            }
+        }
+        let srgb = Chromaticities {
+            red: Vec2(0.64, 0.33),
+            green: Vec2(0.30, 0.60),
+            blue: Vec2(0.15, 0.06),
+            white: Vec2(0.3127, 0.3290),
+        };
+        assert!(are_srgb(&srgb) && !are_srgb(&ap1));
+        assert!(srgb_from(&Chromaticities { red: srgb.green, ..srgb }).is_none());
+    }
+
+    #[test]
+    fn colors_are_the_picture_not_another_pass() {
+        let take = |names: &[&str]| {
+            let planes = names.iter().map(|name| ((*name).to_owned(), Array2::zeros((1, 1)))).collect();
+            let mut channels = Stated::new("channel", planes);
+            colors_of(&mut channels)
+                .map(|(prefix, _)| (prefix, channels.names().map(str::to_owned).collect::<Vec<_>>()))
+        };
+        let pass = |pass: &str| ["R", "G", "B"].map(|letter| format!("{pass}.{letter}"));
+        let both = [pass("V.Noisy Image"), pass("V.Combined")].concat();
+        let names: Vec<&str> = both.iter().map(String::as_str).collect();
+        let (prefix, left) = take(&names).unwrap();
+        assert_eq!((prefix.as_str(), left.len()), ("V.Combined", 3));
+        assert_eq!(take(&["Y"]).unwrap().0, "");
+        assert!(take(&["Y", "RY", "BY"]).is_none() && take(&["R", "G"]).is_none());
+        // Of two passes neither of which is called a picture none is chosen.
+        let two = [pass("x"), pass("y")].concat();
+        assert!(take(&two.iter().map(String::as_str).collect::<Vec<_>>()).is_none());
+    }
+}
