@@ -2,7 +2,7 @@
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot open its files fails")]
 
-use dioptric_analysis::measure::{ChartRequest, CodeCurve, EdgeRequest, PixelRegion};
+use dioptric_analysis::measure::{ChartRequest, CodeCurve, EdgeRequest, MeasuredPicture, PixelRegion};
 use dioptric_golden::shared;
 use dioptric_pipeline::DevelopedFile;
 
@@ -10,9 +10,10 @@ use dioptric_pipeline::DevelopedFile;
 #[test]
 fn an_edge_with_two_percent_of_noise_has_its_mtf50_in_every_region() {
     let path = shared("inputs/sensor/edge_noise2pc.png").unwrap();
+    let picture = MeasuredPicture::open(&path, CodeCurve::ByFile).unwrap();
     for region in ["20,20,120,120", "0,0,160,160", "30,10,100,140", "40,40,80,80", "10,30,140,100"] {
         let request = EdgeRequest { region: Some(PixelRegion::parse(region).unwrap()), ..EdgeRequest::default() };
-        let measured = request.measure(&path).unwrap();
+        let measured = request.measure(&picture).unwrap();
         let channel = &measured.channels[0];
         let (mtf50, error) = (channel.mtf50_cycles_per_pixel.unwrap(), channel.mtf50_error_cycles_per_pixel.unwrap());
         // The truth is 0.2202; the smallest region has an error of 0.007 by its noise.
@@ -28,15 +29,16 @@ fn an_edge_with_two_percent_of_noise_has_its_mtf50_in_every_region() {
 #[test]
 fn a_raw_file_is_measured_by_its_raw_frame() {
     let path = shared("inputs/sensor/plain.dng").unwrap();
+    let picture = MeasuredPicture::open(&path, CodeCurve::ByFile).unwrap();
     // 128 × 96 pixels of RGGB, without an edge: each filter says so, and no preview is looked at.
     let request = EdgeRequest { region: Some(PixelRegion::parse("0,0,128,96").unwrap()), ..EdgeRequest::default() };
-    let reason = match request.measure(&path) {
+    let reason = match request.measure(&picture) {
         Ok(measured) => measured.channels.iter().map(|channel| channel.channel.clone()).collect::<String>(),
         Err(error) => error.to_string(),
     };
     assert!(["RGB", "slanted edge"].iter().any(|word| reason.contains(word)), "{reason}");
-    let chart = ChartRequest { corners: None, light: None, curve: CodeCurve::ByFile };
-    let reason = chart.measure(&path).unwrap_err().to_string();
+    let chart = ChartRequest { corners: None, light: None };
+    let reason = chart.measure(&picture).unwrap_err().to_string();
     assert!(reason.contains("dioptric develop"), "{reason}");
 }
 

@@ -1,11 +1,12 @@
 //! `dioptric measure`: a laboratory's measurements of pictures, frames and sensors.
 
-use std::fmt::Write;
+use std::{fmt::Write, path::Path};
 
 use dioptric_analysis::measure::{
-    BenchRequest, ChartMeasurement, ChartRequest, CompareRequest, Comparison, EdgeMeasurement, EdgeRequest, NoiseData,
-    PictureViewing, PixelRegion, PointRequest, PointSet, RegionMeasurement, RegionRequest, TextureCurve,
-    TextureMeasurement, TextureNoiseRequest, TextureRequest, measure_bench, measure_frames, notes_on_picture,
+    BenchRequest, ChartMeasurement, ChartRequest, CompareRequest, Comparison, EdgeMeasurement, EdgeRequest,
+    MeasuredPicture, NoiseData, PictureViewing, PixelRegion, PointRequest, PointSet, RegionMeasurement, RegionRequest,
+    TextureCurve, TextureMeasurement, TextureNoiseRequest, TextureRequest, measure_bench, measure_frames,
+    notes_on_picture,
 };
 use dioptric_pipeline::{SensorSpec, Staged, open_display, parse_illuminant};
 
@@ -14,7 +15,7 @@ use crate::{
     lens::tell,
     measure_args::{ColorArgs, MeasureCommand, MtfArgs, NoiseArgs, RegionArgs, SpotArgs, TextureArgs},
     measure_charts,
-    measure_output::{Finish, curve, file_name, or_dash},
+    measure_output::{Finish, curve, file_name, opened, or_dash},
 };
 
 /// The seed where the user gives none.
@@ -36,15 +37,12 @@ pub(crate) fn run(command: &MeasureCommand, common: &Common) -> anyhow::Result<(
 }
 
 fn mtf(arguments: &MtfArgs, common: &Common) -> anyhow::Result<()> {
-    let curve = curve(arguments.picture_args.curve);
-    tell(&notes_on_picture(&arguments.picture, curve), common);
     let request = EdgeRequest {
         region: arguments.region.as_deref().map(PixelRegion::parse).transpose()?,
         side: arguments.size,
         mosaic: arguments.mosaic.clone(),
         pixel_um: arguments.pixel_um,
         pixels_per_degree: arguments.pixels_per_degree,
-        curve,
     };
     if arguments.all {
         return measure_charts::edges(request, arguments, common);
@@ -55,52 +53,43 @@ fn mtf(arguments: &MtfArgs, common: &Common) -> anyhow::Result<()> {
         arguments.picture_args.out.as_deref(),
         common,
     )?;
-    finish.with(&request.measure(&arguments.picture)?, mtf_table)
+    finish.with(&request.measure(&opened(&arguments.picture, &arguments.picture_args, common)?)?, mtf_table)
 }
 
 fn texture(arguments: &TextureArgs, common: &Common) -> anyhow::Result<()> {
-    tell(&notes_on_picture(&arguments.picture, curve(arguments.picture_args.curve)), common);
+    let picture = opened(&arguments.picture, &arguments.picture_args, common)?;
+    let beside = |path: &Path| MeasuredPicture::open(path, curve(arguments.picture_args.curve));
     let region = |text: &Option<String>| text.as_deref().map(PixelRegion::parse).transpose();
     let request = TextureRequest {
-        reference: arguments.reference.clone(),
         region: region(&arguments.region)?,
         noise: match (region(&arguments.flat)?, &arguments.second_frame) {
             (Some(patch), _) => TextureNoiseRequest::Flat(patch),
-            (None, Some(second)) => TextureNoiseRequest::SecondFrame(second.clone()),
+            (None, Some(second)) => TextureNoiseRequest::SecondFrame(beside(second)?),
             (None, None) => TextureNoiseRequest::None,
         },
         pixels_per_degree: arguments.pixels_per_degree,
-        curve: curve(arguments.picture_args.curve),
     };
     let subject = format!("{} against {}", file_name(&arguments.picture), file_name(&arguments.reference));
     let finish = Finish::new(("texture", "Texture response"), subject, arguments.picture_args.out.as_deref(), common)?;
-    finish.with(&request.measure(&arguments.picture)?, texture_table)
+    finish.with(&request.measure(&picture, &beside(&arguments.reference)?)?, texture_table)
 }
 
 fn spot(arguments: &SpotArgs, common: &Common) -> anyhow::Result<()> {
-    tell(&notes_on_picture(&arguments.picture, curve(arguments.picture_args.curve)), common);
-    let request = PointRequest {
-        window: arguments.window,
-        pixel_um: arguments.pixel_um,
-        background: arguments.background,
-        curve: curve(arguments.picture_args.curve),
-    };
+    let request =
+        PointRequest { window: arguments.window, pixel_um: arguments.pixel_um, background: arguments.background };
     let finish =
         Finish::new(("spot", "Points"), file_name(&arguments.picture), arguments.picture_args.out.as_deref(), common)?;
-    finish.with(&request.measure(&arguments.picture)?, spot_table)
+    finish.with(&request.measure(&opened(&arguments.picture, &arguments.picture_args, common)?)?, spot_table)
 }
 
 fn region(arguments: &RegionArgs, common: &Common) -> anyhow::Result<()> {
-    tell(&notes_on_picture(&arguments.picture, curve(arguments.picture_args.curve)), common);
+    let curve = curve(arguments.picture_args.curve);
+    tell(&notes_on_picture(&arguments.picture, curve), common);
     let parsed = |text: &Option<String>| text.as_deref().map(PixelRegion::parse).transpose();
-    let request = RegionRequest {
-        region: parsed(&arguments.region)?,
-        reference: parsed(&arguments.reference)?,
-        curve: curve(arguments.picture_args.curve),
-    };
+    let request = RegionRequest { region: parsed(&arguments.region)?, reference: parsed(&arguments.reference)? };
     let out = arguments.picture_args.out.as_deref();
     let finish = Finish::new(("region", "Region"), file_name(&arguments.picture), out, common)?;
-    finish.with(&request.measure(&arguments.picture)?, region_table)
+    finish.with(&request.measure_file(&arguments.picture, curve)?, region_table)
 }
 
 fn noise(arguments: &NoiseArgs, common: &Common) -> anyhow::Result<()> {
@@ -111,7 +100,7 @@ fn noise(arguments: &NoiseArgs, common: &Common) -> anyhow::Result<()> {
         (Some(frames), _) => measure_frames(frames)?,
         (None, Some(sensor)) => {
             let request = BenchRequest {
-                sensor: SensorSpec::named(sensor),
+                sensor: SensorSpec::named(sensor).open()?,
                 filter: arguments.filter.clone(),
                 side: arguments.size,
                 n_levels: arguments.levels,
@@ -145,19 +134,18 @@ fn color(arguments: &ColorArgs, common: &Common) -> anyhow::Result<()> {
         let request = CompareRequest {
             viewing: viewing(arguments, common)?,
             patch: arguments.patch.as_deref().map(PixelRegion::parse).transpose()?,
-            curve,
         };
         let subject = format!("{} against {}", file_name(&arguments.picture), file_name(against));
         let finish = Finish::new(("compare", "Two pictures"), subject, out, common)?;
-        return finish.with(&request.compare(&arguments.picture, against)?, comparison_table);
+        let open = |path: &Path| request.viewing.open(path, curve);
+        return finish.with(&request.compare(&open(&arguments.picture)?, &open(against)?)?, comparison_table);
     }
     let request = ChartRequest {
         corners: arguments.corners.as_deref().map(ChartRequest::parse_corners).transpose()?,
         light: arguments.illuminant.as_deref().map(parse_illuminant).transpose()?,
-        curve,
     };
     let finish = Finish::new(("color", "Color chart"), file_name(&arguments.picture), out, common)?;
-    finish.with(&request.measure(&arguments.picture)?, chart_table)
+    finish.with(&request.measure(&MeasuredPicture::open(&arguments.picture, curve)?)?, chart_table)
 }
 
 fn viewing(arguments: &ColorArgs, common: &Common) -> anyhow::Result<PictureViewing> {

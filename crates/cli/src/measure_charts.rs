@@ -3,15 +3,15 @@
 use std::fmt::{Error, Write};
 
 use dioptric_analysis::measure::{
-    EdgeMap, EdgeMapRequest, EdgeRequest, GridMeasurement, GridRequest, PixelRegion, ShadingMeasurement,
-    ShadingRequest, StarMeasurement, StarRequest, StepsMeasurement, StepsRequest, notes_on_picture,
+    EdgeMap, EdgeMapRequest, EdgeRequest, GridMeasurement, PixelRegion, ShadingMeasurement, StarMeasurement,
+    StarRequest, StepsMeasurement, StepsRequest,
 };
 
 use crate::{
     args::Common,
     lens::tell,
     measure_args::{GridArgs, ShadingArgs, StarArgs, StepsArgs},
-    measure_output::{Finish, curve, file_name, or_dash},
+    measure_output::{Finish, file_name, opened, or_dash},
 };
 
 /// Places of a map that cannot be measured and are still named.
@@ -29,47 +29,43 @@ pub(crate) fn edges(
         arguments.picture_args.out.as_deref(),
         common,
     )?;
-    finish.with(&EdgeMapRequest { edge: request }.measure(&arguments.picture)?, edge_map_table)
+    let picture = opened(&arguments.picture, &arguments.picture_args, common)?;
+    finish.with(&EdgeMapRequest { edge: request }.measure(&picture)?, edge_map_table)
 }
 
 pub(crate) fn star(arguments: &StarArgs, common: &Common) -> anyhow::Result<()> {
-    let curve = curve(arguments.picture_args.curve);
-    tell(&notes_on_picture(&arguments.picture, curve), common);
+    let picture = opened(&arguments.picture, &arguments.picture_args, common)?;
     let request = StarRequest {
         region: arguments.region.as_deref().map(PixelRegion::parse).transpose()?,
         n_cycles: arguments.cycles,
         is_binary: arguments.binary,
         modulation: arguments.modulation,
-        curve,
     };
     let out = arguments.picture_args.out.as_deref();
     let finish = Finish::new(("star", "Siemens star"), file_name(&arguments.picture), out, common)?;
-    finish.with(&request.measure(&arguments.picture)?, star_table)
+    finish.with(&request.measure(&picture)?, star_table)
 }
 
 pub(crate) fn grid(arguments: &GridArgs, common: &Common) -> anyhow::Result<()> {
-    let curve = curve(arguments.picture_args.curve);
-    tell(&notes_on_picture(&arguments.picture, curve), common);
+    let picture = opened(&arguments.picture, &arguments.picture_args, common)?;
     let out = arguments.picture_args.out.as_deref();
     let finish = Finish::new(("grid", "Distortion and lateral color"), file_name(&arguments.picture), out, common)?;
-    finish.with(&GridRequest { curve }.measure(&arguments.picture)?, grid_table)
+    finish.with(&GridMeasurement::of(&picture)?, grid_table)
 }
 
 pub(crate) fn shading(arguments: &ShadingArgs, common: &Common) -> anyhow::Result<()> {
-    let curve = curve(arguments.picture_args.curve);
-    tell(&notes_on_picture(&arguments.picture, curve), common);
+    let picture = opened(&arguments.picture, &arguments.picture_args, common)?;
     let out = arguments.picture_args.out.as_deref();
     let finish = Finish::new(("shading", "Shading"), file_name(&arguments.picture), out, common)?;
-    finish.with(&ShadingRequest { curve }.measure(&arguments.picture)?, shading_table)
+    finish.with(&ShadingMeasurement::of(&picture)?, shading_table)
 }
 
 pub(crate) fn steps(arguments: &StepsArgs, common: &Common) -> anyhow::Result<()> {
-    let curve = curve(arguments.picture_args.curve);
-    tell(&notes_on_picture(&arguments.picture, curve), common);
-    let request = StepsRequest { steps: StepsRequest::read_steps(&arguments.steps)?, curve };
+    let picture = opened(&arguments.picture, &arguments.picture_args, common)?;
+    let request = StepsRequest { steps: StepsRequest::read_steps(&arguments.steps)? };
     let out = arguments.picture_args.out.as_deref();
     let finish = Finish::new(("steps", "Gray steps"), file_name(&arguments.picture), out, common)?;
-    let measured = request.measure(&arguments.picture)?;
+    let measured = request.measure(&picture)?;
     tell(&measured.notes, common);
     finish.with(&measured, steps_table)
 }

@@ -2,13 +2,14 @@
 
 use std::path::Path;
 
-use dioptric_analysis::measure::{CodeCurve, Measurement};
-use dioptric_pipeline::Staged;
+use dioptric_analysis::measure::{CodeCurve, MeasuredPicture, Measurement, notes_on_picture};
+use dioptric_pipeline::{PipelineError, Staged};
 use dioptric_report::{MeasurementWords, write_measurement};
 
 use crate::{
     args::Common,
-    measure_args::CurveKind,
+    lens::tell,
+    measure_args::{CurveKind, PictureArgs},
     terminal::{print, print_json, remark_on_png},
 };
 
@@ -18,6 +19,13 @@ pub(crate) fn curve(kind: CurveKind) -> CodeCurve {
         CurveKind::Linear => CodeCurve::Linear,
         CurveKind::Srgb => CodeCurve::Srgb,
     }
+}
+
+/// Opens a picture to be measured, and tells what of its statements is used.
+pub(crate) fn opened(path: &Path, arguments: &PictureArgs, common: &Common) -> Result<MeasuredPicture, PipelineError> {
+    let curve = curve(arguments.curve);
+    tell(&notes_on_picture(path, curve), common);
+    MeasuredPicture::open(path, curve)
 }
 
 /// What becomes of a measurement: files in a folder, and numbers on standard output.

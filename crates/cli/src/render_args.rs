@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand, ValueEnum};
-use dioptric_pipeline::{Crop, Diffraction, WorldLamp, WorldSky, WorldView, parse_numbers};
+use dioptric_pipeline::{Crop, Diffraction, PipelineError, WorldLamp, WorldSky, WorldView, parse_numbers};
 
 use crate::lens_args::{BandArgs, FilmArgs, LensStateArgs};
 
@@ -169,28 +169,10 @@ fn parse_lamp(text: &str) -> Result<WorldLamp, String> {
 }
 
 fn parse_sky(text: &str) -> Result<WorldSky, String> {
-    let numbers = |text: &str| match text {
-        "" => Ok(Vec::new()),
-        text => parse_numbers("a sky", text).map_err(|e| e.to_string()),
-    };
-    let (word, rest) = text.split_once(':').unwrap_or((text, ""));
-    match word {
-        "even" => match numbers(rest)?.as_slice() {
-            [] => Ok(WorldSky::Even(1.0)),
-            &[radiance] => Ok(WorldSky::Even(radiance)),
-            _ => Err("expected even:RADIANCE".to_owned()),
-        },
-        "day" => {
-            let n = numbers(rest)?;
-            let at = |place: usize, usual: f64| n.get(place).copied().unwrap_or(usual);
-            if n.len() > 3 {
-                return Err("expected day:ELEVATION,AZIMUTH,TURBIDITY".to_owned());
-            }
-            Ok(WorldSky::Day { elevation_deg: at(0, 45.0), azimuth_deg: at(1, 30.0), turbidity: at(2, 3.0) })
-        }
-        _ if Path::new(text).extension().is_some() => Ok(WorldSky::Picture(PathBuf::from(text))),
-        _ => Err("expected even:RADIANCE, day:ELEVATION,AZIMUTH,TURBIDITY or a picture".to_owned()),
-    }
+    text.parse().map_err(|error| match error {
+        PipelineError::Value { expected, .. } => format!("expected {expected}"),
+        other => other.to_string(),
+    })
 }
 
 /// Something to do with worlds.

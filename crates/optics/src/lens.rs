@@ -473,7 +473,7 @@ impl Lens {
     }
 
     /// Half the diameter of the prescription's stop, mm, however far it is stopped down.
-    pub(crate) fn full_stop_semi_aperture_mm(&self) -> f64 {
+    pub fn full_stop_semi_aperture_mm(&self) -> f64 {
         self.full_stop_semi_aperture_mm
     }
 

@@ -35,7 +35,11 @@ impl DevelopedFile {
         Self::of(DngFile::read_with(path, DngOpcodes::Ignored)?, processing)
     }
 
-    fn of(file: DngFile, processing: Processing) -> Result<Self, PipelineError> {
+    /// Develops the frame of a file, or one that a program holds as such.
+    ///
+    /// # Errors
+    /// As [`read`](Self::read).
+    pub fn of(file: DngFile, processing: Processing) -> Result<Self, PipelineError> {
         if !processing.lens_corrections.is_none() {
             let reason = "need a simulated lens, which a raw file does not hold, expected none".to_owned();
             return Err(SensorError::Unsuitable { what: "lens_corrections", reason }.into());

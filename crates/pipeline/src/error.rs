@@ -1,6 +1,6 @@
 //! What can go wrong between a camera file and its picture.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use dioptric_backward::BackwardError;
 use dioptric_files::WriteError;
@@ -177,6 +177,20 @@ impl PipelineError {
                     | Self::Backward(BackwardError::Write { .. })
                     | Self::Forward(ForwardError::Sink { .. })
             )
+    }
+
+    /// Returns the file or folder that cannot be read or written, where that is what is wrong.
+    pub fn file(&self) -> Option<&Path> {
+        match self {
+            Self::Read { path, .. }
+            | Self::Write { path, .. }
+            | Self::Optics(OpticsError::Io { path, .. })
+            | Self::Sensor(SensorError::Read { path, .. } | SensorError::Write { path, .. })
+            | Self::Scene(SceneError::Unreadable { file: path, .. } | SceneError::Unwritable { file: path, .. })
+            | Self::World(WorldError::Unreadable { file: path, .. })
+            | Self::Backward(BackwardError::Write { file: path, .. }) => Some(path),
+            _ => None,
+        }
     }
 
     /// Whether a file that the camera is made from cannot be read: absent, cut off, or of another format. Another try may find it

@@ -1,23 +1,30 @@
 //! The camera.
 
-use std::path::PathBuf;
+use std::{path::PathBuf, sync::Arc};
 
-use dioptric_pipeline::{Camera as CameraFile, KeptCamera, Quality, parse_bytes};
+use dioptric_analysis::MethodComparison;
+use dioptric_pipeline::{Camera as CameraFile, Given, KeptCamera, RenderEffort, SceneSource, StopSpec, parse_bytes};
+use ndarray::Array3;
 use pyo3::{
+    IntoPyObjectExt,
     prelude::*,
-    types::{PyDict, PyType},
+    types::{PyDict, PyTuple},
 };
 
 use crate::{
     changes::{all, changed},
     errors::{exception, guarded, wrong},
     lens::Lens,
-    options::word,
+    light_field::LightField,
+    options::{count, word},
     paintings::painting_folder,
+    pickle::{quality_of, restorer},
     scene::Scene,
     sensor::Sensor,
     serial::{from_python, to_python},
     shot::Shot,
+    video::Video,
+    view::view,
     worker::{Follower, run},
 };
 
@@ -33,6 +40,11 @@ pub(crate) struct Camera {
 impl Camera {
     pub(crate) fn new(kept: KeptCamera) -> Self {
         Self { kept }
+    }
+
+    /// The camera with what is kept.
+    pub(crate) fn kept(&self) -> &KeptCamera {
+        &self.kept
     }
 
     /// Returns the camera of a camera file; paintings of the still life are kept in the user's cache, as the program does.
@@ -169,7 +181,17 @@ impl Camera {
     ///     How far a lone pixel is off before it is replaced, a share of saturation.
     /// seed : int
     /// name : str
-    #[pyo3(signature = (**changes))]
+    #[pyo3(signature = (**changes), text_signature = "($self, *, name=None, lens=None, f_number=None, stop_mm=None, focus_mm=None, film_mm=None, tilt_deg=None, \
+swing_deg=None, rise_mm=None, shift_mm=None, sensor=None, film=None, crop=None, pixels=None, pixel_um=None, \
+dual_pixel=None, filters=None, diffraction=None, gamma=None, blur=None, border=None, bank=None, bank_error=None, \
+scene=None, fov_deg=None, depth_m=None, width_mm=None, distance_mm=None, fill_depth=None, hidden=None, points=None, \
+white_level=None, quantity=None, unit=None, scale=None, scene_wavelengths_nm=None, variable=None, axes=None, \
+no_data=None, depth=None, depth_unit=None, depth_kind=None, view=None, panorama=None, illuminant=None, \
+illuminance_lux=None, scene_light=None, mean_luminance_cd_m2=None, mean_lux=None, wavelengths_nm=None, \
+exposure_s=None, analog_gain=None, noise=None, burst=None, bracket_stops=None, interleaved_ratio=None, \
+interleaved_gain_ratio=None, seed=None, white=None, demosaic=None, denoise=None, highlights=None, \
+lens_corrections=None, color=None, sharpen_px=None, local_tone=None, perspective=None, brightness=None, curve=None, \
+space=None, defect_threshold=None)")]
     fn with_(&self, changes: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
         guarded(|| Ok(Self::new(changed("with_", &self.kept, changes, &all())?)))
     }
@@ -201,12 +223,8 @@ impl Camera {
         memory_bytes: Option<u64>,
         memory: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Shot> {
-        let quality = match quality {
-            "full" => Quality::Full,
-            "draft" => Quality::Draft,
-            "preview" => Quality::Preview,
-            "sketch" => Quality::Sketch,
-            other => return Err(wrong("quality", format!("'{other}'"), "'full', 'draft', 'preview' or 'sketch'")),
+        let Some(quality) = quality_of(quality) else {
+            return Err(wrong("quality", format!("'{quality}'"), "'full', 'draft', 'preview' or 'sketch'"));
         };
         let mut kept = self.kept.with_quality(quality);
         if let Some(bytes) = memory_bytes {
@@ -221,6 +239,127 @@ impl Camera {
             kept = kept.with_memory_budget(budget);
         }
         Shot::take(py, kept, &Follower::of(progress)?)
+    }
+
+    /// Takes the frames of a video one after the other: how the camera turns is that of its file, with what is given changed.
+    ///
+    /// Parameters
+    /// ----------
+    /// frames : int
+    /// frames_per_s : float
+    /// row_time_us : float
+    ///     From one row's readout to the next, 0 for a global shutter; that of the sensor without it.
+    /// pan_deg_per_s, tilt_deg_per_s, roll_deg_per_s : float
+    ///     To the right, upwards and clockwise.
+    /// shake_deg, shake_hz : float
+    ///     Standard deviation of the shake of a hand, and the middle of its frequencies.
+    /// progress : bool or callable
+    ///     As of `render`, for what all frames are taken from.
+    ///
+    /// Returns
+    /// -------
+    /// Video, whose frames are taken when they are asked for.
+    #[pyo3(signature = (*, frames=None, frames_per_s=None, row_time_us=None, pan_deg_per_s=None, tilt_deg_per_s=None,
+        roll_deg_per_s=None, shake_deg=None, shake_hz=None, progress=None))]
+    #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
+    fn video(
+        &self,
+        py: Python<'_>,
+        frames: Option<&Bound<'_, PyAny>>,
+        frames_per_s: Option<f64>,
+        row_time_us: Option<f64>,
+        pan_deg_per_s: Option<f64>,
+        tilt_deg_per_s: Option<f64>,
+        roll_deg_per_s: Option<f64>,
+        shake_deg: Option<f64>,
+        shake_hz: Option<f64>,
+        progress: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Video> {
+        let mut spec = self.kept.camera().video.unwrap_or_default();
+        if let Some(value) = frames {
+            spec.frames = count("frames", value)?;
+        }
+        spec.row_time_us = row_time_us.or(spec.row_time_us);
+        let motion = &mut spec.motion;
+        for (place, given) in [
+            (&mut spec.frames_per_s, frames_per_s),
+            (&mut motion.pan_deg_per_s, pan_deg_per_s),
+            (&mut motion.tilt_deg_per_s, tilt_deg_per_s),
+            (&mut motion.roll_deg_per_s, roll_deg_per_s),
+            (&mut motion.shake_deg, shake_deg),
+            (&mut motion.shake_hz, shake_hz),
+        ] {
+            *place = given.unwrap_or(*place);
+        }
+        let kept = self.kept.with(|camera| camera.video = Some(spec));
+        kept.camera().validate().map_err(exception)?;
+        run(py, &Follower::of(progress)?, |progress, cancel| Ok(Video::new(kept.video(progress, cancel)?)))
+    }
+
+    /// Takes the light field of a camera with an array before its film, or of a raster of cameras, as its file's ``light_field`` has it; the
+    /// scene must be a world.
+    ///
+    /// Parameters
+    /// ----------
+    /// views : int, optional
+    ///     Along each side of the pupil behind an array; one a pixel across its image without it.
+    /// progress : bool or callable
+    ///     As of `render`.
+    ///
+    /// Returns
+    /// -------
+    /// LightField
+    #[pyo3(signature = (*, views=None, progress=None))]
+    fn light_field(
+        &self,
+        py: Python<'_>,
+        views: Option<&Bound<'_, PyAny>>,
+        progress: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<LightField> {
+        let n_views = views.map(|value| count("views", value)).transpose()?;
+        run(py, &Follower::of(progress)?, |progress, cancel| {
+            Ok(LightField::new(self.kept.light_field(n_views, progress, cancel)?))
+        })
+    }
+
+    /// Renders the world before the camera both ways, rays from the film against its view blurred by point spread functions, and compares
+    /// them.
+    ///
+    /// Parameters
+    /// ----------
+    /// samples : int, optional
+    ///     A pixel, of both; those of the scene without it.
+    /// progress : bool or callable
+    ///     As of `render`.
+    ///
+    /// Returns
+    /// -------
+    /// dict, with the keys of ``dioptric compare --json``, and ``backward`` and ``forward``, both pictures as an observer sees them, linear
+    /// sRGB in lux, (rows, columns, 3) float32.
+    #[pyo3(signature = (*, samples=None, progress=None))]
+    fn compare_methods<'py>(
+        &self,
+        py: Python<'py>,
+        samples: Option<&Bound<'py, PyAny>>,
+        progress: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        self.kept.given().check_none().map_err(exception)?;
+        let mut camera = self.kept.camera().clone();
+        if let (Some(value), SceneSource::World(world)) = (samples, &mut camera.scene.source) {
+            let n = u32::try_from(count("samples", value)?).map_err(|_| wrong("samples", value, "a smaller number"))?;
+            world.effort = RenderEffort::Samples(n);
+        }
+        camera.validate().map_err(exception)?;
+        let comparison =
+            run(py, &Follower::of(progress)?, |progress, cancel| MethodComparison::of(&camera, progress, cancel))?;
+        let numbers = to_python(py, &comparison)?;
+        for (key, picture) in [("backward", &comparison.backward), ("forward", &comparison.forward)] {
+            let planes = &picture.planes;
+            let (rows, columns) = planes[0].dim();
+            let samples = Array3::from_shape_fn((rows, columns, 3), |(row, column, k)| planes[k][(row, column)]);
+            numbers.set_item(key, view(py, &Arc::new(samples), |samples| samples.view())?)?;
+        }
+        Ok(numbers)
     }
 
     /// What the shot is called.
@@ -286,16 +425,44 @@ impl Camera {
         guarded(|| dioptric_files::write(&path, text.as_bytes()).map_err(exception))
     }
 
+    /// Cameras are equal when their files are, and what was made in Python: large contents are compared where they are not the same.
     fn __eq__(&self, other: &Self) -> bool {
-        self.kept.camera() == other.kept.camera() && self.kept.given() == other.kept.given()
+        fn alike<T: PartialEq>(own: Option<&Given<T>>, other: Option<&Given<T>>) -> bool {
+            own == other || matches!((own, other), (Some(own), Some(other)) if **own == **other)
+        }
+        let (own, others) = (self.kept.given(), other.kept.given());
+        self.kept.camera() == other.kept.camera()
+            && alike(own.lens.as_ref(), others.lens.as_ref())
+            && alike(own.sensor.as_ref(), others.sensor.as_ref())
+            && alike(own.scene.as_ref(), others.scene.as_ref())
     }
 
     fn __repr__(&self) -> String {
         format!("<Camera {}>", self.name())
     }
 
-    /// Copies by the text of the camera file, so that cameras can be sent to other processes; what is kept stays here.
-    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (String,))> {
-        Ok((PyType::new::<Self>(py).getattr("from_ron")?, (self.to_ron()?,)))
+    /// Copies by the text of the camera file and the parts that were made in Python, so that cameras can be sent to other processes;
+    /// what is kept stays here.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
+        let (camera, given) = (self.kept.camera(), self.kept.given());
+        let lens = given.lens.as_ref().map(|lens| Lens::restored((**lens).clone().into(), None, StopSpec::AsGiven));
+        let scene = given.scene.as_ref().map(|_| Scene::of_camera(&self.kept));
+        let sensor = given.sensor.as_ref().map(|sheet| Sensor::restored((**sheet).clone(), None));
+        let arguments = [
+            camera.to_ron().into_bound_py_any(py)?,
+            lens.into_bound_py_any(py)?,
+            scene.into_bound_py_any(py)?,
+            sensor.into_bound_py_any(py)?,
+        ];
+        Ok((restorer(py, "_restore_camera")?, PyTuple::new(py, arguments)?))
+    }
+
+    fn __copy__(own: Py<Self>) -> Py<Self> {
+        own
+    }
+
+    fn __deepcopy__(own: Py<Self>, memo: &Bound<'_, PyAny>) -> Py<Self> {
+        let _ = memo;
+        own
     }
 }

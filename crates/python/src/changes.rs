@@ -16,8 +16,9 @@ use crate::{
     errors::{exception, wrong, wrong_type},
     input::{number, numbers, type_name},
     lens::Lens,
-    options::{count, diffraction, each_option, with_gamma, word},
-    scene::{SCENE_OPTIONS, Scene, check_flat, set_scene_option},
+    options::{count, diffraction, each_option, seed, with_gamma, word},
+    scene::Scene,
+    scene_options::{SCENE_OPTIONS, check_flat, set_scene_option},
     sensor::Sensor,
 };
 
@@ -368,10 +369,7 @@ fn set_frames(camera: &mut Camera, key: &str, value: &Bound<'_, PyAny>) -> PyRes
                 _ => FramesSpec::Interleaved { ratio: 1.0, period_rows: 2, gain_ratio },
             };
         }
-        "seed" => {
-            camera.seed =
-                value.extract().map_err(|_| wrong_type(key, type_name(value), "a whole number of 0 or more"))?;
-        }
+        "seed" => camera.seed = seed(key, value)?,
         _ => return Ok(false),
     }
     Ok(true)

@@ -18,6 +18,7 @@ pub(crate) fn number(key: &str, value: &Bound<'_, PyAny>) -> PyResult<f64> {
 
 /// Returns a list of numbers, or a single one as a list of one.
 pub(crate) fn numbers(key: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
+    refuse_masked(key, value)?;
     if value.len().is_err() {
         let one = value.extract().map_err(|_| wrong_type(key, type_name(value), "a number or a list of numbers"))?;
         return Ok(vec![one]);
@@ -30,21 +31,24 @@ pub(crate) fn numbers(key: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<f64>>
     }
 }
 
+/// Refuses NumPy's masked arrays, whose masked numbers would count.
+fn refuse_masked(key: &str, value: &Bound<'_, PyAny>) -> PyResult<()> {
+    let is_masked = value.hasattr(intern!(value.py(), "mask"))? && value.hasattr(intern!(value.py(), "filled"))?;
+    match is_masked {
+        true => Err(wrong_type(key, "a masked array", "an array without a mask: array.filled(value) makes one")),
+        false => Ok(()),
+    }
+}
+
 /// Whether an argument is a single number, whose axis results leave out.
 pub(crate) fn is_single(value: &Bound<'_, PyAny>) -> bool {
     value.len().is_err()
 }
 
-/// Returns an array of 64-bit floats with so many axes; lists and arrays of other real numbers are converted.
-pub(crate) fn array_f64<'py>(
-    key: &str,
-    value: &Bound<'py, PyAny>,
-    shape: &str,
-    n_axes: &[usize],
-) -> PyResult<PyReadonlyArrayDyn<'py, f64>> {
+/// Returns an array of 64-bit floats; lists and arrays of other real numbers are converted.
+pub(crate) fn array_f64<'py>(key: &str, value: &Bound<'py, PyAny>) -> PyResult<PyReadonlyArrayDyn<'py, f64>> {
     let array = real_array(key, value, "float64")?;
     let array = array.cast_into::<PyArrayDyn<f64>>().map_err(|_| wrong_type(key, type_name(value), "an array"))?;
-    check_axes(key, array.as_untyped(), shape, n_axes)?;
     Ok(array.readonly())
 }
 
@@ -67,6 +71,7 @@ fn check_axes(key: &str, array: &Bound<'_, PyUntypedArray>, shape: &str, n_axes:
 fn real_array<'py>(key: &str, value: &Bound<'py, PyAny>, kind: &str) -> PyResult<Bound<'py, PyAny>> {
     static AS_ARRAY: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
     let py = value.py();
+    refuse_masked(key, value)?;
     let as_array = AS_ARRAY.import(py, "numpy", "asarray")?;
     let array = as_array.call1((value,)).map_err(|_| wrong_type(key, type_name(value), "an array of numbers"))?;
     let dtype = array.getattr(intern!(py, "dtype"))?;

@@ -5,30 +5,29 @@ use std::{
     sync::{Arc, Mutex, PoisonError},
 };
 
-use dioptric_analysis::{LensData, LensDefaults, LensInfoRequest, built_in_lenses, surface_rows};
+use dioptric_analysis::{LensData, LensDefaults, LensInfoRequest, built_in_lenses};
 use dioptric_optics::{Layout, LensFile, MonoLens, ReadOptions, Vignetting};
 use dioptric_pipeline::{
     Camera, CoatingSpec, Given, GlassRange, Iris, KeptCamera, LensReadOptions, LensSpec, MissingGlass,
     REFERENCE_WAVELENGTH_NM, StopSpec,
 };
-use ndarray::{ArrayD, IxDyn};
 use pyo3::{
+    IntoPyObjectExt,
     prelude::*,
-    types::{PyDict, PyType},
+    types::{PyDict, PyList, PyTuple},
 };
 
 use crate::{
     errors::{exception, guarded, wrong},
     input::{is_single, numbers},
     lens_requests::{PsfOptions, analysis_request},
-    rays::{GivenRays, Rays},
-    serial::to_python,
-    view::view,
-    worker::{Follower, install, run},
+    lens_rows::{lens_of, rows_of, with_surface},
+    pickle::restorer,
+    rays::{GivenRays, Rays, Traced, trace},
+    serial::{from_python, to_python},
+    worker::run_apart,
 };
 
-/// Rays below which a trace is done at once, without giving up the interpreter's lock: some 50 µs of work.
-const FEW_RAYS: usize = 500;
 /// Rays of each fan of a drawing.
 const DRAWN_RAYS: usize = 9;
 
@@ -121,6 +120,16 @@ impl Lens {
                 Ok(mono)
             }
         }
+    }
+
+    /// Returns the lens as a part of a camera.
+    pub(crate) fn given(&self) -> Given<dioptric_optics::Lens> {
+        Given::new(self.file.lens.clone())
+    }
+
+    /// Returns the lens of a text, and of what a camera file says of it.
+    pub(crate) fn restored(file: LensFile, choice: Option<(LensSpec, LensReadOptions)>, stop: StopSpec) -> Self {
+        Self { file, choice, stop, mono: Mutex::default() }
     }
 
     fn used(&self) -> LensDefaults {
@@ -413,20 +422,75 @@ impl Lens {
         })
     }
 
-    /// Returns the surfaces as a list of dictionaries: radius, thickness, diameter, medium behind, whether it is the stop.
-    fn surfaces<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        guarded(|| to_python(py, &surface_rows(&self.file.lens)))
+    /// Returns the surfaces as a list of dictionaries, copies that may be changed and given to `from_surfaces`; the keys are those of its
+    /// rows.
+    fn surfaces<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
+        guarded(|| rows_of(py, &self.file))
     }
 
-    /// Traces rays of one wavelength through all surfaces.
+    /// Returns the lens with entries of a surface changed, as ``lens.with_surface(2, radius_mm=40, medium="N-SF6")``.
     ///
     /// Parameters
     /// ----------
-    /// origins : array_like, (n, 3) or (3,)
+    /// surface : int
+    ///     Its number from 0.
+    /// radius_mm, thickness_mm, semi_aperture_mm, medium, stop, conic, coefficients, shape, mirror, comment
+    ///     As of `from_surfaces`. Rims and all else stay as they are.
+    #[pyo3(signature = (surface, **changes), text_signature = "($self, surface, *, radius_mm=None, thickness_mm=None, \
+semi_aperture_mm=None, medium=None, stop=None, conic=None, coefficients=None, shape=None, mirror=None, comment=None)")]
+    fn with_surface(&self, py: Python<'_>, surface: usize, changes: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+        let none = PyDict::new(py);
+        let changes = changes.unwrap_or(&none);
+        guarded(|| Ok(Self::new(with_surface(&self.file, surface, changes)?, None)))
+    }
+
+    /// Returns a lens of surfaces in the order in which light meets them.
+    ///
+    /// Parameters
+    /// ----------
+    /// surfaces : list of dict, or dict of lists
+    ///     A row a surface, or a column an entry: ``radius_mm`` (``inf`` or left out for a plane; positive where the center lies behind),
+    ///     ``thickness_mm`` to the next vertex (0 of the last), ``semi_aperture_mm``, ``medium`` behind it (``None`` for air; the name of
+    ///     a glass, ``"N-BK7"``; an index; index and Abbe number, ``(1.5168, 64.17)``), ``stop``, ``conic``, ``coefficients`` of r⁴,
+    ///     r⁶, … in mm, ``mirror``, ``comment``; ``shape`` for any other shape, in the words of the lens file.
+    /// name : str
+    /// stop : int, optional
+    ///     The surface that is the stop, from 0, in place of an entry ``stop``.
+    /// film_mm : float, optional
+    ///     Where the film stands behind the last vertex.
+    #[staticmethod]
+    #[pyo3(signature = (surfaces, *, name="lens", stop=None, film_mm=None))]
+    fn from_surfaces(
+        surfaces: &Bound<'_, PyAny>,
+        name: &str,
+        stop: Option<usize>,
+        film_mm: Option<f64>,
+    ) -> PyResult<Self> {
+        guarded(|| Ok(Self::new(lens_of(surfaces, (name, stop, film_mm))?, None)))
+    }
+
+    /// Returns the lens as a dictionary with the keys of our own lens file.
+    fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        to_python(py, &self.file)
+    }
+
+    /// Returns the lens of a dictionary as `to_dict` makes it.
+    #[staticmethod]
+    fn from_dict(data: &Bound<'_, PyDict>) -> PyResult<Self> {
+        guarded(|| Ok(Self::new(from_python("the lens", data.as_any())?, None)))
+    }
+
+    /// Traces rays through all surfaces.
+    ///
+    /// Parameters
+    /// ----------
+    /// origins : array_like, (n, 3), (3,) or (..., 3)
     ///     Points before the lens, mm in the lens frame.
-    /// directions : array_like, (n, 3) or (3,)
+    /// directions : array_like, (n, 3), (3,) or (..., 3)
     ///     Directions; those not of unit length are made so.
-    /// wavelength_nm : float
+    /// wavelength_nm : float or array_like
+    ///     Of all rays, or one each. Axes before the last of points and directions, and those of the wavelengths, go together as NumPy
+    ///     broadcasts: a point of shape (3,) with directions (n, 3) is a fan.
     /// film_mm : float, optional
     ///     Follows the rays on to a film this far behind the last vertex; else they end on the last surface.
     /// clip : bool
@@ -435,41 +499,23 @@ impl Lens {
     /// Returns
     /// -------
     /// Rays
-    #[pyo3(signature = (origins, directions, wavelength_nm=REFERENCE_WAVELENGTH_NM, *, film_mm=None, clip=true))]
+    #[pyo3(signature = (origins, directions, wavelength_nm=None, *, film_mm=None, clip=true),
+        text_signature = "($self, origins, directions, wavelength_nm=550.0, *, film_mm=None, clip=True)")]
     fn trace(
         &self,
         py: Python<'_>,
         origins: &Bound<'_, PyAny>,
         directions: &Bound<'_, PyAny>,
-        wavelength_nm: f64,
+        wavelength_nm: Option<&Bound<'_, PyAny>>,
         film_mm: Option<f64>,
         clip: bool,
     ) -> PyResult<Rays> {
-        let given = GivenRays::read(origins, directions)?;
-        let given = given.rows();
+        let given = GivenRays::read(origins, directions, wavelength_nm, REFERENCE_WAVELENGTH_NM)?;
         if let Some(film_mm) = film_mm.filter(|mm| !mm.is_finite()) {
             return Err(wrong("film_mm", film_mm, "a finite number"));
         }
-        let mono = guarded(|| self.mono(wavelength_nm))?;
         let rims = if clip { Vignetting::On } else { Vignetting::Off };
-        if given.len() <= FEW_RAYS {
-            return guarded(|| {
-                let mut rays = given.batch()?;
-                match film_mm {
-                    Some(film_mm) => mono.trace_to_film(&mut rays, rims, film_mm),
-                    None => mono.trace(&mut rays, rims),
-                }
-                Ok(Rays::new(rays))
-            });
-        }
-        let mut rays = install(py, || given.batch_parallel())??;
-        run(py, &Follower::nobody(), |_, _| {
-            match film_mm {
-                Some(film_mm) => mono.trace_to_film_parallel(&mut rays, rims, film_mm),
-                None => mono.trace_parallel(&mut rays, rims),
-            }
-            Ok(Rays::new(rays))
-        })
+        trace(py, &given, &Traced { lens: &self.file.lens, film_mm, rims }, |nm| self.mono(nm))
     }
 
     /// Returns point spread functions, upright as the picture shows them: the energy on each pixel about the centroid.
@@ -478,8 +524,11 @@ impl Lens {
     /// ----------
     /// field_deg : float or list of float
     ///     Angles at the entrance pupil, to the right of the picture. Default 0.
-    /// field_y_deg : float
-    ///     How far above the axis all of them lie. Default 0.
+    /// field_y_deg : float or list of float
+    ///     How far above the axis they lie, one number or one each. Default 0.
+    /// film_xy_mm : (float, float) or list of them
+    ///     In place of angles the places on the film that the chief rays of the points go to, mm to the right of the axis and above it, as
+    ///     the picture shows them.
     /// distance_mm : float or list of float
     ///     Of the points before the first vertex; ``inf`` for a star. Default: that of the lens's file, else ``inf``.
     /// wavelengths_nm : float or list of float
@@ -502,29 +551,21 @@ impl Lens {
     ///
     /// Returns
     /// -------
-    /// ndarray of float32, (fields, distances, wavelengths, shape, shape); an axis whose argument is a single number is left out.
-    /// Sums are at most 1: the share of the light entering the pupil that reaches the pixels.
-    #[pyo3(signature = (**options))]
+    /// Psf, an array of float32, (fields, distances, wavelengths, shape, shape); an axis whose argument is a single number is left out.
+    /// Each picture has a sum of 1, less what lies beyond its pixels. Its ``energy``, of the axes before the last two, is the light of
+    /// each point over that of one on the axis: ``psf * psf.energy[..., None, None]`` has fields as bright as the lens shows them. ``x_mm``
+    /// and ``y_mm`` are the centroids in the picture, from the axis.
+    #[pyo3(signature = (**options), text_signature = "($self, *, field_deg=None, field_y_deg=None, film_xy_mm=None, distance_mm=None, wavelengths_nm=None, focus_mm=None, film_mm=None, \
+pixel_um=None, shape=None, diffraction=None, gamma=None, rays=None, exact_grid=None, seed=None)")]
     fn psf<'py>(&self, py: Python<'py>, options: Option<&Bound<'py, PyDict>>) -> PyResult<Bound<'py, PyAny>> {
-        let asked = PsfOptions::read("psf", options, &self.used())?;
-        let set = asked.compute(py, &self.file.lens)?;
-        let (n, n_points) = (asked.request.size.unwrap_or(1), set.pictures.len());
-        let mut samples: Vec<f32> = Vec::with_capacity(n_points * n * n);
-        for picture in &set.pictures {
-            samples.extend(picture.iter());
-        }
-        let request = &asked.request;
-        let lists = [request.fields_deg.len(), request.distances_mm.len(), request.wavelengths_nm.len()];
-        let kept = lists.iter().zip(asked.is_single).filter(|(_, is_single)| !is_single).map(|(n, _)| *n);
-        let shape: Vec<usize> = kept.chain([n, n]).collect();
-        let array =
-            ArrayD::from_shape_vec(IxDyn(&shape), samples).map_err(|_| wrong("shape", n, "pictures of equal size"))?;
-        view(py, &Arc::new(array), |array| array.view())
+        PsfOptions::read("psf", options, &self.used())?.pictures(py, &self.file.lens)
     }
 
     /// Returns what is measured of point spread functions, a dictionary each: centroid, widths, encircled energy, energy and, where
     /// ``mtf_per_mm`` lists spatial frequencies, the MTF. Arguments as of `psf`; fields outermost, then distances, then wavelengths.
-    #[pyo3(signature = (**options))]
+    #[pyo3(signature = (**options), text_signature = "($self, *, field_deg=None, field_y_deg=None, film_xy_mm=None, distance_mm=None, wavelengths_nm=None, focus_mm=None, film_mm=None, \
+pixel_um=None, shape=None, diffraction=None, gamma=None, rays=None, exact_grid=None, seed=None, \
+mtf_per_mm=None)")]
     fn psf_table<'py>(&self, py: Python<'py>, options: Option<&Bound<'py, PyDict>>) -> PyResult<Bound<'py, PyAny>> {
         let set = PsfOptions::read("psf_table", options, &self.used())?.compute(py, &self.file.lens)?;
         to_python(py, &set.rows)
@@ -548,10 +589,12 @@ impl Lens {
     /// Returns
     /// -------
     /// dict, with the keys of ``dioptric lens analyze --json``.
-    #[pyo3(signature = (**options))]
+    #[pyo3(signature = (**options), text_signature = "($self, *, fields_deg=None, wavelengths_nm=None, distance_mm=None, film_mm=None, \
+focus_mm=None, rings=None)")]
     fn analyze<'py>(&self, py: Python<'py>, options: Option<&Bound<'py, PyDict>>) -> PyResult<Bound<'py, PyAny>> {
         let request = analysis_request(&self.used(), options)?;
-        let analysis = run(py, &Follower::nobody(), |_, _| request.compute(&self.file.lens))?;
+        let lens = self.file.lens.clone();
+        let analysis = run_apart(py, move |cancel| request.compute_until(&lens, cancel))?;
         to_python(py, &analysis)
     }
 
@@ -631,9 +674,29 @@ impl Lens {
         self.draw(None, f64::INFINITY, None, None)
     }
 
-    /// Copies by the text of the lens file, so that lenses can be sent to other processes.
-    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (String,))> {
-        let parse = PyType::new::<Self>(py).getattr("parse")?;
-        Ok((parse, (self.to_ron(),)))
+    /// Copies by the text of the lens file and the name or path that a camera file has for it, so that lenses can be sent to other
+    /// processes.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
+        let choice = self.choice.as_ref().map(|(lens, reading)| (lens, reading, self.stop));
+        let lens = &self.file.lens;
+        let open = lens.with_stop_diameter_mm(2.0 * lens.full_stop_semi_aperture_mm()).map_err(exception)?;
+        let stop_mm = 2.0 * lens.stop_semi_aperture_mm();
+        let arguments = [
+            LensFile { lens: open, ..self.file.clone() }.to_ron().into_bound_py_any(py)?,
+            stop_mm.into_bound_py_any(py)?,
+            to_python(py, &lens.glass_range())?,
+            self.file.notes.clone().into_bound_py_any(py)?,
+            to_python(py, &choice)?,
+        ];
+        Ok((restorer(py, "_restore_lens")?, PyTuple::new(py, arguments)?))
+    }
+
+    fn __copy__(own: Py<Self>) -> Py<Self> {
+        own
+    }
+
+    fn __deepcopy__(own: Py<Self>, memo: &Bound<'_, PyAny>) -> Py<Self> {
+        let _ = memo;
+        own
     }
 }

@@ -16,16 +16,22 @@ mod errors;
 mod input;
 mod lens;
 mod lens_requests;
+mod lens_rows;
+mod light_field;
+mod measure;
 mod options;
 mod paintings;
+mod pickle;
 mod rays;
 mod samples;
 mod save;
 mod scene;
+mod scene_options;
 mod sensor;
 mod serial;
 mod shot;
 mod sweep;
+mod video;
 mod view;
 mod worker;
 
@@ -39,12 +45,16 @@ mod _native {
         camera::Camera,
         developed::{Developed, develop},
         lens::Lens,
+        light_field::LightField,
+        measure::_measure,
+        pickle::{_restore_camera, _restore_lens, _restore_scene, _restore_scene_spec, _restore_sensor, _restore_shot},
         rays::Rays,
         samples::read_samples,
         scene::Scene,
         sensor::Sensor,
         shot::Shot,
         sweep::{Maker, Plan, Sweep, read_index},
+        video::{Video, VideoFrame},
         view::Memory,
         worker::{_panic, set_threads, threads},
     };

@@ -2,7 +2,12 @@
 
 use dioptric_pipeline::{Diffraction, parse_illuminant};
 use dioptric_spectrum::Illuminant;
-use pyo3::{exceptions::PyTypeError, prelude::*, types::PyDict};
+use pyo3::{
+    conversion::FromPyObjectOwned,
+    exceptions::PyTypeError,
+    prelude::*,
+    types::{PyDict, PyInt},
+};
 
 use crate::{
     errors::{exception, wrong, wrong_type},
@@ -39,7 +44,21 @@ pub(crate) fn word(key: &str, value: &Bound<'_, PyAny>) -> PyResult<String> {
 
 /// Returns a count.
 pub(crate) fn count(key: &str, value: &Bound<'_, PyAny>) -> PyResult<usize> {
-    value.extract().map_err(|_| wrong_type(key, type_name(value), "a whole number of 0 or more"))
+    whole(key, value)
+}
+
+/// Returns the seed of random numbers.
+pub(crate) fn seed(key: &str, value: &Bound<'_, PyAny>) -> PyResult<u64> {
+    whole(key, value)
+}
+
+/// Returns a whole number: of another type it is a `TypeError`, below 0 or too large a `ValueError`.
+fn whole<'py, T: FromPyObjectOwned<'py>>(key: &str, value: &Bound<'py, PyAny>) -> PyResult<T> {
+    const EXPECTED: &str = "a whole number of 0 or more";
+    value.extract().map_err(|_| match value.is_instance_of::<PyInt>() {
+        true => wrong(key, value, EXPECTED),
+        false => wrong_type(key, type_name(value), EXPECTED),
+    })
 }
 
 /// Returns the light of a name, a temperature, a chromaticity or a CSV file.

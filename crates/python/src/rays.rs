@@ -2,32 +2,100 @@
 
 use std::{borrow::Cow, sync::Arc};
 
-use dioptric_optics::{RayBatch, RayFate, glam::DVec3};
-use ndarray::{Array2, ArrayView1};
-use numpy::{PyReadonlyArrayDyn, PyUntypedArrayMethods};
-use pyo3::prelude::*;
+use dioptric_optics::{Lens, MonoLens, RayBatch, RayFate, Vignetting, glam::DVec3};
+use dioptric_pipeline::PipelineError;
+use ndarray::{ArrayD, ArrayView, IxDyn};
+use numpy::{PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use pyo3::{prelude::*, types::PyTuple};
+use rayon::prelude::*;
 
 use crate::{
-    errors::wrong,
-    input::array_f64,
-    view::{list, view},
+    errors::{guarded, wrong},
+    input::{array_f64, is_single, number},
+    view::{Sample, view},
+    worker::{Follower, install, run},
 };
 
-/// Points and directions of rays as Python gave them.
+/// Points, directions and wavelengths of rays as Python gave them.
 pub(crate) struct GivenRays<'py> {
     origins: PyReadonlyArrayDyn<'py, f64>,
     directions: PyReadonlyArrayDyn<'py, f64>,
+    /// One of all rays, or one each, nm.
+    wavelengths_nm: Vec<f64>,
+    /// The shape that they have together, without the axis of x, y and z.
+    shape: Vec<usize>,
 }
 
 impl<'py> GivenRays<'py> {
-    /// Reads two arrays of shape (n, 3), or (3,) for a single ray.
-    pub(crate) fn read(origins: &Bound<'py, PyAny>, directions: &Bound<'py, PyAny>) -> PyResult<Self> {
+    /// Reads arrays of points and directions, x, y and z last, and one of wavelengths, whose other axes go together as NumPy has it;
+    /// without any a single ray.
+    pub(crate) fn read(
+        origins: &Bound<'py, PyAny>,
+        directions: &Bound<'py, PyAny>,
+        wavelengths_nm: Option<&Bound<'py, PyAny>>,
+        usual_nm: f64,
+    ) -> PyResult<Self> {
         let (origins, directions) = (read_rows("origins", origins)?, read_rows("directions", directions)?);
-        let (n_origins, n_directions) = (origins.len() / 3, directions.len() / 3);
-        match n_origins == n_directions {
-            true => Ok(Self { origins, directions }),
-            false => Err(wrong("directions", format!("{n_directions} rows"), &format!("{n_origins}, as origins"))),
+        let wavelengths_nm = match wavelengths_nm {
+            None => Wavelengths::One(usual_nm),
+            Some(one) if is_single(one) => Wavelengths::One(number("wavelength_nm", one)?),
+            Some(each) => Wavelengths::Each(array_f64("wavelength_nm", each)?),
+        };
+        let is_flat = origins.ndim() <= 2 && directions.ndim() <= 2 && origins.len() == directions.len();
+        if let (true, Wavelengths::One(nm)) = (is_flat, &wavelengths_nm) {
+            let shape = vec![origins.len() / 3];
+            return Ok(Self { origins, directions, wavelengths_nm: vec![*nm], shape });
         }
+        Self::together(origins, directions, &wavelengths_nm)
+    }
+
+    /// Repeats what has fewer axes, or axes of length 1, along the axes of the others.
+    fn together(
+        origins: PyReadonlyArrayDyn<'py, f64>,
+        directions: PyReadonlyArrayDyn<'py, f64>,
+        wavelengths_nm: &Wavelengths<'py>,
+    ) -> PyResult<Self> {
+        let numpy = origins.py().import("numpy")?;
+        let of_rays = |array: &PyReadonlyArrayDyn<'py, f64>| array.shape()[..array.ndim() - 1].to_vec();
+        let mut shape = of_rays(&origins);
+        let others = [("directions", of_rays(&directions)), ("wavelength_nm", wavelengths_nm.shape())];
+        for (key, other) in others {
+            let py_shape = |shape: &[usize]| PyTuple::new(numpy.py(), shape);
+            let both = numpy.call_method1("broadcast_shapes", (py_shape(&shape)?, py_shape(&other)?));
+            shape = both
+                .map_err(|_| {
+                    wrong(key, format!("for rays of shape {other:?}"), &format!("one that goes with {shape:?}"))
+                })?
+                .extract()?;
+        }
+        let n_rays = shape.iter().product::<usize>();
+        let spread = |array: &Bound<'py, PyAny>, tail: &[usize]| -> PyResult<PyReadonlyArrayDyn<'py, f64>> {
+            let wanted = PyTuple::new(numpy.py(), [&shape, tail].concat())?;
+            let flat = PyTuple::new(numpy.py(), [&[n_rays], tail].concat())?;
+            let spread = numpy.call_method1("broadcast_to", (array, wanted))?;
+            let rows = numpy.call_method1("reshape", (spread, flat))?;
+            Ok(numpy.call_method1("ascontiguousarray", (rows,))?.cast_into::<PyArrayDyn<f64>>()?.readonly())
+        };
+        let wavelengths_nm = match wavelengths_nm {
+            Wavelengths::One(nm) => vec![*nm],
+            Wavelengths::Each(each) => spread(each.as_any(), &[])?.as_array().iter().copied().collect(),
+        };
+        Ok(Self {
+            origins: spread(origins.as_any(), &[3])?,
+            directions: spread(directions.as_any(), &[3])?,
+            wavelengths_nm,
+            shape: if shape.is_empty() { vec![1] } else { shape },
+        })
+    }
+
+    /// The shape of the rays; their number is its product.
+    pub(crate) fn shape(&self) -> &[usize] {
+        &self.shape
+    }
+
+    /// The wavelengths: one of all rays, or one each, nm.
+    pub(crate) fn wavelengths_nm(&self) -> &[f64] {
+        &self.wavelengths_nm
     }
 
     /// Returns the rays to read while the interpreter's lock is held, so that no other thread writes to the arrays meanwhile.
@@ -37,14 +105,118 @@ impl<'py> GivenRays<'py> {
     }
 }
 
-/// Reads an array of shape (n, 3) or (3,).
+/// Wavelengths as they were given.
+enum Wavelengths<'py> {
+    One(f64),
+    Each(PyReadonlyArrayDyn<'py, f64>),
+}
+
+impl Wavelengths<'_> {
+    fn shape(&self) -> Vec<usize> {
+        match self {
+            Self::One(_) => Vec::new(),
+            Self::Each(each) => each.shape().to_vec(),
+        }
+    }
+}
+
+/// Reads an array whose last axis is x, y and z.
 fn read_rows<'py>(key: &str, value: &Bound<'py, PyAny>) -> PyResult<PyReadonlyArrayDyn<'py, f64>> {
-    const SHAPE: &str = "(n, 3) or (3,)";
-    let array = array_f64(key, value, SHAPE, &[1, 2])?;
+    let array = array_f64(key, value)?;
     match array.shape().last() {
         Some(3) => Ok(array),
-        _ => Err(wrong(key, format!("of shape {:?}", array.shape()), &format!("an array of shape {SHAPE}"))),
+        _ => Err(wrong(key, format!("of shape {:?}", array.shape()), "an array of shape (n, 3), (3,) or (..., 3)")),
     }
+}
+
+/// Rays below which a trace is done at once, without giving up the interpreter's lock: some 50 µs of work.
+const FEW_RAYS: usize = 500;
+
+/// Through what rays are traced.
+pub(crate) struct Traced<'a> {
+    pub(crate) lens: &'a Lens,
+    /// A film behind the last vertex, mm; else rays end on the last surface.
+    pub(crate) film_mm: Option<f64>,
+    pub(crate) rims: Vignetting,
+}
+
+impl Traced<'_> {
+    fn trace_parallel(&self, mono: &MonoLens, rays: &mut RayBatch) {
+        match self.film_mm {
+            Some(film_mm) => mono.trace_to_film_parallel(rays, self.rims, film_mm),
+            None => mono.trace_parallel(rays, self.rims),
+        }
+    }
+}
+
+/// Traces rays as Python gave them; `mono` is the lens at a wavelength.
+pub(crate) fn trace(
+    py: Python<'_>,
+    given: &GivenRays<'_>,
+    through: &Traced<'_>,
+    mono: impl FnOnce(f64) -> PyResult<Arc<MonoLens>>,
+) -> PyResult<Rays> {
+    let (rows, shape) = (given.rows(), given.shape());
+    let wavelength_nm = match given.wavelengths_nm() {
+        &[wavelength_nm] => wavelength_nm,
+        each => {
+            let mut rays = install(py, || rows.batch_parallel())??;
+            return run(py, &Follower::nobody(), |_, cancel| {
+                trace_by_wavelength(&mut rays, each, |nm, bundle| -> Result<(), PipelineError> {
+                    cancel.check()?;
+                    through.trace_parallel(&through.lens.at(nm)?, bundle);
+                    Ok(())
+                })?;
+                Ok(Rays::new(rays, shape))
+            });
+        }
+    };
+    let mono = guarded(|| mono(wavelength_nm))?;
+    if rows.len() <= FEW_RAYS {
+        return guarded(|| {
+            let mut rays = rows.batch()?;
+            match through.film_mm {
+                Some(film_mm) => mono.trace_to_film(&mut rays, through.rims, film_mm),
+                None => mono.trace(&mut rays, through.rims),
+            }
+            Ok(Rays::new(rays, shape))
+        });
+    }
+    let mut rays = install(py, || rows.batch_parallel())??;
+    run(py, &Follower::nobody(), |_, _| {
+        through.trace_parallel(&mono, &mut rays);
+        Ok(Rays::new(rays, shape))
+    })
+}
+
+/// Traces rays of several wavelengths, each bundle of one wavelength by `trace`.
+///
+/// # Errors
+/// That of the first bundle, by wavelength, that cannot be traced.
+fn trace_by_wavelength<E: Send>(
+    rays: &mut RayBatch,
+    wavelengths_nm: &[f64],
+    trace: impl Fn(f64, &mut RayBatch) -> Result<(), E> + Sync,
+) -> Result<(), E> {
+    let mut order: Vec<usize> = (0..rays.len()).collect();
+    order.sort_by(|&a, &b| wavelengths_nm[a].total_cmp(&wavelengths_nm[b]));
+    let bundles: Vec<&[usize]> = order.chunk_by(|&a, &b| wavelengths_nm[a] == wavelengths_nm[b]).collect();
+    let traced = |bundle: &&[usize]| {
+        let mut own = RayBatch::with_capacity(bundle.len());
+        bundle.iter().for_each(|&ray| own.push(rays.point_mm(ray), rays.direction(ray), 0.0));
+        trace(wavelengths_nm[bundle[0]], &mut own).map(|()| own)
+    };
+    let traced: Vec<RayBatch> = bundles.par_iter().map(traced).collect::<Result<_, E>>()?;
+    for (bundle, own) in bundles.iter().zip(&traced) {
+        for (from, &to) in bundle.iter().enumerate() {
+            let places = [&mut rays.x_mm, &mut rays.y_mm, &mut rays.z_mm, &mut rays.l, &mut rays.m, &mut rays.n];
+            let values = [&own.x_mm, &own.y_mm, &own.z_mm, &own.l, &own.m, &own.n];
+            places.into_iter().zip(values).for_each(|(place, value)| place[to] = value[from]);
+            rays.opl_mm[to] = own.opl_mm[from];
+            rays.fate[to] = own.fate[from];
+        }
+    }
+    Ok(())
 }
 
 /// Rows of three numbers, in the order that they lie in memory.
@@ -129,26 +301,38 @@ impl RayRows<'_> {
 
 /// Rays where a trace left them: on the last surface or on the film, bent into the image space, or where they ended.
 ///
-/// Every array has one entry a ray, in the order given; ``len(rays)`` is their number. Positions are millimetres in the lens frame
+/// Every array has one entry a ray, in the order and the shape given; ``len(rays)`` is their number. Positions are millimetres in the lens frame
 /// (+z the way light travels, origin at the first vertex), directions unit vectors.
 #[pyclass(frozen, module = "dioptric")]
 pub(crate) struct Rays {
     batch: Arc<RayBatch>,
+    // Invariant: its product is the number of rays.
+    shape: Vec<usize>,
 }
 
 impl Rays {
-    pub(crate) fn new(batch: RayBatch) -> Self {
-        Self { batch: Arc::new(batch) }
+    /// Rays in an array of this shape.
+    pub(crate) fn new(batch: RayBatch, shape: &[usize]) -> Self {
+        Self { batch: Arc::new(batch), shape: shape.to_vec() }
     }
 
     fn column<'py>(&self, py: Python<'py>, pick: impl FnOnce(&RayBatch) -> &Vec<f64>) -> PyResult<Bound<'py, PyAny>> {
-        view(py, &self.batch, |rays| ArrayView1::from(pick(rays).as_slice()))
+        view(py, &self.batch, |rays| {
+            ArrayView::from_shape(IxDyn(&self.shape), pick(rays).as_slice()).expect("a number a ray")
+        })
+    }
+
+    fn list<'py, E: Sample>(&self, py: Python<'py>, of: impl Fn(&RayFate) -> E) -> PyResult<Bound<'py, PyAny>> {
+        let list = self.batch.fate.iter().map(of).collect();
+        let array = ArrayD::from_shape_vec(IxDyn(&self.shape), list).expect("an entry a ray");
+        view(py, &Arc::new(array), |array| array.view())
     }
 
     fn rows<'py>(&self, py: Python<'py>, pick: impl Fn(&RayBatch, usize) -> [f64; 3]) -> PyResult<Bound<'py, PyAny>> {
         let rays = &*self.batch;
         let flat: Vec<f64> = (0..rays.len()).flat_map(|ray| pick(rays, ray)).collect();
-        let rows = Array2::from_shape_vec((rays.len(), 3), flat).expect("three numbers a ray");
+        let shape: Vec<usize> = self.shape.iter().copied().chain([3]).collect();
+        let rows = ArrayD::from_shape_vec(IxDyn(&shape), flat).expect("three numbers a ray");
         view(py, &Arc::new(rows), |rows| rows.view())
     }
 }
@@ -162,6 +346,12 @@ impl Rays {
 
     fn __len__(&self) -> usize {
         self.batch.len()
+    }
+
+    /// The shape of the arrays.
+    #[getter]
+    fn shape<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
+        PyTuple::new(py, &self.shape)
     }
 
     fn __repr__(&self) -> String {
@@ -225,7 +415,7 @@ impl Rays {
     /// Whether each ray got through; (n,) bool.
     #[getter]
     fn passed<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        list(py, self.batch.fate.iter().map(|fate| fate.is_in_flight()).collect())
+        self.list(py, |fate| fate.is_in_flight())
     }
 
     /// How each ray ended, a place in `FATES`; (n,) uint8.
@@ -237,13 +427,13 @@ impl Rays {
             RayFate::Missed { .. } => 2,
             RayFate::TotalReflection { .. } => 3,
         };
-        list(py, self.batch.fate.iter().map(code).collect())
+        self.list(py, code)
     }
 
     /// The 0-based surface that ended each ray, -1 for one that got through; (n,) int16.
     #[getter]
     fn surface<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let place = |fate: &RayFate| fate.surface().map_or(-1, |surface| surface as i16);
-        list(py, self.batch.fate.iter().map(place).collect())
+        self.list(py, place)
     }
 }

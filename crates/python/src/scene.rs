@@ -6,23 +6,30 @@ use std::{
 };
 
 use dioptric_pipeline::{
-    Camera, FileQuantity, FillDepth, FlatSize, Given, KeptCamera, PipelineError, SceneSource, SceneSpec,
-    parse_illuminant,
+    Camera, FileQuantity, Given, KeptCamera, LightPaths, PipelineError, RenderEffort, RenderMethod, SceneSource,
+    SceneSpec, WorldLamp, WorldSpec, WorldView, parse_illuminant,
 };
 use dioptric_scene::{
-    ExrSamples, Pattern, Scene as RadianceScene, SceneError, SceneLight, View, filled_depth, joules_per_photon,
-    reflectance_under, write_scene_exr,
+    ExrSamples, Pattern, Scene as RadianceScene, SceneLight, View, filled_depth, joules_per_photon, reflectance_under,
+    write_scene_exr,
 };
 use dioptric_spectrum::{Illuminant, Quantity, SpectralImage, WavelengthGrid};
 use ndarray::{Array2, Array3, ArrayView1, Axis, Ix2, Ix3};
-use pyo3::{prelude::*, types::PyDict};
+use pyo3::{
+    IntoPyObjectExt,
+    prelude::*,
+    types::{PyDict, PyTuple},
+};
 
 use crate::{
-    errors::{exception, guarded, wrong, wrong_type},
-    input::{is_single, number, numbers, owned_f32, type_name},
-    options::{each_option, light, word},
+    errors::{exception, guarded, wrong},
+    input::{is_single, number, numbers, owned_f32},
+    options::count,
+    pickle::restorer,
+    scene_options::{fill_of, with_options},
+    serial::to_python,
     view::view,
-    worker::{Follower, run},
+    worker::{Follower, run, run_apart},
 };
 
 /// What stands before the camera: spectral radiance and depth, from arrays, a file, or drawn. It never changes.
@@ -56,6 +63,16 @@ impl Scene {
         }
     }
 
+    /// Returns a scene that a program made.
+    pub(crate) fn of_radiance(scene: RadianceScene) -> Self {
+        Self::of_given(Given::new(scene))
+    }
+
+    /// Returns the scene as a part of a camera, read where it is of a file.
+    pub(crate) fn given(&self, py: Python<'_>) -> PyResult<Given<RadianceScene>> {
+        self.opened(py).cloned()
+    }
+
     fn of_given(scene: Given<RadianceScene>) -> Self {
         Self { source: Source::Given(scene), radiance: OnceLock::new() }
     }
@@ -81,7 +98,10 @@ impl Scene {
         }
         let scene = match &self.source {
             Source::Given(scene) => scene.clone(),
-            Source::Spec(spec) => run(py, &Follower::nobody(), |_, _| spec.open(None).map(Given::new))?,
+            Source::Spec(spec) => {
+                let spec = spec.clone();
+                run_apart(py, move |_| spec.open(None).map(Given::new))?
+            }
         };
         Ok(self.radiance.get_or_init(|| scene))
     }
@@ -210,13 +230,120 @@ impl Scene {
     /// mean_luminance_cd_m2 : float, optional
     ///     Scales the radiance.
     #[staticmethod]
-    #[pyo3(signature = (path, **options))]
+    #[pyo3(signature = (path, **options), text_signature = "(path, *, fov_deg=None, depth_m=None, width_mm=None, distance_mm=None, fill_depth=None, hidden=None, \
+points=None, white_level=None, quantity=None, unit=None, scale=None, scene_wavelengths_nm=None, variable=None, \
+axes=None, no_data=None, depth=None, depth_unit=None, depth_kind=None, view=None, panorama=None, \
+illuminant=None, illuminance_lux=None, light=None, mean_luminance_cd_m2=None)")]
     fn read(path: PathBuf, options: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
         if !path.exists() {
             let reason = "there is no such file or folder".to_owned();
             return Err(exception(PipelineError::Read { path, reason }));
         }
         Ok(Self::of_choice(with_options("read", SceneSpec::of_file(path), options)?))
+    }
+
+    /// Returns a three-dimensional world as the camera sees it from a place.
+    ///
+    /// Parameters
+    /// ----------
+    /// path : str or os.PathLike
+    ///     A file: ``.pbrt``, ``.gltf``, ``.glb``, ``.obj``, ``.ply`` or ``.stl``.
+    /// eye, look_at, up : (float, float, float), optional
+    ///     Where the center of the entrance pupil stands, what is in the middle of the picture, m, and what is up in it; without ``eye``
+    ///     the place of the file's camera, or the whole of the world.
+    /// camera : str, optional
+    ///     In place of them a camera of the file, by its name or its number from 1; ``"whole"`` to see all of it.
+    /// unit_m : float
+    ///     Length of the file's unit, m.
+    /// sky : str, optional
+    ///     Light from beyond: "even:RADIANCE" (W m⁻² sr⁻¹ nm⁻¹), "day:ELEVATION,AZIMUTH,TURBIDITY", or the path of a picture of all
+    ///     directions; of a world without light an even sky.
+    /// lamps : list of (x, y, z, lumens), optional
+    ///     Lamps that are added, m and lm.
+    /// method : {"backward", "forward"}
+    ///     Rays from the film through the lens, or the view blurred by its point spread functions.
+    /// samples : int
+    ///     A pixel. Default 64.
+    /// noise : float, optional
+    ///     In place of ``samples`` the relative standard error of a pixel.
+    /// bounces : int, optional
+    ///     How often light is followed over; all of it without it.
+    /// size : (columns, rows), optional
+    ///     Of the view; that of the file's camera without it.
+    /// seed : int
+    /// fov_deg, illuminant, ... :
+    ///     As of `Scene.read`.
+    #[staticmethod]
+    #[pyo3(signature = (path, *, eye=None, look_at=None, up=None, camera=None, unit_m=1.0, sky=None, lamps=None, method="backward",
+        samples=None, noise=None, bounces=None, size=None, seed=None, **options), text_signature = "(path, *, eye=None, look_at=None, up=None, camera=None, unit_m=1.0, sky=None, lamps=None, method='backward', \
+samples=None, noise=None, bounces=None, size=None, seed=None, fov_deg=None, depth_m=None, width_mm=None, \
+distance_mm=None, fill_depth=None, hidden=None, points=None, white_level=None, quantity=None, unit=None, \
+scale=None, scene_wavelengths_nm=None, variable=None, axes=None, no_data=None, depth=None, depth_unit=None, \
+depth_kind=None, view=None, panorama=None, illuminant=None, illuminance_lux=None, light=None, \
+mean_luminance_cd_m2=None)")]
+    #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
+    fn world(
+        path: PathBuf,
+        eye: Option<(f64, f64, f64)>,
+        look_at: Option<(f64, f64, f64)>,
+        up: Option<(f64, f64, f64)>,
+        camera: Option<&str>,
+        unit_m: f64,
+        sky: Option<&str>,
+        lamps: Option<Vec<(f64, f64, f64, f64)>>,
+        method: &str,
+        samples: Option<&Bound<'_, PyAny>>,
+        noise: Option<f64>,
+        bounces: Option<&Bound<'_, PyAny>>,
+        size: Option<(usize, usize)>,
+        seed: Option<&Bound<'_, PyAny>>,
+        options: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<Self> {
+        let mut world = WorldSpec::of_file(path);
+        if !world.is_still_life() && !world.file.exists() {
+            let reason = "there is no such file".to_owned();
+            return Err(exception(PipelineError::Read { path: world.file, reason }));
+        }
+        world.view = match (eye, camera) {
+            (Some(_), Some(camera)) => {
+                return Err(wrong("camera", format!("'{camera}'"), "eye or a camera of the file, not both"));
+            }
+            (Some(eye_m), None) => WorldView::From { eye_m, look_at_m: look_at, up },
+            (None, _) if look_at.is_some() || up.is_some() => {
+                return Err(wrong("eye", "missing", "a place beside look_at and up"));
+            }
+            (None, Some("whole")) => WorldView::Whole,
+            (None, Some(camera)) => WorldView::Camera(camera.to_owned()),
+            (None, None) => WorldView::OfFile,
+        };
+        world.unit_m = unit_m;
+        world.sky = sky.map(str::parse).transpose().map_err(|error: PipelineError| exception(error))?;
+        let lamp = |(x, y, z, lumens)| WorldLamp { at_m: (x, y, z), lumens };
+        world.lamps = lamps.unwrap_or_default().into_iter().map(lamp).collect();
+        world.method = match method {
+            "backward" => RenderMethod::Backward,
+            "forward" => RenderMethod::Forward,
+            other => return Err(wrong("method", format!("'{other}'"), "'backward' or 'forward'")),
+        };
+        let small = |key: &str, value: &Bound<'_, PyAny>| -> PyResult<u32> {
+            u32::try_from(count(key, value)?).map_err(|_| wrong(key, value, "a smaller number"))
+        };
+        world.effort = match (samples, noise) {
+            (Some(_), Some(noise)) => return Err(wrong("noise", noise, "samples or noise, not both")),
+            (Some(samples), None) => RenderEffort::Samples(small("samples", samples)?),
+            (None, Some(noise)) => RenderEffort::Noise(noise),
+            (None, None) => RenderEffort::default(),
+        };
+        if let Some(bounces) = bounces {
+            world.paths = LightPaths::UpTo(small("bounces", bounces)?);
+        }
+        world.size = size;
+        if let Some(value) = seed {
+            world.seed = crate::options::seed("seed", value)?;
+        }
+        let source = SceneSource::World(world);
+        let spec = with_options("world", SceneSpec { source, ..SceneSpec::of_file(PathBuf::new()) }, options)?;
+        Ok(Self::of_choice(spec))
     }
 
     /// Returns the built-in still life, with objects at several depths, under a light like a room's.
@@ -227,7 +354,10 @@ impl Scene {
     /// illuminant, illuminance_lux, mean_luminance_cd_m2
     ///     As of `Scene.read`.
     #[staticmethod]
-    #[pyo3(signature = (columns=1080, rows=720, **options))]
+    #[pyo3(signature = (columns=1080, rows=720, **options), text_signature = "(columns=1080, rows=720, *, fov_deg=None, depth_m=None, width_mm=None, distance_mm=None, fill_depth=None, \
+hidden=None, points=None, white_level=None, quantity=None, unit=None, scale=None, scene_wavelengths_nm=None, \
+variable=None, axes=None, no_data=None, depth=None, depth_unit=None, depth_kind=None, view=None, \
+panorama=None, illuminant=None, illuminance_lux=None, light=None, mean_luminance_cd_m2=None)")]
     fn still_life(columns: usize, rows: usize, options: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
         let source = SceneSource::StillLife { columns, rows };
         let spec = SceneSpec { source, ..SceneSpec::of_file(PathBuf::new()) };
@@ -252,7 +382,11 @@ impl Scene {
     /// illuminant, illuminance_lux, mean_luminance_cd_m2
     ///     As of `Scene.read`.
     #[staticmethod]
-    #[pyo3(signature = (pattern, columns, rows, *, size=None, **options))]
+    #[pyo3(signature = (pattern, columns, rows, *, size=None, **options), text_signature = "(pattern, columns, rows, *, size=None, fov_deg=None, depth_m=None, width_mm=None, distance_mm=None, \
+fill_depth=None, hidden=None, points=None, white_level=None, quantity=None, unit=None, scale=None, \
+scene_wavelengths_nm=None, variable=None, axes=None, no_data=None, depth=None, depth_unit=None, \
+depth_kind=None, view=None, panorama=None, illuminant=None, illuminance_lux=None, light=None, \
+mean_luminance_cd_m2=None)")]
     fn target(
         pattern: &str,
         columns: usize,
@@ -351,6 +485,50 @@ impl Scene {
         run(py, &Follower::nobody(), |_, _| Ok(write_scene_exr(&path, scene, ExrSamples::Single)?))
     }
 
+    /// Scenes are equal when what a camera file says of them is, or their samples are.
+    fn __eq__(&self, other: &Self) -> bool {
+        match (&self.source, &other.source) {
+            (Source::Given(own), Source::Given(other)) => own == other || **own == **other,
+            (Source::Spec(own), Source::Spec(other)) => own == other,
+            _ => false,
+        }
+    }
+
+    /// Copies by what a camera file says, or by the arrays, so that scenes can be sent to other processes.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
+        let scene = match &self.source {
+            Source::Spec(spec) => {
+                let arguments = [to_python(py, spec)?];
+                return Ok((restorer(py, "_restore_scene_spec")?, PyTuple::new(py, arguments)?));
+            }
+            Source::Given(scene) => scene,
+        };
+        let owner = Arc::new(scene.clone());
+        let view_of = scene.view.ok_or_else(|| wrong("the scene", "without a view", "one of `Scene.from_array`"))?;
+        let bands = 0..scene.radiance.planes().len();
+        let planes = bands.map(|band| view(py, &owner, |scene| scene.radiance.planes()[band].view()));
+        let light = scene.light.as_ref().map(|light| (&light.illuminant, light.illuminance_lux));
+        let arguments = [
+            scene.name.as_str().into_bound_py_any(py)?,
+            scene.radiance.grid().centers_nm().into_bound_py_any(py)?,
+            planes.collect::<PyResult<Vec<_>>>()?.into_bound_py_any(py)?,
+            self.depth_m(py)?,
+            [view_of.focal_px, view_of.center_x_px, view_of.center_y_px].into_bound_py_any(py)?,
+            to_python(py, &light)?,
+            scene.notes.clone().into_bound_py_any(py)?,
+        ];
+        Ok((restorer(py, "_restore_scene")?, PyTuple::new(py, arguments)?))
+    }
+
+    fn __copy__(own: Py<Self>) -> Py<Self> {
+        own
+    }
+
+    fn __deepcopy__(own: Py<Self>, memo: &Bound<'_, PyAny>) -> Py<Self> {
+        let _ = memo;
+        own
+    }
+
     fn __repr__(&self) -> String {
         let of_size = |what: &str, columns: usize, rows: usize| format!("<Scene {what}: {columns} × {rows}>");
         match &self.source {
@@ -363,108 +541,6 @@ impl Scene {
             },
         }
     }
-}
-
-fn with_options(function: &str, mut spec: SceneSpec, options: Option<&Bound<'_, PyDict>>) -> PyResult<SceneSpec> {
-    each_option(function, options, SCENE_OPTIONS, |key, value| set_scene_option(&mut spec, key, value))?;
-    check_flat(&spec)?;
-    Ok(spec)
-}
-
-/// What may be said of a scene beside where it comes from, in the order in which it is set; the words are those of the command line.
-pub(crate) const SCENE_OPTIONS: &[&str] = &[
-    "fov_deg",
-    "depth_m",
-    "width_mm",
-    "distance_mm",
-    "fill_depth",
-    "hidden",
-    "points",
-    "white_level",
-    "quantity",
-    "unit",
-    "scale",
-    "scene_wavelengths_nm",
-    "variable",
-    "axes",
-    "no_data",
-    "depth",
-    "depth_unit",
-    "depth_kind",
-    "depth_variable",
-    "view",
-    "panorama",
-    "illuminant",
-    "illuminance_lux",
-    "light",
-    "mean_luminance_cd_m2",
-];
-
-/// Sets one of [`SCENE_OPTIONS`]. A size takes the place of a field of view and a depth, and these that of a size.
-pub(crate) fn set_scene_option(spec: &mut SceneSpec, key: &str, value: &Bound<'_, PyAny>) -> PyResult<()> {
-    match key {
-        "fov_deg" => {
-            spec.field_of_view_deg = Some(number(key, value)?);
-            spec.flat = None;
-        }
-        "depth_m" => {
-            spec.depth_m = Some(number(key, value)?);
-            spec.flat = None;
-        }
-        "width_mm" => {
-            let distance_mm = spec.flat.map_or(f64::NAN, |flat| flat.distance_mm);
-            spec.flat = Some(FlatSize { width_mm: number(key, value)?, distance_mm });
-            (spec.field_of_view_deg, spec.depth_m) = (None, None);
-        }
-        "distance_mm" => match &mut spec.flat {
-            Some(flat) => flat.distance_mm = number(key, value)?,
-            None => return Err(wrong(key, number(key, value)?, "'width_mm' with it, the width of a flat scene")),
-        },
-        "fill_depth" => spec.fill_depth = Some(fill_of(key, value)?),
-        "quantity" => spec.reading.quantity = Some(parsed(key, value)?),
-        "unit" => spec.reading.unit = Some(word(key, value)?),
-        "scale" => spec.reading.scale = Some(number(key, value)?),
-        "scene_wavelengths_nm" => spec.reading.wavelengths_nm = Some(numbers(key, value)?),
-        "variable" => spec.reading.variable = Some(word(key, value)?),
-        "axes" => spec.reading.axes = Some(word(key, value)?),
-        "no_data" => spec.reading.no_data = Some(parsed(key, value)?),
-        "depth_unit" => spec.reading.depth_unit = Some(word(key, value)?),
-        "depth_kind" => spec.reading.depth_kind = Some(parsed(key, value)?),
-        "depth_variable" => spec.reading.depth_variable = Some(word(key, value)?),
-        "panorama" => spec.reading.panorama = Some(parsed(key, value)?),
-        "depth" | "view" => {
-            let path: PathBuf = value.extract().map_err(|_| wrong_type(key, type_name(value), "a path"))?;
-            if key == "depth" { spec.reading.depth = Some(path) } else { spec.reading.view = Some(path) }
-        }
-        "points" => {
-            let expected = "a path: a table of points that shine";
-            spec.points = Some(value.extract().map_err(|_| wrong_type(key, type_name(value), expected))?);
-        }
-        "hidden" => {
-            let expected = "a path: a file of what lies behind the first surface";
-            spec.hidden = Some(value.extract().map_err(|_| wrong_type(key, type_name(value), expected))?);
-        }
-        "white_level" => spec.white_level = Some(number(key, value)?),
-        "illuminant" => spec.illuminant = Some(light(key, value)?),
-        "illuminance_lux" => spec.illuminance_lux = Some(number(key, value)?),
-        "light" => spec.light = Some(light(key, value)?),
-        _ => spec.mean_luminance_cd_m2 = Some(number(key, value)?),
-    }
-    Ok(())
-}
-
-/// Returns a choice by its word.
-fn parsed<T: std::str::FromStr<Err = SceneError>>(key: &str, value: &Bound<'_, PyAny>) -> PyResult<T> {
-    word(key, value)?.parse().map_err(|error| exception(PipelineError::from(error)))
-}
-
-fn fill_of(key: &str, value: &Bound<'_, PyAny>) -> PyResult<FillDepth> {
-    let fill = match value.extract::<f64>() {
-        Ok(z_m) => FillDepth::Metres(z_m),
-        Err(_) => word(key, value)?.parse().map_err(exception)?,
-    };
-    fill.check().map_err(exception)?;
-    Ok(fill)
 }
 
 /// Returns the radiance of numbers, and the light on them.
@@ -491,15 +567,5 @@ fn radiance_of(
             }
             Ok((image, light.map(|illuminant| SceneLight { illuminant, illuminance_lux })))
         }
-    }
-}
-
-/// Refuses the width of a flat scene without its distance.
-pub(crate) fn check_flat(spec: &SceneSpec) -> PyResult<()> {
-    match spec.flat {
-        Some(flat) if flat.distance_mm.is_nan() => {
-            Err(wrong("width_mm", flat.width_mm, "'distance_mm' with it, from the first vertex of the lens"))
-        }
-        _ => Ok(()),
     }
 }

@@ -6,13 +6,15 @@ use dioptric_pipeline::{Camera, Given, KeptCamera, SensorSpec};
 use dioptric_sensor::Sensor as SensorSheet;
 use ndarray::Array2;
 use pyo3::{
+    IntoPyObjectExt,
     prelude::*,
-    types::{PyDict, PyType},
+    types::{PyDict, PyTuple},
 };
 
 use crate::{
     errors::{exception, guarded},
     input::numbers,
+    pickle::restorer,
     serial::{from_python, to_python},
     view::view,
 };
@@ -28,6 +30,21 @@ pub(crate) struct Sensor {
 impl Sensor {
     fn of_spec(spec: SensorSpec) -> PyResult<Self> {
         guarded(|| Ok(Self { sheet: spec.open().map_err(exception)?, spec: Some(spec) }))
+    }
+
+    /// Returns the sensor of a data sheet, and of what a camera file says of it.
+    pub(crate) fn restored(sheet: SensorSheet, spec: Option<SensorSpec>) -> Self {
+        Self { sheet, spec }
+    }
+
+    /// The data sheet.
+    pub(crate) fn sheet(&self) -> &SensorSheet {
+        &self.sheet
+    }
+
+    /// Returns the sensor as a part of a camera.
+    pub(crate) fn given(&self) -> Given<SensorSheet> {
+        Given::new(self.sheet.clone())
     }
 
     /// Returns the sensor of a camera.
@@ -151,8 +168,19 @@ impl Sensor {
         format!("<Sensor {name}: {columns} × {rows} pixels of {pixel_pitch_um} µm>")
     }
 
-    /// Copies by the text of the data sheet, so that sensors can be sent to other processes.
-    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (String,))> {
-        Ok((PyType::new::<Self>(py).getattr("from_ron")?, (self.to_ron(),)))
+    /// Copies by the text of the data sheet and the name or path that a camera file has for it, so that sensors can be sent to other
+    /// processes.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
+        let arguments = [self.to_ron().into_bound_py_any(py)?, to_python(py, &self.spec)?];
+        Ok((restorer(py, "_restore_sensor")?, PyTuple::new(py, arguments)?))
+    }
+
+    fn __copy__(own: Py<Self>) -> Py<Self> {
+        own
+    }
+
+    fn __deepcopy__(own: Py<Self>, memo: &Bound<'_, PyAny>) -> Py<Self> {
+        let _ = memo;
+        own
     }
 }

@@ -7,21 +7,24 @@ use std::{
 
 use dioptric_analysis::{Run, RunReport};
 use dioptric_pipeline::{
-    Capture, IRRADIANCE_FILE, KeptCamera, PipelineError, Quality, Staged, picture_png, write_file, write_frames,
-    write_json,
+    Capture, IRRADIANCE_FILE, Imaged, Irradiance, KeptCamera, PipelineError, Quality, Staged, picture_png, write_file,
+    write_frames, write_json,
 };
 use dioptric_psf::LensImageModel;
 use dioptric_scene::write_planes_exr;
 use dioptric_spectrum::{Bands, DepthMap};
 use ndarray::{Array2, Array3, ArrayView1, Axis};
 use pyo3::{
+    IntoPyObjectExt,
     prelude::*,
-    types::{PyBytes, PyDict},
+    types::{PyBytes, PyDict, PyTuple},
 };
 
 use crate::{
     camera::Camera,
     changes::{changed, of_exposure, of_picture},
+    errors::exception,
+    pickle::restorer,
     save::{is_picture, write_picture},
     serial::to_python,
     view::{plane_or_planes, raw_planes, rgb8, view},
@@ -42,6 +45,11 @@ pub(crate) struct Shot {
 }
 
 impl Shot {
+    /// The results.
+    pub(crate) fn capture(&self) -> &Capture {
+        &self.capture
+    }
+
     /// Takes the picture of a camera.
     pub(crate) fn take(py: Python<'_>, kept: KeptCamera, follower: &Follower) -> PyResult<Self> {
         let capture = run(py, follower, |progress, cancel| kept.capture(progress, cancel))?;
@@ -237,7 +245,10 @@ impl Shot {
     /// Returns
     /// -------
     /// Shot
-    #[pyo3(signature = (**changes))]
+    #[pyo3(signature = (**changes), text_signature = "($self, *, seed=None, exposure_s=None, analog_gain=None, noise=None, burst=None, bracket_stops=None, \
+interleaved_ratio=None, interleaved_gain_ratio=None, white=None, demosaic=None, denoise=None, highlights=None, \
+lens_corrections=None, color=None, sharpen_px=None, local_tone=None, perspective=None, brightness=None, curve=None, \
+space=None, defect_threshold=None)")]
     fn expose(&self, py: Python<'_>, changes: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
         self.again(py, "expose", changes, &of_exposure())
     }
@@ -253,7 +264,8 @@ impl Shot {
     /// Returns
     /// -------
     /// Shot
-    #[pyo3(signature = (**changes))]
+    #[pyo3(signature = (**changes), text_signature = "($self, *, white=None, demosaic=None, denoise=None, highlights=None, lens_corrections=None, color=None, \
+sharpen_px=None, local_tone=None, perspective=None, brightness=None, curve=None, space=None, defect_threshold=None)")]
     fn develop(&self, py: Python<'_>, changes: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
         self.again(py, "develop", changes, &of_picture())
     }
@@ -291,6 +303,41 @@ impl Shot {
     /// ``pip install dioptric[xarray]`` brings.
     fn to_xarray<'py>(slf: Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         slf.py().import("dioptric._xarray")?.call_method1("dataset", (slf,))
+    }
+
+    /// Copies by the camera and the irradiance, so that shots can be sent to other processes: the frames are taken again there with
+    /// their seeds, to the bit.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
+        let capture = &*self.capture;
+        let of_one = |irradiance: &Irradiance| -> PyResult<Vec<Bound<'py, PyAny>>> {
+            let band = |band| {
+                let plane = irradiance.band(band).map_err(exception)?.into_owned();
+                view(py, &Arc::new(plane), |plane| plane.view())
+            };
+            (0..irradiance.grid().len()).map(band).collect()
+        };
+        let photodiodes = capture.irradiance.photodiodes();
+        let cubes = match photodiodes.is_empty() {
+            true => vec![of_one(&capture.irradiance)?],
+            false => photodiodes.iter().map(of_one).collect::<PyResult<_>>()?,
+        };
+        let arguments = [
+            self.camera().into_bound_py_any(py)?,
+            self.quality().into_bound_py_any(py)?,
+            to_python(py, &Imaged::of(capture))?,
+            capture.grid().centers_nm().into_bound_py_any(py)?,
+            cubes.into_bound_py_any(py)?,
+        ];
+        Ok((restorer(py, "_restore_shot")?, PyTuple::new(py, arguments)?))
+    }
+
+    fn __copy__(own: Py<Self>) -> Py<Self> {
+        own
+    }
+
+    fn __deepcopy__(own: Py<Self>, memo: &Bound<'_, PyAny>) -> Py<Self> {
+        let _ = memo;
+        own
     }
 
     fn _repr_png_<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {

@@ -128,11 +128,6 @@ where
     array(py, Memory { _owner: Box::new(copied), address, shape, kind: E::KIND })
 }
 
-/// Returns a read-only array that takes over a list.
-pub(crate) fn list<E: Sample>(py: Python<'_>, list: Vec<E>) -> PyResult<Bound<'_, PyAny>> {
-    view(py, &Arc::new(list), |list| ArrayView::from(list.as_slice()))
-}
-
 fn array(py: Python<'_>, memory: Memory) -> PyResult<Bound<'_, PyAny>> {
     static AS_ARRAY: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
     AS_ARRAY.import(py, "numpy", "asarray")?.call1((memory,))

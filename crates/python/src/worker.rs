@@ -35,7 +35,7 @@ static POOL: Mutex<Option<Pool>> = Mutex::new(None);
 /// Pieces of work that run; a child that was forked meanwhile would wait for locks that no thread of it will release.
 static RUNNING: AtomicUsize = AtomicUsize::new(0);
 
-/// Counts a piece of work while it runs. Made and dropped by threads that hold the interpreter's lock.
+/// Counts a piece of work while it runs.
 struct Running;
 
 impl Running {
@@ -259,6 +259,47 @@ fn run_as<T: Send, E: Send>(
     // What was raised first is what is raised.
     let closed = follower.close(py);
     result.and_then(|value| closed.map(|()| value))
+}
+
+/// Runs work that owns all it needs on the pool without the interpreter's lock.
+///
+/// The thread that asked looks at signals: what they raise cancels the work and is raised at once. The work goes on beside until it
+/// sees that it is cancelled, and its result is dropped.
+pub(crate) fn run_apart<T: Send + 'static>(
+    py: Python<'_>,
+    work: impl FnOnce(&Cancel) -> Result<T, PipelineError> + Send + 'static,
+) -> PyResult<T> {
+    let threads = pool(py)?;
+    let (cancel, running) = (Cancel::new(), Running::new());
+    let (sender, receiver) = mpsc::sync_channel(1);
+    let of_work = cancel.clone();
+    threads.spawn(move || {
+        let result = std::panic::catch_unwind(AssertUnwindSafe(|| work(&of_work)));
+        drop(running);
+        // Whoever was interrupted waits no more.
+        let _ = sender.send(result);
+    });
+    let outcome = py.detach(move || {
+        loop {
+            match receiver.recv_timeout(POLL) {
+                Ok(result) => return Ok(result),
+                Err(RecvTimeoutError::Timeout) => {
+                    if let Err(raised) = Python::attach(|py| py.check_signals()) {
+                        cancel.cancel();
+                        return Err(raised);
+                    }
+                }
+                Err(RecvTimeoutError::Disconnected) => {
+                    return Ok(Err(Box::new("the work ended without a result")));
+                }
+            }
+        }
+    })?;
+    py.check_signals()?;
+    match outcome {
+        Ok(result) => result.map_err(exception),
+        Err(payload) => Err(of_panic(payload.as_ref())),
+    }
 }
 
 /// Runs short work that borrows from Python on the pool, with the interpreter's lock held.

@@ -24,9 +24,12 @@ def test_page_runs(page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
 
 
 def test_everything_is_documented() -> None:
-    for kind in (dp.Camera, dp.Developed, dp.Lens, dp.Rays, dp.Scene, dp.Sensor, dp.Shot):
+    kinds = (dp.Camera, dp.Developed, dp.Lens, dp.LightField, dp.Rays, dp.Scene, dp.Sensor, dp.Shot, dp.Video, dp.VideoFrame)
+    for kind in kinds:
         assert kind.__doc__
         public = [name for name in vars(kind) if not name.startswith("_") and name != "FATES"]
         assert public
         for name in public:
             assert getattr(kind, name).__doc__, f"{kind.__name__}.{name}"
+    for name in dp.measure.__all__:
+        assert getattr(dp.measure, name).__doc__, name

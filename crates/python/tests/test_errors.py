@@ -1,5 +1,8 @@
 """Everything wrong is a ValueError, an OSError or a TypeError of one sentence; no panic passes `except Exception`."""
 
+import errno
+import inspect
+
 import dioptric as dp
 import numpy as np
 import pytest
@@ -23,7 +26,10 @@ import pytest
         ({"noise": "hiss"}, ValueError, "'hiss' is not known"),
         ({"wavelengths_nm": []}, ValueError, "wavelengths_nm is empty"),
         ({"wavelengths_nm": [500, None]}, TypeError, "wavelengths_nm is list, expected a number or a list of numbers"),
-        ({"seed": -1}, TypeError, "seed is int, expected a whole number of 0 or more"),
+        ({"seed": -1}, ValueError, "seed is -1, expected a whole number of 0 or more"),
+        ({"seed": 1.5}, TypeError, "seed is float, expected a whole number of 0 or more"),
+        ({"burst": -3}, ValueError, "burst is -3, expected a whole number of 0 or more"),
+        ({"wavelengths_nm": np.ma.masked_greater([450, 550], 500)}, TypeError, "wavelengths_nm is a masked array"),
         ({"burst": 0}, ValueError, "Burst is 0"),
         ({"illuminant": "moon"}, ValueError, "moon"),
         ({"f_numbre": 4}, TypeError, r"with_\(\) has no argument 'f_numbre'; it has name, lens, f_number"),
@@ -42,8 +48,39 @@ def test_files_that_are_not_there_are_os_errors() -> None:
         lambda: dp.Sensor.read("/nowhere/sensor.ron"),
         lambda: dp.Scene.read("/nowhere/scene.exr"),
     ):
-        with pytest.raises(OSError, match="/nowhere/"):
+        with pytest.raises(FileNotFoundError, match="/nowhere/") as raised:
             act()
+        assert raised.value.errno == errno.ENOENT and str(raised.value.filename).startswith("/nowhere/")
+
+
+def test_files_that_are_none_of_ours_say_so(tmp_path) -> None:
+    (tmp_path / "a.zmx").write_text("no lens")
+    with pytest.raises((OSError, ValueError), match="a.zmx"):
+        dp.Lens.read(tmp_path / "a.zmx")
+    with pytest.raises(OSError, match="a.zmx") as raised:
+        dp.Camera.demo().write(tmp_path / "a.zmx" / "camera.ron")
+    assert str(tmp_path) in str(raised.value.filename)
+
+
+def test_signatures_have_the_names_that_are_known(tiny: dp.Camera, shot: dp.Shot) -> None:
+    lens = dp.Lens.thin(50, 10)
+    for function, with_none in [
+        (tiny.with_, lambda: tiny.with_(nonsense=1)),
+        (shot.expose, lambda: shot.expose(nonsense=1)),
+        (shot.develop, lambda: shot.develop(nonsense=1)),
+        (lens.psf, lambda: lens.psf(nonsense=1)),
+        (lens.psf_table, lambda: lens.psf_table(nonsense=1)),
+        (lens.analyze, lambda: lens.analyze(nonsense=1)),
+    ]:
+        with pytest.raises(TypeError, match="it has ") as raised:
+            with_none()
+        known = str(raised.value).split("it has ")[1].split(", ")
+        if function == lens.psf:
+            known.remove("mtf_per_mm")
+        assert sorted(inspect.signature(function).parameters) == sorted(known), function
+    for function in (dp.Scene.read, dp.Scene.target, dp.Scene.still_life, dp.Scene.world, dp.develop):
+        assert not any(p.kind is p.VAR_KEYWORD for p in inspect.signature(function).parameters.values()), function
+    assert list(inspect.signature(lens.trace).parameters)[:3] == ["origins", "directions", "wavelength_nm"]
 
 
 def test_camera_text_names_line_and_key(tiny: dp.Camera) -> None:

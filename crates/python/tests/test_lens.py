@@ -80,9 +80,9 @@ def test_strided_and_integer_arrays_are_taken(gauss: dp.Lens) -> None:
 
 def test_arrays_of_other_shapes_are_named(gauss: dp.Lens) -> None:
     for origins, directions, words in [
-        (np.zeros((4, 2)), np.zeros((4, 3)), r"origins is of shape \[4, 2\], expected an array of shape \(n, 3\) or \(3,\)"),
-        (np.zeros((2, 2, 3)), np.zeros((4, 3)), r"origins is of shape \[2, 2, 3\], expected"),
-        (np.zeros((4, 3)), np.ones((5, 3)), "directions is 5 rows, expected 4, as origins"),
+        (np.zeros((4, 2)), np.zeros((4, 3)), r"origins is of shape \[4, 2\], expected an array of shape \(n, 3\), \(3,\)"),
+        (np.zeros((2, 2, 3)), np.ones((4, 3)), r"directions is for rays of shape \[4\], expected one that goes with \[2, 2\]"),
+        (np.zeros((4, 3)), np.ones((5, 3)), r"directions is for rays of shape \[5\], expected one that goes with \[4\]"),
         (np.zeros((4, 3)), np.zeros((4, 3)), r"directions is \[0, 0, 0\] in row 0, expected a direction"),
         (np.full((4, 3), np.nan), np.ones((4, 3)), r"origins is \[NaN, NaN, NaN\] in row 0, expected finite numbers"),
         (np.zeros((4, 3)), np.array([[0, 0, 1.0]] * 3 + [[0, np.nan, 1]]), r"directions is \[0, NaN, 1\] in row 3"),
@@ -191,3 +191,102 @@ def test_single_ray_takes_microseconds(gauss: dp.Lens) -> None:
         times.append((time.perf_counter() - start) / 20)
     # 20 µs are asked for of a release build on a quiet machine; this one may be neither.
     assert min(times) < 100e-6, f"{1e6 * min(times):.1f} µs"
+
+
+def test_rays_broadcast_as_arrays_do(gauss: dp.Lens) -> None:
+    origins, directions = collimated(12, 5)
+    colors = np.array([450.0, 550.0, 650.0])
+    rays = gauss.trace(origins, [0, 0, 1], colors[:, None], film_mm=40)
+    assert rays.shape == rays.x_mm.shape == rays.fate.shape == (3, 12) and len(rays) == 36
+    assert rays.positions_mm.shape == (3, 12, 3)
+    for row, nm in enumerate(colors):
+        single = gauss.trace(origins, directions, nm, film_mm=40)
+        for name in ("x_mm", "y_mm", "z_mm", "l", "m", "n", "opl_mm", "surface"):
+            assert np.array_equal(getattr(rays, name)[row], getattr(single, name)), (name, nm)
+    fan = gauss.trace([0, 0, -100], np.stack([np.zeros(5), np.linspace(0, 0.1, 5), np.ones(5)], axis=1))
+    assert fan.shape == (5,)
+    each = gauss.trace(origins, directions, np.repeat(colors, 4), film_mm=40)
+    assert np.array_equal(each.y_mm[4:8], gauss.trace(origins[4:8], directions[4:8], 550, film_mm=40).y_mm)
+    with pytest.raises(ValueError, match="wavelength_nm is for rays of shape"):
+        gauss.trace(origins, directions, [450, 550])
+    with pytest.raises(ValueError, match="wavelength|nm"):
+        gauss.trace(origins, directions, np.full(12, -5.0))
+
+
+def test_surfaces_there_and_back_are_the_lens() -> None:
+    for name in dp.Lens.names():
+        lens = dp.Lens.built_in(name)
+        if lens.is_rotational and not lens.configurations:
+            assert dp.Lens.from_dict(lens.to_dict()) == lens, name
+    lens = dp.Lens.built_in("dgauss-50mm")
+    rows = lens.surfaces()
+    again = dp.Lens.from_surfaces(rows, name=lens.name)
+    assert again.efl_mm == lens.efl_mm and again.surfaces() == rows
+    rows[0]["radius_mm"] *= 1.01
+    assert dp.Lens.from_surfaces(rows).efl_mm != lens.efl_mm and lens.surfaces()[0] != rows[0]
+
+
+def test_lens_of_rows_has_the_power_of_the_lens_maker() -> None:
+    n, c1, c2, t = 1.5, 1 / 50, -1 / 80, 4.0
+    lens = dp.Lens.from_surfaces([
+        dict(radius_mm=1 / c1, thickness_mm=t, semi_aperture_mm=8, medium=n, stop=True),
+        dict(radius_mm=1 / c2, thickness_mm=0, semi_aperture_mm=8),
+    ])
+    # Of a thick lens in air: φ = (n − 1) (c1 − c2 + (n − 1) t c1 c2 / n).
+    power = (n - 1) * (c1 - c2 + (n - 1) * t * c1 * c2 / n)
+    # An index is that in air, to the 3e-4 of air's own.
+    assert lens.efl_mm == pytest.approx(1 / power, rel=1e-3)
+    parabola = lens.with_surface(1, conic=-1.0)
+    assert parabola.surfaces()[1]["conic"] == -1 and parabola.efl_mm == lens.efl_mm
+    assert lens.with_surface(1, stop=True).surfaces()[0]["stop"] is False
+    assert lens.with_surface(0, medium="N-BK7").surfaces()[0]["medium"].endswith("N-BK7")
+    assert lens.with_surface(0, medium=(1.5168, 64.17)).surfaces()[0]["medium"] == {"NdVd": {"nd": 1.5168, "vd": 64.17}}
+    stopped = lens.with_stop(f_number=10).with_surface(1, radius_mm=-90)
+    assert stopped.with_stop(f_number=5).f_number == pytest.approx(5) and 10 < stopped.f_number < 12
+    asphere = lens.with_surface(0, coefficients=[1e-6, 0, 2e-10])
+    assert asphere.surfaces()[0]["coefficients"] == [1e-6, 0, 2e-10]
+
+
+def test_wrong_surfaces_are_named() -> None:
+    good = dict(radius_mm=50.0, thickness_mm=4.0, semi_aperture_mm=8.0, medium=1.5, stop=True)
+    for rows, error, words in [
+        ([good | {"radius": 4}], TypeError, "surface 0 has no entry 'radius'; it has radius_mm"),
+        ([{"radius_mm": 50.0}], ValueError, "surface 0: thickness_mm is missing"),
+        ([good | {"radius_mm": "wide"}], TypeError, "surface 0: radius_mm is str, expected a number"),
+        ([good | {"medium": "N-NOTHING"}], ValueError, "N-NOTHING"),
+        ([good | {"stop": False}], ValueError, "exactly one stop"),
+        ([good | {"semi_aperture_mm": 60.0}], ValueError, "surface 0"),
+        ({"radius_mm": [50.0, 1.0], "thickness_mm": [1.0]}, ValueError, "thickness_mm is of 1 entries, expected 2"),
+        (5, TypeError, "surfaces is int, expected a list of dictionaries"),
+    ]:
+        with pytest.raises(error, match=words):
+            dp.Lens.from_surfaces(rows)
+    with pytest.raises(ValueError, match="stop is 3, expected the number of a surface, 0 to 0"):
+        dp.Lens.from_surfaces([good], stop=3)
+    with pytest.raises(ValueError, match="surface is 5, expected 0 to 0"):
+        dp.Lens.from_surfaces([good]).with_surface(5, radius_mm=3)
+    with pytest.raises(TypeError, match="has no entry 'radius'"):
+        dp.Lens.from_surfaces([good]).with_surface(0, radius=3)  # type: ignore[call-arg]
+
+
+def test_energies_and_places_of_point_spreads(gauss: dp.Lens) -> None:
+    psf = gauss.psf(field_deg=[0, 10], field_y_deg=[0, 5], distance_mm=2000, wavelengths_nm=[500, 600], shape=9, pixel_um=20)
+    table = gauss.psf_table(field_deg=[0, 10], field_y_deg=[0, 5], distance_mm=2000, wavelengths_nm=[500, 600], shape=9, pixel_um=20)
+    assert psf.energy.shape == psf.x_mm.shape == (2, 2) and psf.pixel_um == 20
+    assert psf.energy.ravel().tolist() == [row["energy"] for row in table]
+    # To the right of the axis and above it in the picture.
+    assert psf.x_mm[1, 0] > 0 and psf.y_mm[1, 0] > 0
+    single = gauss.psf(field_deg=3, distance_mm=2000, shape=9)
+    assert single.energy.shape == () and isinstance(single, dp.Psf) and not single.flags.writeable
+    by_place = gauss.psf(film_xy_mm=(float(psf.x_mm[1, 0]), float(psf.y_mm[1, 0])), distance_mm=2000, wavelengths_nm=500, shape=9, pixel_um=20)
+    # The chief ray and the centroid differ by coma.
+    assert by_place.x_mm == pytest.approx(psf.x_mm[1, 0], abs=0.02)
+    for options, words in [
+        (dict(field_deg=[0, 1, 2], field_y_deg=[0, 1]), "field_y_deg is of 2 angles, expected one, or 3"),
+        (dict(film_xy_mm=(0, 0), field_deg=3), "film_xy_mm is given beside field_deg"),
+        (dict(film_xy_mm=(0, 0), distance_mm=[1000, 2000]), "film_xy_mm is given with 2 distances"),
+        (dict(film_xy_mm=[1, 2, 3]), "film_xy_mm is of shape"),
+        (dict(seed=-1), "seed is -1"),
+    ]:
+        with pytest.raises(ValueError, match=words):
+            gauss.psf(**options)

@@ -121,6 +121,23 @@ def test_ctrl_c_ends_the_work(tiny: dp.Camera) -> None:
     assert fresh(tiny).render().png() == tiny.render().png()
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="signals are POSIX's")
+@pytest.mark.parametrize("what", ["psf", "analyze"])
+def test_ctrl_c_ends_the_work_of_a_lens(what: str) -> None:
+    lens = dp.Lens.built_in("dgauss-50mm").with_stop(f_number=1.8)
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT)).start()
+    start = time.perf_counter()
+    with pytest.raises(KeyboardInterrupt):
+        if what == "psf":
+            lens.psf(field_deg=np.linspace(0, 14, 200), wavelengths_nm=np.arange(400, 700, 2), diffraction="wave", shape=65)
+        else:
+            lens.analyze(fields_deg=np.linspace(0, 14, 60), wavelengths_nm=np.arange(400, 700, 10), rings=12)
+    # Seconds are for a busy machine: it is interrupted at once, and what is under way ends with its rays.
+    assert time.perf_counter() - start < 3
+    assert lens.psf(shape=9).shape == (9, 9)
+
+
 def picture_of(text: str) -> bytes:
     """In another process."""
     return dp.Camera.from_ron(text).render().png()

@@ -9,6 +9,7 @@ mod file_profile;
 mod levels;
 mod lossless_jpeg;
 mod opcodes;
+mod own_mosaic;
 mod predictor;
 mod read;
 #[cfg(test)]
@@ -31,6 +32,7 @@ use self::{
 pub use self::{
     file_color::{DngColor, DngLight},
     file_profile::{DngNoise, DngProfile},
+    own_mosaic::OwnMosaic,
     read::{DngFile, DngOpcodes, DngShot, raw_format_by_name, raw_format_of},
 };
 use crate::{

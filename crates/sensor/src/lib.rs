@@ -90,7 +90,7 @@ pub use color::{ColorCorrection, ColorMatrix};
 pub use demosaic::{Demosaic, demosaic};
 pub use disparity::{DisparityAxis, DisparityMap, DisparitySearch};
 pub use dng::{
-    DngColor, DngDetails, DngFile, DngLight, DngNoise, DngOpcodes, DngProfile, DngShot, raw_format_by_name,
+    DngColor, DngDetails, DngFile, DngLight, DngNoise, DngOpcodes, DngProfile, DngShot, OwnMosaic, raw_format_by_name,
     raw_format_of,
 };
 pub use error::SensorError;

@@ -2,7 +2,7 @@
 
 use ndarray::{Array3, Axis};
 
-use crate::ColorSpace;
+use crate::{ColorSpace, ToneCurve};
 
 /// A picture of red, green and blue codes.
 #[derive(Clone, Debug, PartialEq)]
@@ -27,6 +27,16 @@ impl Picture {
     /// Returns the codes of one pixel.
     pub fn rgb_at(&self, row: usize, column: usize) -> [f32; 3] {
         [0, 1, 2].map(|i| self.codes[(row, column, i)])
+    }
+
+    /// Returns the light that the codes stand for, linear sRGB, where they were made with this tone curve; rows × columns × 3.
+    pub fn linear_srgb(&self, curve: ToneCurve) -> Array3<f32> {
+        let mut light = self.codes.mapv(|code| curve.decode(f64::from(code)) as f32);
+        for mut rgb in light.lanes_mut(Axis(2)) {
+            let own = self.space.to_linear_srgb([rgb[0], rgb[1], rgb[2]]);
+            rgb.iter_mut().zip(own).for_each(|(place, value)| *place = value);
+        }
+        light
     }
 
     /// Returns the picture turned as a number of Exif's `Orientation` says, 1 to 8; others leave it as it is.

@@ -64,6 +64,46 @@ impl Sensor {
         })
     }
 
+    /// Returns digital numbers that a program made as a frame of this sensor's pixels and converter, of any size.
+    ///
+    /// # Errors
+    /// When the sensor or the exposure makes no sense, the sensor has no converter or stacked filters, a number is beyond the highest of the
+    /// converter, or there is none.
+    pub fn frame_of(&self, dn: Array2<u16>, exposure: &Exposure) -> Result<Raw, SensorError> {
+        self.check()?;
+        exposure.check()?;
+        let refused = |reason: String| Err(SensorError::Unsuitable { what: "the raw frame", reason });
+        let Some(top) = self.adc.top_dn() else {
+            return refused(format!(
+                "is of digital numbers, expected a sensor with a converter, which {} has not",
+                self.name
+            ));
+        };
+        let tile = self.tile()?;
+        if tile.is_none() && self.filters.len() > 1 {
+            return refused(format!(
+                "has one plane, expected a sensor with a mosaic: {} has stacked filters",
+                self.name
+            ));
+        }
+        match dn.iter().max() {
+            None => return refused("has no pixel".to_owned()),
+            Some(&most) if most > top => {
+                return refused(format!("holds {most}, expected digital numbers of {} up to {top}", self.name));
+            }
+            Some(_) => {}
+        }
+        Ok(Raw {
+            planes: vec![RawPlane::Dn(dn)],
+            tile,
+            filter_names: self.filters.iter().map(|f| f.name.clone()).collect(),
+            levels: Levels::new(self, exposure),
+            exposure: *exposure,
+            row_time_us: self.row_time_us,
+            merged: Vec::new(),
+        })
+    }
+
     fn convert(&self, volts: &Array2<f32>, gain_of: &(dyn Fn(usize) -> f64 + Sync)) -> RawPlane {
         let black_v = match self.adc {
             crate::Adc::Bits { black_level_dn, .. } => {

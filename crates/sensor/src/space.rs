@@ -20,7 +20,23 @@ pub enum ColorSpace {
 const P3_FROM_SRGB: [[f32; 3]; 3] =
     [[0.822_461_96, 0.177_538_04, 0.0], [0.033_194_2, 0.966_805_8, 0.0], [0.017_082_63, 0.072_397_44, 0.910_519_93]];
 
+/// Linear sRGB from linear Display P3: the inverse of [`P3_FROM_SRGB`].
+const SRGB_FROM_P3: [[f32; 3]; 3] = [
+    [1.224_940_2, -0.224_940_18, 0.0],
+    [-0.042_056_955, 1.042_056_9, 0.0],
+    [-0.019_637_555, -0.078_636_05, 1.098_273_6],
+];
+
 impl ColorSpace {
+    /// Returns linear sRGB of linear light in these primaries; what lies outside its gamut is below 0 or above 1.
+    #[inline]
+    pub fn to_linear_srgb(self, rgb: [f32; 3]) -> [f32; 3] {
+        match self {
+            Self::Srgb => rgb,
+            Self::DisplayP3 => SRGB_FROM_P3.map(|row| row[0] * rgb[0] + row[1] * rgb[1] + row[2] * rgb[2]),
+        }
+    }
+
     /// Reads `srgb` or `display-p3`.
     ///
     /// # Errors
@@ -59,6 +75,14 @@ impl ColorSpace {
 mod tests {
     use super::*;
     use dioptric_spectrum::Xyz;
+
+    #[test]
+    fn primaries_there_and_back_are_the_same() {
+        for rgb in [[0.2, 0.5, 0.9], [1.0, 0.0, 0.0], [0.0, 1.0, 0.3]] {
+            let back = ColorSpace::DisplayP3.to_linear_srgb(ColorSpace::DisplayP3.from_linear_srgb(rgb));
+            assert!(back.iter().zip(rgb).all(|(a, b)| (a - b).abs() < 2e-6), "{back:?}");
+        }
+    }
 
     #[test]
     fn white_stays_and_the_primaries_of_p3_are_its_own() {

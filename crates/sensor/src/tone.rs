@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, LazyLock};
 
-use dioptric_spectrum::srgb_encode;
+use dioptric_spectrum::{srgb_decode, srgb_encode};
 use serde::{Deserialize, Serialize};
 
 use crate::SensorError;
@@ -111,6 +111,30 @@ impl ToneCurve {
         }
     }
 
+    /// Returns the linear light of a code, 0–1: [`encode`](Self::encode) undone; codes outside 0–1 are clipped.
+    pub fn decode(self, code: f64) -> f64 {
+        let code = code.clamp(0.0, 1.0);
+        match self {
+            Self::Linear => code,
+            Self::Srgb => srgb_decode(code),
+            Self::Gamma(exponent) => code.powf(1.0 / exponent),
+            Self::Filmic { contrast } => {
+                // The blend with the smooth step rises from 0 to 1, of a slope of 1 − contrast or more: halving finds its inverse.
+                let blend = |x: f64| x + contrast * (x * x * (3.0 - 2.0 * x) - x);
+                let (mut low, mut high) = (0.0, 1.0);
+                for _ in 0..f64::MANTISSA_DIGITS {
+                    let middle = 0.5 * (low + high);
+                    if blend(middle) < code {
+                        low = middle;
+                    } else {
+                        high = middle;
+                    }
+                }
+                srgb_decode(0.5 * (low + high))
+            }
+        }
+    }
+
     /// Returns the curve as a table that is read with straight lines between its entries.
     pub(crate) fn table(self) -> ToneTable {
         // For a small picture its powers take longer than all other processing.
@@ -164,6 +188,18 @@ mod tests {
         }
         assert!(Brightness::parse("bright").unwrap_err().to_string().contains("99%:0.9"));
         assert!(ToneCurve::parse("gamma").unwrap_err().to_string().contains("filmic:CONTRAST"));
+    }
+
+    #[test]
+    fn decoding_undoes_encoding() {
+        let filmic = |contrast| ToneCurve::Filmic { contrast };
+        for curve in [ToneCurve::Linear, ToneCurve::Srgb, ToneCurve::Gamma(0.45), filmic(0.5), filmic(1.0)] {
+            for i in 0..=1000 {
+                let light = f64::from(i) / 1000.0;
+                // Where the S is flat, at its ends, a code of 64 bits tells light to half of its digits.
+                assert_abs_diff_eq!(curve.decode(curve.encode(light)), light, epsilon = 1e-7);
+            }
+        }
     }
 
     #[test]

@@ -1,5 +1,7 @@
 //! The program `dioptric-studio [CAMERA.ron]`: a window of the system around [`dioptric_studio::ui`].
 
+mod arguments;
+
 use std::{env, error::Error, path::PathBuf, process::ExitCode};
 
 use dioptric_pipeline::PaintingFolder;
@@ -10,6 +12,8 @@ use dioptric_studio::{
 };
 use eframe::{Frame, NativeOptions, egui};
 
+use crate::arguments::{Asked, why_no_window};
+
 /// The window's contents as eframe wants them.
 struct Shell(Studio);
 
@@ -19,19 +23,42 @@ impl eframe::App for Shell {
     }
 }
 
-#[expect(clippy::print_stderr, reason = "what a program could not do")]
+#[expect(
+    clippy::print_stderr,
+    clippy::print_stdout,
+    reason = "what a program could not do, and what it was asked to say"
+)]
 fn main() -> ExitCode {
-    match run() {
+    let camera = match Asked::of(env::args_os().skip(1)) {
+        Ok(Asked::Window(camera)) => camera,
+        Ok(Asked::Words(words)) => {
+            println!("{words}");
+            return ExitCode::SUCCESS;
+        }
+        Err(words) => {
+            eprintln!("error: {words}");
+            return ExitCode::from(2);
+        }
+    };
+    match run(camera) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {error}");
+            eprintln!("error: {}", why_no_window(&error.to_string(), has_display()));
             ExitCode::FAILURE
         }
     }
 }
 
-fn run() -> Result<(), Box<dyn Error>> {
-    let camera = env::args_os().nth(1).map(PathBuf::from);
+/// Whether the system names a display to show windows on; systems other than those with X and Wayland need not name one.
+fn has_display() -> bool {
+    let is_named = |name| env::var_os(name).is_some_and(|value| !value.is_empty());
+    !cfg!(all(unix, not(target_os = "macos")))
+        || is_named("DISPLAY")
+        || is_named("WAYLAND_DISPLAY")
+        || is_named("WAYLAND_SOCKET")
+}
+
+fn run(camera: Option<PathBuf>) -> Result<(), Box<dyn Error>> {
     let settings = StudioSettings {
         engine: EngineSettings {
             paintings: env::current_exe().ok().and_then(|program| PaintingFolder::of_user(&program)),

@@ -15,6 +15,7 @@ use dioptric_optics::{
     glam::{DVec2, DVec3},
     zernike::FRINGE_TERMS,
 };
+use dioptric_spectrum::{Cancel, Cancelled};
 use rayon::prelude::*;
 
 use super::{
@@ -58,9 +59,17 @@ impl AnalysisRequest {
     /// # Errors
     /// When a number makes no sense, a glass is not known at a wavelength, or the lens has no focus and no film is given.
     pub fn compute(&self, lens: &Lens) -> Result<LensAnalysis, PipelineError> {
+        self.compute_until(lens, &Cancel::new())
+    }
+
+    /// Analyzes a lens until that is cancelled.
+    ///
+    /// # Errors
+    /// As [`compute`](Self::compute), and when it is cancelled.
+    pub fn compute_until(&self, lens: &Lens, cancel: &Cancel) -> Result<LensAnalysis, PipelineError> {
         self.check()?;
         let (lens, view) = self.lens_with_image(lens)?;
-        let mut analysis = self.compute_imaging(&lens)?;
+        let mut analysis = self.compute_imaging(&lens, cancel)?;
         analysis.notes.extend(view.map(|view| view.note()));
         analysis.afocal = view;
         Ok(analysis)
@@ -76,7 +85,7 @@ impl AnalysisRequest {
         AfocalView::applied(lens, self.film, &FilmUse { wavelengths_nm, reference_nm, distance_mm })
     }
 
-    fn compute_imaging(&self, lens: &Lens) -> Result<LensAnalysis, PipelineError> {
+    fn compute_imaging(&self, lens: &Lens, cancel: &Cancel) -> Result<LensAnalysis, PipelineError> {
         let lenses: Vec<MonoLens> = self.wavelengths_nm.iter().map(|&nm| lens.at(nm)).collect::<Result<_, _>>()?;
         let reference_nm = self.reference_nm();
         let reference = self.wavelengths_nm.iter().position(|&nm| nm == reference_nm).unwrap_or(0);
@@ -105,6 +114,7 @@ impl AnalysisRequest {
             film_distance_mm: 0.0,
             sampling: PupilSampling { coordinates, places: hexapolar(self.n_rings), rims: Vignetting::On },
             rule: PupilRule::of_rings(self.n_rings),
+            cancel: cancel.clone(),
         };
         bench.analyze(self, lens, (fields, notes))
     }
@@ -120,6 +130,7 @@ struct Bench {
     sampling: PupilSampling,
     /// The rays that stand for the light, of which sizes and foci are.
     rule: PupilRule,
+    cancel: Cancel,
 }
 
 impl Bench {
@@ -186,9 +197,9 @@ impl Bench {
         let curve_fields = curve_fields(&fields);
         let straight = StraightMap::of(self.reference(), self.dioptres, self.film_distance_mm);
         let axial_cone = self.cone(&axis);
-        let field_rows = |fields: &[Field]| {
-            fields.par_iter().map(|field| self.field_row(field, (straight.as_ref(), axial_cone))).collect()
-        };
+        self.cancel.check()?;
+        let field_rows =
+            |fields: &[Field]| self.each(fields, |field| self.field_row(field, (straight.as_ref(), axial_cone)));
         let apertures = NumericalApertures::find(self.reference(), &axis);
         let is_round = self.reference().is_rotational();
         let conjugate_x = self.reference().conjugate_x(request.distance_mm);
@@ -226,13 +237,18 @@ impl Bench {
                 wavefront_rms_waves: wavefront.map(|found| found.1),
             },
             axial_color: self.axial_color(request.distance_mm, from_mm),
-            spots: pairs.par_iter().map(|&(field, lens)| self.spot_row(field, lens)).collect(),
-            fans: pairs.par_iter().map(|&(field, lens)| self.fan_row(field, lens)).collect(),
-            opd_maps: pairs.par_iter().map(|&(field, lens)| self.opd_map(field, lens)).collect(),
+            spots: self.each(&pairs, |(field, lens)| self.spot_row(field, lens))?,
+            fans: self.each(&pairs, |(field, lens)| self.fan_row(field, lens))?,
+            opd_maps: self.each(&pairs, |(field, lens)| self.opd_map(field, lens))?,
             grid: straight.map_or_else(Vec::new, |straight| self.grid(&fields, &straight)),
-            fields: field_rows(&fields),
-            curves: field_rows(&curve_fields),
+            fields: field_rows(&fields)?,
+            curves: field_rows(&curve_fields)?,
         })
+    }
+
+    /// Returns a row of each on all threads, until the work is cancelled.
+    fn each<T: Sync, R: Send>(&self, of: &[T], row: impl Fn(&T) -> R + Sync) -> Result<Vec<R>, Cancelled> {
+        of.par_iter().map(|one| self.cancel.check().map(|()| row(one))).collect()
     }
 
     /// Returns a sentence on lit fields whose chief ray a rim or an opening stops; that it is stopped by an obscuration goes without saying.

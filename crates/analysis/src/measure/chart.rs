@@ -1,12 +1,10 @@
 //! Colors of a 24-patch chart in a picture.
 
-use std::path::Path;
-
 use dioptric_sensor::{ChartCorners, ChartReport, find_chart};
 use dioptric_spectrum::{Illuminant, Xyz, color_checker_reflectances};
 use serde::Serialize;
 
-use super::{CodeCurve, MeasuredPicture, Measurement};
+use super::{MeasuredPicture, Measurement};
 use crate::{Corner, LineChart, Scale, Series};
 use dioptric_pipeline::{PipelineError, display::code, parse_numbers};
 
@@ -18,8 +16,6 @@ pub struct ChartRequest {
     pub corners: Option<ChartCorners>,
     /// The light on the chart, under which its patches have the colors that are wanted; D65 where it is not given.
     pub light: Option<Illuminant>,
-    /// How samples stand for light.
-    pub curve: CodeCurve,
 }
 
 /// The colors of a chart.
@@ -76,21 +72,19 @@ impl ChartRequest {
         }
     }
 
-    /// Measures the chart of a picture file.
+    /// Measures the chart of a picture.
     ///
     /// # Errors
-    /// When the file cannot be read or there is no chart in it.
-    pub fn measure(&self, path: &Path) -> Result<ChartMeasurement, PipelineError> {
+    /// When there is no chart in it.
+    pub fn measure(&self, picture: &MeasuredPicture) -> Result<ChartMeasurement, PipelineError> {
         let light = self.light.clone().unwrap_or(Illuminant::D65);
-        let picture = MeasuredPicture::open(path, self.curve)?;
         let light_rgb = picture.rgb()?;
-        let in_file =
-            |e: dioptric_sensor::SensorError| PipelineError::Read { path: path.to_owned(), reason: e.to_string() };
+        let unfit = |e: dioptric_sensor::SensorError| picture.unfit(e.to_string());
         let corners = match self.corners {
             Some(corners) => corners,
-            None => find_chart(&light_rgb, &light).map_err(in_file)?,
+            None => find_chart(&light_rgb, &light).map_err(unfit)?,
         };
-        let report = ChartReport::measure(&light_rgb, corners, &light).map_err(in_file)?;
+        let report = ChartReport::measure(&light_rgb, corners, &light).map_err(unfit)?;
         let lab = |rgb: [f64; 3]| {
             let lab = Xyz::from_linear_srgb(rgb).to_lab(Xyz::D65);
             [lab.l, lab.a, lab.b]
@@ -107,7 +101,7 @@ impl ChartRequest {
             }
         });
         Ok(ChartMeasurement {
-            picture: picture.name,
+            picture: picture.name.clone(),
             mean_delta_e: report.mean_delta_e(),
             median_delta_e: report.median_delta_e(),
             max_delta_e: report.max_delta_e(),

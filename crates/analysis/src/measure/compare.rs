@@ -21,8 +21,6 @@ pub struct CompareRequest {
     pub viewing: PictureViewing,
     /// An even patch, whose visual signal-to-noise ratio is measured.
     pub patch: Option<PixelRegion>,
-    /// How samples stand for light.
-    pub curve: CodeCurve,
 }
 
 /// How a viewer sees pictures.
@@ -48,12 +46,43 @@ impl PictureViewing {
         }
     }
 
-    /// Returns the light of a picture file as the viewer sees it, in linear sRGB.
-    fn light(&self, path: &Path, curve: CodeCurve) -> Result<Array3<f32>, PipelineError> {
-        match self {
-            Self::PixelsPerDegree(_) => MeasuredPicture::open(path, curve)?.rgb(),
-            Self::Display { display, .. } => Ok(display.seen(&MeasuredPicture::open(path, CodeCurve::Linear)?.rgb()?)),
+    /// Opens a picture file to be seen so; `curve` is how its samples stand for light.
+    ///
+    /// # Errors
+    /// As [`MeasuredPicture::open`].
+    pub fn open(&self, path: &Path, curve: CodeCurve) -> Result<SeenPicture, PipelineError> {
+        let codes = match self {
+            Self::PixelsPerDegree(_) => None,
+            Self::Display { .. } => Some(MeasuredPicture::open(path, CodeCurve::Linear)?),
+        };
+        Ok(SeenPicture { picture: MeasuredPicture::open(path, curve)?, codes })
+    }
+
+    /// Returns the light of a picture as the viewer sees it, in linear sRGB.
+    fn light(&self, seen: &SeenPicture) -> Result<Array3<f32>, PipelineError> {
+        match (self, &seen.codes) {
+            (Self::Display { display, .. }, Some(codes)) => Ok(display.seen(&codes.rgb()?)),
+            (Self::Display { .. }, None) => {
+                Err(seen.picture.unfit("holds light, expected codes for a display".to_owned()))
+            }
+            (Self::PixelsPerDegree(_), _) => seen.picture.rgb(),
         }
+    }
+}
+
+/// A picture that is compared with another.
+#[derive(Clone, Debug)]
+pub struct SeenPicture {
+    /// Its light.
+    picture: MeasuredPicture,
+    /// Its codes from 0 to 1, where a display shows them.
+    codes: Option<MeasuredPicture>,
+}
+
+impl SeenPicture {
+    /// A picture whose light a program holds; no display shows it.
+    pub fn of_light(picture: MeasuredPicture) -> Self {
+        Self { picture, codes: None }
     }
 }
 
@@ -96,15 +125,14 @@ pub struct DeltaESummary {
 }
 
 impl CompareRequest {
-    /// Compares two picture files.
+    /// Compares two pictures.
     ///
     /// # Errors
-    /// When a file cannot be read, the pictures differ in size, or a setting makes no sense.
-    pub fn compare(&self, first: &Path, second: &Path) -> Result<Comparison, PipelineError> {
+    /// When the pictures differ in size or have no colors, or a setting makes no sense.
+    pub fn compare(&self, first: &SeenPicture, second: &SeenPicture) -> Result<Comparison, PipelineError> {
         let pixels_per_degree = self.viewing.pixels_per_degree();
-        let (light, other_light) = (self.viewing.light(first, self.curve)?, self.viewing.light(second, self.curve)?);
-        let open = |path: &Path| MeasuredPicture::open(path, self.curve);
-        let (first, second) = (open(first)?, open(second)?);
+        let (light, other_light) = (self.viewing.light(first)?, self.viewing.light(second)?);
+        let (first, second) = (&first.picture, &second.picture);
         let patch = self.patch.map(|patch| patch.check_within(first.size())).transpose()?;
         let (codes, other_codes) = (first.coded()?, second.coded()?);
         let psnr = psnr_db(&codes, &other_codes)?;
@@ -116,8 +144,8 @@ impl CompareRequest {
         Ok(Comparison {
             vsnr: vsnr(&light)?,
             against_vsnr: vsnr(&other_light)?,
-            picture: first.name,
-            against: second.name,
+            picture: first.name.clone(),
+            against: second.name.clone(),
             psnr_db: psnr.is_finite().then_some(psnr),
             ssim: ssim(&codes, &other_codes)?,
             pixels_per_degree,

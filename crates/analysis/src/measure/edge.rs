@@ -1,12 +1,10 @@
 //! The spatial frequency response of a slanted edge in a picture.
 
-use std::path::Path;
-
 use dioptric_sensor::{EdgeResponse, SensorError, Tile, Viewing, find_edge, find_edges};
 use ndarray::{Array2, ArrayView2, s};
 use serde::Serialize;
 
-use super::{CodeCurve, MeasuredPicture, Measurement, PixelRegion};
+use super::{MeasuredPicture, Measurement, PixelRegion};
 use crate::{Corner, LineChart, Scale, Series, palette};
 use dioptric_pipeline::PipelineError;
 
@@ -34,8 +32,6 @@ pub struct EdgeRequest {
     pub pixel_um: Option<f64>,
     /// Pixels a degree of the viewer's field, for acutance and square-root integral; 60 where it is not given.
     pub pixels_per_degree: Option<f64>,
-    /// How samples stand for light.
-    pub curve: CodeCurve,
 }
 
 /// The responses of an edge, a channel each.
@@ -103,22 +99,14 @@ pub struct UnmeasuredChannel {
 }
 
 impl EdgeRequest {
-    /// Measures the edge of a picture file.
+    /// Measures the edge of a picture.
     ///
     /// In a picture of R, G and B the luminance is measured too; in a mosaic each filter by itself, over all its places
     /// in the tile.
     ///
     /// # Errors
-    /// When the file cannot be read, there is no edge, or a setting does not go with the picture.
-    pub fn measure(&self, path: &Path) -> Result<EdgeMeasurement, PipelineError> {
-        self.measure_picture(&MeasuredPicture::open(path, self.curve)?)
-    }
-
-    /// Measures the edge of a picture that is open.
-    ///
-    /// # Errors
-    /// As [`measure`](Self::measure).
-    pub(super) fn measure_picture(&self, picture: &MeasuredPicture) -> Result<EdgeMeasurement, PipelineError> {
+    /// When there is no edge, or a setting does not go with the picture.
+    pub fn measure(&self, picture: &MeasuredPicture) -> Result<EdgeMeasurement, PipelineError> {
         if let Some(value) = self.pixel_um.filter(|v| !(*v > 0.0 && v.is_finite())) {
             return Err(wrong("--pixel-um", value.to_string(), "a number above 0"));
         }
@@ -152,7 +140,7 @@ impl EdgeRequest {
             }),
             (None, first) => {
                 let reason = first.map_or_else(|| "has no channel".to_owned(), |first| first.reason.clone());
-                Err(PipelineError::Read { path: picture.name.clone().into(), reason })
+                Err(picture.unfit(reason))
             }
         }
     }
@@ -197,7 +185,7 @@ impl EdgeRequest {
         let (rows, columns) = (tile.rows(), tile.columns());
         if rows != columns {
             let reason = format!("has a mosaic of {rows} × {columns} pixels, expected a square one");
-            return Err(PipelineError::Read { path: picture.name.clone().into(), reason });
+            return Err(picture.unfit(reason));
         }
         let mut channels: Vec<(String, Vec<Part<'a>>)> = names.iter().map(|name| (name.clone(), Vec::new())).collect();
         for (row, column) in (0..rows).flat_map(|row| (0..columns).map(move |column| (row, column))) {
@@ -214,7 +202,7 @@ impl EdgeRequest {
         if let Some(region) = self.region {
             return region.check_within((rows, columns));
         }
-        let in_file = |reason: String| PipelineError::Read { path: picture.name.clone().into(), reason };
+        let in_file = |reason: String| picture.unfit(reason);
         let binned = binned(picture, period);
         let most = binned.nrows().min(binned.ncols());
         let square = |side: usize| find_edge(&binned, side).map(|corner| (corner, side));
@@ -239,8 +227,7 @@ impl EdgeRequest {
         let period = self.samples(picture)?.period;
         let binned = binned(picture, period);
         let side = self.side_for(picture)? / period;
-        let corners = find_edges(&binned, side)
-            .map_err(|e| PipelineError::Read { path: picture.name.clone().into(), reason: e.to_string() })?;
+        let corners = find_edges(&binned, side).map_err(|e| picture.unfit(e.to_string()))?;
         let region = |(row, column)| PixelRegion {
             row: row * period,
             column: column * period,
@@ -288,7 +275,7 @@ fn binned(picture: &MeasuredPicture, period: usize) -> Array2<f32> {
 /// Returns why an edge is not measured, without the name of the file.
 pub(super) fn reason_of(error: &PipelineError) -> String {
     match error {
-        PipelineError::Read { reason, .. } => reason.clone(),
+        PipelineError::Read { reason, .. } | PipelineError::Unsuitable { reason, .. } => reason.clone(),
         other => other.to_string(),
     }
 }

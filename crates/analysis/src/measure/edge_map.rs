@@ -1,7 +1,5 @@
 //! Slanted edges all over a picture: the response over the field.
 
-use std::path::Path;
-
 use dioptric_pipeline::PipelineError;
 use serde::Serialize;
 
@@ -54,12 +52,11 @@ pub struct UnmeasuredPlace {
 }
 
 impl EdgeMapRequest {
-    /// Finds and measures the slanted edges of a picture file.
+    /// Finds and measures the slanted edges of a picture.
     ///
     /// # Errors
-    /// When the file cannot be read, a setting makes no sense, or no edge can be measured.
-    pub fn measure(&self, path: &Path) -> Result<EdgeMap, PipelineError> {
-        let picture = MeasuredPicture::open(path, self.edge.curve)?;
+    /// When a setting makes no sense, or no edge can be measured.
+    pub fn measure(&self, picture: &MeasuredPicture) -> Result<EdgeMap, PipelineError> {
         let (rows, columns) = picture.size();
         let half_diagonal = 0.5 * (rows as f64).hypot(columns as f64);
         let field = |region: &PixelRegion| {
@@ -67,17 +64,17 @@ impl EdgeMapRequest {
             off(region.column, region.columns, columns).hypot(off(region.row, region.rows, rows)) / half_diagonal
         };
         let (mut edges, mut not_measured): (Vec<EdgePlace>, Vec<UnmeasuredPlace>) = (Vec::new(), Vec::new());
-        let first = self.edge.side_for(&picture)?;
+        let first = self.edge.side_for(picture)?;
         // Smaller squares find the edges of which larger ones hold corners.
         for side in SIDES.map(|share| (share * first as f64) as usize) {
             let sized = EdgeRequest { side: Some(side), ..self.edge.clone() };
-            let Ok(regions) = sized.regions(&picture, MOST) else { continue };
+            let Ok(regions) = sized.regions(picture, MOST) else { continue };
             for region in regions {
                 if edges.iter().any(|edge| overlap(&edge.region, &region)) {
                     continue;
                 }
                 let request = EdgeRequest { region: Some(region), ..self.edge.clone() };
-                match request.measure_picture(&picture) {
+                match request.measure(picture) {
                     Ok(measured) => edges.push(EdgePlace {
                         region,
                         field: field(&region),
@@ -95,10 +92,10 @@ impl EdgeMapRequest {
         if edges.is_empty() {
             let reason =
                 not_measured.first().map_or_else(|| "holds no slanted edge".to_owned(), |first| first.reason.clone());
-            return Err(PipelineError::Read { path: path.to_owned(), reason });
+            return Err(picture.unfit(reason));
         }
         edges.sort_by(|a, b| a.field.total_cmp(&b.field));
-        Ok(EdgeMap { picture: picture.name, edges, not_measured })
+        Ok(EdgeMap { picture: picture.name.clone(), edges, not_measured })
     }
 }
 

@@ -5,14 +5,14 @@
 //! fitted together. Distortion is how much farther from the middle a dot is than that, as a share; lateral color how far its red and its blue are from
 //! its green.
 
-use std::{collections::HashMap, path::Path};
+use std::collections::HashMap;
 
 use dioptric_pipeline::PipelineError;
 use dioptric_sensor::{PointWindow, find_points};
 use ndarray::Array2;
 use serde::Serialize;
 
-use super::{CodeCurve, MeasuredPicture, Measurement};
+use super::{MeasuredPicture, Measurement};
 use crate::{Corner, LineChart, Scale, Series, palette};
 
 /// A dot is the neighbor that is looked for within this share of the distance between dots.
@@ -23,13 +23,6 @@ const CUT_OFF: f64 = 0.6;
 const FEWEST: usize = 25;
 /// Rounds of the fit.
 const ROUNDS: usize = 20;
-
-/// How a grid is measured.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct GridRequest {
-    /// How samples stand for light.
-    pub curve: CodeCurve,
-}
 
 /// The distortion and the lateral color of a picture of dots.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -96,26 +89,25 @@ struct Dot {
     channels: Vec<[f64; 2]>,
 }
 
-impl GridRequest {
-    /// Measures the grid of a picture file: dots that are brighter or darker than what lies between them.
+impl GridMeasurement {
+    /// Measures the grid of a picture: dots that are brighter or darker than what lies between them.
     ///
     /// # Errors
-    /// When the file cannot be read, or fewer than 25 dots are in order.
-    pub fn measure(&self, path: &Path) -> Result<GridMeasurement, PipelineError> {
-        let picture = MeasuredPicture::open(path, self.curve)?;
+    /// When fewer than 25 dots are in order.
+    pub fn of(picture: &MeasuredPicture) -> Result<Self, PipelineError> {
         picture.require_whole()?;
-        let in_file = |reason: String| PipelineError::Read { path: path.to_owned(), reason };
-        let dots = dots_of(&picture).map_err(in_file)?;
+        let unfit = |reason: String| picture.unfit(reason);
+        let dots = dots_of(picture).map_err(unfit)?;
         let ordered = in_order(&dots, picture.size());
         if ordered.len() < FEWEST {
-            return Err(in_file(format!(
+            return Err(unfit(format!(
                 "holds {} dots in the order of a grid, expected {FEWEST} or more, apart by about the same in rows and columns",
                 ordered.len()
             )));
         }
         let n_left_out = dots.len() - ordered.len();
         let names: Vec<String> = picture.planes.iter().map(|(name, _)| name.clone()).collect();
-        Ok(Fit::of(&ordered, picture.size()).measurement(&ordered, (picture.name, n_left_out), &names))
+        Ok(Fit::of(&ordered, picture.size()).measurement(&ordered, (picture.name.clone(), n_left_out), &names))
     }
 }
 

@@ -20,16 +20,19 @@ mod texture;
 use serde::Serialize;
 
 pub use chart::{ChartMeasurement, ChartRequest, PatchRow};
-pub use compare::{CompareRequest, Comparison, DeltaESummary, PictureViewing};
+pub use compare::{CompareRequest, Comparison, DeltaESummary, PictureViewing, SeenPicture};
 pub use edge::{EdgeChannel, EdgeMeasurement, EdgeRequest, UnmeasuredChannel};
 pub use edge_map::{EdgeMap, EdgeMapRequest, EdgePlace, UnmeasuredPlace};
-pub use grid::{GridDot, GridMeasurement, GridRequest, LateralColor};
-pub use noise::{BenchRequest, NoiseData, NoiseDataSheet, NoisePoint, SpatialPatterns, measure_bench, measure_frames};
+pub use grid::{GridDot, GridMeasurement, LateralColor};
+pub use noise::{
+    BenchRequest, FrameSeries, NoiseData, NoiseDataSheet, NoisePoint, SpatialPatterns, measure_bench, measure_frames,
+    measure_series,
+};
 pub use open::{CodeCurve, MeasuredPicture, notes_on_picture};
 pub use points::{PointRequest, PointRow, PointSet};
 pub use region::PixelRegion;
 pub use region_statistics::{BandMean, ColorDifference, RegionChannel, RegionColor, RegionMeasurement, RegionRequest};
-pub use shading::{ShadingChannel, ShadingMeasurement, ShadingRequest};
+pub use shading::{ShadingChannel, ShadingMeasurement};
 pub use star::{StarChannel, StarMeasurement, StarRequest};
 pub use steps::{Step, StepRow, StepsChannel, StepsMeasurement, StepsRequest};
 pub use texture::{TextureChannel, TextureCurve, TextureMeasurement, TextureNoiseRequest, TextureRequest};

@@ -7,14 +7,14 @@ use std::{
 
 use dioptric_sensor::{
     Bench, BenchSettings, DarkCurrentEstimate, Exposure, FlatPoint, FrameStack, NonUniformity, Parts, PhotonTransfer,
-    Raw, Spectrogram,
+    Raw, Sensor, Spectrogram,
 };
 use dioptric_spectrum::Illuminant;
 use ndarray::Array2;
 use serde::Serialize;
 
 use super::frames::{DESCRIPTOR_FILE, FileSeries, descriptor, find_series, read_frame};
-use dioptric_pipeline::{PipelineError, SensorSpec};
+use dioptric_pipeline::PipelineError;
 
 /// The light for which ISO speeds are given.
 const ISO_LIGHT: Illuminant = Illuminant::D55;
@@ -27,7 +27,7 @@ const SAME_TIME: f64 = 1e-6;
 #[derive(Clone, Debug, PartialEq)]
 pub struct BenchRequest {
     /// The sensor.
-    pub sensor: SensorSpec,
+    pub sensor: Sensor,
     /// The filter; the one that sees the light best where it is not given.
     pub filter: Option<String>,
     /// The side of the square of pixels; 512 where it is not given.
@@ -252,8 +252,8 @@ pub struct NoisePoint {
 /// # Errors
 /// When the sensor cannot be opened, a setting makes no sense or a frame cannot be written.
 pub fn measure_bench(request: &BenchRequest, frames_folder: Option<&Path>) -> Result<NoiseData, PipelineError> {
-    let sensor = request.sensor.open()?;
-    let bench = Bench::new(&sensor, request.settings(), request.filter.as_deref())?;
+    let sensor = &request.sensor;
+    let bench = Bench::new(sensor, request.settings(), request.filter.as_deref())?;
     let mut collected = Collected::default();
     let mut kept = Vec::new();
     let mut number = 0;
@@ -310,6 +310,36 @@ pub fn measure_frames(path: &Path) -> Result<NoiseData, PipelineError> {
         collected.add(taken).map_err(in_file)?;
     }
     collected.analyze(path.display().to_string()).map_err(in_file)
+}
+
+/// Frames under equal light that a program holds.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FrameSeries {
+    /// The exposure time, s, where it is known.
+    pub time_s: Option<f64>,
+    /// The photons that fell on a pixel: 0 for dark frames, `None` where they were not counted.
+    pub photons: Option<f64>,
+    /// Two frames or more of digital numbers, of one size.
+    pub frames: Vec<Array2<f32>>,
+}
+
+/// Measures frames that a program holds; `name` is what they are called.
+///
+/// # Errors
+/// When frames differ in size, hold a number that is not finite, or there are too few.
+pub fn measure_series(name: &str, series: Vec<FrameSeries>) -> Result<NoiseData, PipelineError> {
+    let mut collected = Collected::default();
+    for FrameSeries { time_s, photons, frames } in series {
+        let mut taken = Taken::new(time_s, photons);
+        for frame in frames {
+            if frame.iter().any(|dn| !dn.is_finite()) {
+                return Err(too_few("hold a number that is not finite".to_owned()));
+            }
+            taken.add(frame)?;
+        }
+        collected.add(taken)?;
+    }
+    collected.analyze(name.to_owned())
 }
 
 fn numbers_of(raw: &Raw) -> Array2<f32> {

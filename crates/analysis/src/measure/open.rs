@@ -27,7 +27,7 @@ pub enum CodeCurve {
 /// A picture in linear light.
 #[derive(Clone, Debug)]
 pub struct MeasuredPicture {
-    /// The file.
+    /// The file, or what a program calls it.
     pub name: String,
     /// Each channel with its name; the highest code of a file of whole numbers is 1, saturation of a raw file.
     pub planes: Vec<(String, Array2<f32>)>,
@@ -35,6 +35,8 @@ pub struct MeasuredPicture {
     pub mosaic: Option<(Tile, Vec<String>)>,
     /// What its red, green and blue are.
     primaries: Primaries,
+    /// Whether it was read from a file.
+    is_of_file: bool,
 }
 
 /// A channel's name, the plane that holds it, and which pixels are its own.
@@ -77,6 +79,14 @@ pub(crate) fn read_dng(path: &Path) -> Result<Option<DngFile>, PipelineError> {
     if is_dng { Ok(Some(DngFile::read(path)?)) } else { Ok(None) }
 }
 
+/// Returns the error of a picture that does not do: of a file that cannot be used, or of what a program holds.
+fn unfit(name: &str, is_of_file: bool, reason: String) -> PipelineError {
+    match is_of_file {
+        true => PipelineError::Read { path: name.into(), reason },
+        false => PipelineError::Unsuitable { what: "the picture", reason },
+    }
+}
+
 /// Returns what of a picture's statements is used or not when it is measured, a sentence each: how it is turned, and which colors it has.
 pub fn notes_on_picture(path: &Path, curve: CodeCurve) -> Vec<String> {
     let mut notes = notes_on_samples(path);
@@ -114,10 +124,26 @@ impl MeasuredPicture {
     /// When the file cannot be read, is empty, holds samples that are not finite, or colors that cannot be converted.
     pub fn open(path: &Path, curve: CodeCurve) -> Result<Self, PipelineError> {
         if let Some(DngFile { raw, .. }) = read_dng(path)? {
-            return Ok(Self::of_raw(path, raw));
+            return Ok(Self { is_of_file: true, ..Self::of_raw(path.display().to_string(), &raw) });
         }
-        let PictureSamples { planes, top, colors } = read_picture_samples(path)?;
-        let wrong = |reason: String| PipelineError::Read { path: path.to_owned(), reason };
+        Self::of_codes(path.display().to_string(), read_picture_samples(path)?, curve, true)
+    }
+
+    /// Takes samples that a program holds: R, G and B, or one plane of gray.
+    ///
+    /// # Errors
+    /// When there are none, one is not finite, or they have colors that cannot be converted.
+    pub fn of_samples(name: &str, samples: PictureSamples, curve: CodeCurve) -> Result<Self, PipelineError> {
+        Self::of_codes(name.to_owned(), samples, curve, false)
+    }
+
+    fn of_codes(
+        name: String,
+        PictureSamples { planes, top, colors }: PictureSamples,
+        curve: CodeCurve,
+        is_of_file: bool,
+    ) -> Result<Self, PipelineError> {
+        let wrong = |reason: String| unfit(&name, is_of_file, reason);
         if planes.first().is_none_or(|(_, plane)| plane.is_empty()) {
             return Err(wrong("it has no pixels".to_owned()));
         }
@@ -142,21 +168,23 @@ impl MeasuredPicture {
         let linear =
             |(channel, (name, plane)): (usize, (String, Array2<f32>))| (name, plane.mapv(|v| light(channel, v)));
         Ok(Self {
-            name: path.display().to_string(),
+            is_of_file,
+            name,
             planes: planes.into_iter().enumerate().map(linear).collect(),
             mosaic: None,
             primaries: colors.as_ref().map_or(Primaries::Srgb, |colors| Primaries::Stated(colors.to_srgb)),
         })
     }
 
-    /// Takes the frame of a raw file.
-    fn of_raw(path: &Path, raw: Raw) -> Self {
-        let (planes, names) = (raw.linear(), raw.filter_names);
+    /// Takes a raw frame that a program holds, in shares of saturation.
+    pub fn of_raw(name: String, raw: &Raw) -> Self {
+        let (planes, names) = (raw.linear(), raw.filter_names.clone());
         // One filter everywhere is no mosaic.
-        let tile = raw.tile.filter(|_| names.len() > 1);
+        let tile = raw.tile.clone().filter(|_| names.len() > 1);
         let named = if tile.is_some() { vec!["raw".to_owned()] } else { names.clone() };
         Self {
-            name: path.display().to_string(),
+            is_of_file: false,
+            name,
             planes: named.into_iter().zip(planes).collect(),
             mosaic: tile.map(|tile| (tile, names)),
             primaries: Primaries::Filters,
@@ -173,7 +201,12 @@ impl MeasuredPicture {
         }
         let reason =
             "holds a mosaic, of whose pixels each has one filter, expected a picture: `dioptric develop` makes one";
-        Err(PipelineError::Read { path: self.name.clone().into(), reason: reason.to_owned() })
+        Err(self.unfit(reason.to_owned()))
+    }
+
+    /// Returns the error of a picture that does not do.
+    pub(crate) fn unfit(&self, reason: String) -> PipelineError {
+        unfit(&self.name, self.is_of_file, reason)
     }
 
     /// Takes planes of linear light of sRGB's primaries.
@@ -184,6 +217,7 @@ impl MeasuredPicture {
             planes: planes.into_iter().map(|(name, plane)| (name.to_owned(), plane)).collect(),
             mosaic: None,
             primaries: Primaries::Srgb,
+            is_of_file: true,
         }
     }
 
@@ -255,7 +289,7 @@ impl MeasuredPicture {
             _ => {
                 let names: Vec<&str> = self.planes.iter().map(|(name, _)| name.as_str()).collect();
                 let reason = format!("its channels are {}, expected R, G and B or a single one", names.join(", "));
-                return Err(PipelineError::Read { path: self.name.clone().into(), reason });
+                return Err(self.unfit(reason));
             }
         };
         let (rows, columns) = self.size();
@@ -263,7 +297,7 @@ impl MeasuredPicture {
             Primaries::Filters if self.planes.len() > 1 => {
                 let reason = "holds what a camera's filters see, which is no color yet, expected a picture: \
                               `dioptric develop` makes one";
-                Err(PipelineError::Read { path: self.name.clone().into(), reason: reason.to_owned() })
+                Err(self.unfit(reason.to_owned()))
             }
             Primaries::Stated(matrix) if self.planes.len() > 1 => {
                 let at = |(r, c, k): (usize, usize, usize)| {

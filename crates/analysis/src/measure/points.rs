@@ -1,13 +1,11 @@
 //! Pictures of points, and what is read off them.
 
-use std::path::Path;
-
 use dioptric_psf::Picture;
 use dioptric_sensor::{PointWindow, find_points};
 use ndarray::{Array2, s};
 use serde::Serialize;
 
-use super::{CodeCurve, MeasuredPicture, Measurement};
+use super::{MeasuredPicture, Measurement};
 use crate::{Corner, LineChart, Scale, Series, palette};
 use dioptric_pipeline::PipelineError;
 
@@ -25,8 +23,6 @@ pub struct PointRequest {
     pub pixel_um: f64,
     /// The light between the points, where it is not the median of the picture.
     pub background: Option<f64>,
-    /// How samples stand for light.
-    pub curve: CodeCurve,
 }
 
 /// The points of a picture.
@@ -80,11 +76,11 @@ pub struct PointRow {
 }
 
 impl PointRequest {
-    /// Measures every point of a picture file; points are looked for in the luminance and measured in each channel.
+    /// Measures every point of a picture; points are looked for in the luminance and measured in each channel.
     ///
     /// # Errors
-    /// When the file cannot be read, there is no point, or a setting makes no sense.
-    pub fn measure(&self, path: &Path) -> Result<PointSet, PipelineError> {
+    /// When there is no point, or a setting makes no sense.
+    pub fn measure(&self, picture: &MeasuredPicture) -> Result<PointSet, PipelineError> {
         let wrong = |key, found: String, expected: &str| {
             let origin = "the command line".to_owned();
             Err(PipelineError::Value { origin, key, found, expected: expected.to_owned() })
@@ -95,20 +91,16 @@ impl PointRequest {
         if let Some(side) = self.window.filter(|side| *side < 3 || side % 2 == 0) {
             return wrong("--window", side.to_string(), "an odd number of pixels, 3 or more");
         }
-        let picture = MeasuredPicture::open(path, self.curve)?;
         picture.require_whole()?;
-        let in_file = |error: dioptric_sensor::SensorError| PipelineError::Read {
-            path: path.to_owned(),
-            reason: error.to_string(),
-        };
-        let windows = find_points(&picture.luminance(), self.window).map_err(in_file)?;
+        let windows =
+            find_points(&picture.luminance(), self.window).map_err(|error| picture.unfit(error.to_string()))?;
         let mut spots = Vec::new();
         for (number, window) in windows.iter().enumerate() {
             for (channel, plane) in &picture.planes {
                 spots.extend(self.row(number, window, channel, plane));
             }
         }
-        Ok(PointSet { picture: picture.name, pixel_um: self.pixel_um, spots })
+        Ok(PointSet { picture: picture.name.clone(), pixel_um: self.pixel_um, spots })
     }
 
     /// Returns what is read off one channel, or `None` where the point has no light in it.

@@ -24,8 +24,6 @@ pub struct RegionRequest {
     pub region: Option<PixelRegion>,
     /// A region of the same file whose color it is compared with.
     pub reference: Option<PixelRegion>,
-    /// How samples stand for light.
-    pub curve: CodeCurve,
 }
 
 /// The numbers of a region.
@@ -124,15 +122,15 @@ pub struct ColorDifference {
 }
 
 impl RegionRequest {
-    /// Measures a region of a file.
+    /// Measures a region of a file, whose samples stand for light so.
     ///
     /// # Errors
     /// When the file cannot be read, or a region is not within it.
-    pub fn measure(&self, path: &Path) -> Result<RegionMeasurement, PipelineError> {
+    pub fn measure_file(&self, path: &Path, curve: CodeCurve) -> Result<RegionMeasurement, PipelineError> {
         let is_exr = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr"));
         match is_exr.then(|| read_spectral_exr(path)) {
-            Some(Ok(file)) => self.of_bands(path, &file.image),
-            _ => self.of_picture(path),
+            Some(Ok(file)) => self.measure_bands(&path.display().to_string(), &file.image),
+            _ => self.measure(&MeasuredPicture::open(path, curve)?),
         }
     }
 
@@ -140,8 +138,11 @@ impl RegionRequest {
         PixelRegion { column: 0, row: 0, columns, rows }
     }
 
-    fn of_picture(&self, path: &Path) -> Result<RegionMeasurement, PipelineError> {
-        let picture = MeasuredPicture::open(path, self.curve)?;
+    /// Measures a region of a picture.
+    ///
+    /// # Errors
+    /// When a region is not within it.
+    pub fn measure(&self, picture: &MeasuredPicture) -> Result<RegionMeasurement, PipelineError> {
         let size = picture.size();
         let region = self.region.unwrap_or(Self::whole(size)).check_within(size)?;
         let reference = self.reference.map(|region| region.check_within(size)).transpose()?;
@@ -175,7 +176,7 @@ impl RegionRequest {
         let (own, other) = (mean_xyz(region), reference.and_then(mean_xyz));
         Ok(RegionMeasurement {
             unit: picture.unit().to_owned(),
-            picture: picture.name,
+            picture: picture.name.clone(),
             region,
             channels,
             color: own.map(|xyz| RegionColor::of(xyz, Some(Xyz::D65))),
@@ -184,9 +185,13 @@ impl RegionRequest {
         })
     }
 
-    fn of_bands(
+    /// Measures a region of a spectral image: luminance or illuminance, color, and the mean of each band.
+    ///
+    /// # Errors
+    /// When a region is not within it.
+    pub fn measure_bands(
         &self,
-        path: &Path,
+        picture: &str,
         image: &dioptric_spectrum::SpectralImage,
     ) -> Result<RegionMeasurement, PipelineError> {
         let size = (image.rows(), image.columns());
@@ -215,7 +220,7 @@ impl RegionRequest {
         };
         let spectrum = image.grid().centers_nm().iter().zip(means(region));
         Ok(RegionMeasurement {
-            picture: path.display().to_string(),
+            picture: picture.to_owned(),
             region,
             unit: format!("{luminance_unit}; of bands {}", image.quantity().unit()),
             channels: vec![RegionChannel::of_some(name, region.of(&luminance), |_| true)],

@@ -1,12 +1,10 @@
 //! Shading of an even plane (ISO 17957): how luminance and color change over the field.
 
-use std::path::Path;
-
 use dioptric_pipeline::PipelineError;
 use ndarray::Array2;
 use serde::Serialize;
 
-use super::{CodeCurve, MeasuredPicture, Measurement};
+use super::{MeasuredPicture, Measurement};
 use crate::{Corner, LineChart, Scale, Series, palette};
 use dioptric_spectrum::Xyz;
 
@@ -16,13 +14,6 @@ const BLOCKS: usize = 15;
 const FEWEST: usize = 4;
 /// The share of samples at the ends of the codes from which on a frame is refused.
 const CLIPPED: f64 = 0.01;
-
-/// How an even plane is measured.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct ShadingRequest {
-    /// How samples stand for light.
-    pub curve: CodeCurve,
-}
 
 /// The shading of a picture of an even plane.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -54,25 +45,24 @@ pub struct ShadingChannel {
     pub error_percent: f64,
 }
 
-impl ShadingRequest {
-    /// Measures the shading of a picture file that shows an even plane.
+impl ShadingMeasurement {
+    /// Measures the shading of a picture that shows an even plane.
     ///
     /// # Errors
-    /// When the file cannot be read, is smaller than its blocks, has no light, or more than 1 % of its samples at the ends of the codes.
-    pub fn measure(&self, path: &Path) -> Result<ShadingMeasurement, PipelineError> {
-        let picture = MeasuredPicture::open(path, self.curve)?;
-        let in_file = |reason: String| PipelineError::Read { path: path.to_owned(), reason };
+    /// When it is smaller than its blocks, has no light, or more than 1 % of its samples at the ends of the codes.
+    pub fn of(picture: &MeasuredPicture) -> Result<Self, PipelineError> {
+        let unfit = |reason: String| picture.unfit(reason);
         let (rows, columns) = picture.size();
         let period = picture.mosaic.as_ref().map_or(1, |(tile, _)| tile.rows().max(tile.columns()));
         let smallest = BLOCKS * FEWEST * period;
         if rows < smallest || columns < smallest {
-            return Err(in_file(format!(
+            return Err(unfit(format!(
                 "has {columns} × {rows} pixels, expected {smallest} × {smallest} or more for shading"
             )));
         }
         let clipped = picture.clipped_share();
         if clipped > CLIPPED {
-            return Err(in_file(format!(
+            return Err(unfit(format!(
                 "has {:.1} % of its samples at 0 or at the highest code, expected an exposure between: shading would look less than it is",
                 100.0 * clipped
             )));
@@ -80,7 +70,7 @@ impl ShadingRequest {
         let mut channels = Vec::new();
         for (name, plane, is_own) in picture.filters() {
             channels.push(
-                ShadingChannel::of(&name, plane, &is_own).ok_or_else(|| in_file(format!("has no light in {name}")))?,
+                ShadingChannel::of(&name, plane, &is_own).ok_or_else(|| unfit(format!("has no light in {name}")))?,
             );
         }
         let mut color_shading = None;
@@ -89,12 +79,12 @@ impl ShadingRequest {
         {
             let luminance = picture.luminance();
             let own = ShadingChannel::of("luminance", &luminance, &|_| true)
-                .ok_or_else(|| in_file("has no light".to_owned()))?;
+                .ok_or_else(|| unfit("has no light".to_owned()))?;
             let planes = [0, 1, 2].map(|k| rgb.index_axis(ndarray::Axis(2), k).to_owned());
             color_shading = Some(color_shading_of(&planes));
             channels.push(own);
         }
-        Ok(ShadingMeasurement { picture: picture.name.clone(), blocks: [BLOCKS; 2], channels, color_shading })
+        Ok(Self { picture: picture.name.clone(), blocks: [BLOCKS; 2], channels, color_shading })
     }
 }
 

@@ -4,13 +4,13 @@
 //! fitted to all pixels by least squares, so that neither the places of the pixels nor the other harmonics of a binary star enter; what noise adds to
 //! the amplitude is taken off.
 
-use std::{f64::consts::TAU, path::Path};
+use std::f64::consts::TAU;
 
 use dioptric_pipeline::PipelineError;
 use ndarray::Array2;
 use serde::Serialize;
 
-use super::{CodeCurve, MeasuredPicture, Measurement, PixelRegion, edge::response_series};
+use super::{MeasuredPicture, Measurement, PixelRegion, edge::response_series};
 use crate::{Corner, LineChart, Scale};
 
 /// Segments of the circle (ISO 12233).
@@ -39,8 +39,6 @@ pub struct StarRequest {
     pub is_binary: bool,
     /// The modulation of the star itself, (most − least) / (most + least); that of its coarsest ring is taken for the response 1 where it is not given.
     pub modulation: Option<f64>,
-    /// How samples stand for light.
-    pub curve: CodeCurve,
 }
 
 /// The response of a star.
@@ -80,11 +78,11 @@ pub struct StarChannel {
 }
 
 impl StarRequest {
-    /// Measures the star of a picture file.
+    /// Measures the star of a picture.
     ///
     /// # Errors
-    /// When the file cannot be read, holds no star with its center within the region, or a setting makes no sense.
-    pub fn measure(&self, path: &Path) -> Result<StarMeasurement, PipelineError> {
+    /// When it holds no star with its center within the region, or a setting makes no sense.
+    pub fn measure(&self, picture: &MeasuredPicture) -> Result<StarMeasurement, PipelineError> {
         let wrong = |key: &'static str, found: String, expected: &str| {
             let origin = "the command line".to_owned();
             Err(PipelineError::Value { origin, key, found, expected: expected.to_owned() })
@@ -95,14 +93,13 @@ impl StarRequest {
         if let Some(m) = self.modulation.filter(|m| !(*m > 0.0 && *m <= 1.0)) {
             return wrong("--modulation", m.to_string(), "a number above 0, 1 at most");
         }
-        let picture = MeasuredPicture::open(path, self.curve)?;
         picture.require_whole()?;
         let (rows, columns) = picture.size();
         let whole = PixelRegion { column: 0, row: 0, columns, rows };
         let region = self.region.unwrap_or(whole).check_within((rows, columns))?;
-        let in_file = |reason: String| PipelineError::Read { path: path.to_owned(), reason };
+        let unfit = |reason: String| picture.unfit(reason);
         let luminance = region.of(&picture.luminance()).to_owned();
-        let star = Star::find(&luminance, self.n_cycles).map_err(in_file)?;
+        let star = Star::find(&luminance, self.n_cycles).map_err(unfit)?;
         let mut planes: Vec<(String, Array2<f32>)> =
             picture.planes.iter().map(|(name, plane)| (name.clone(), region.of(plane).to_owned())).collect();
         if planes.len() > 1 && picture.rgb().is_ok() {
@@ -110,7 +107,7 @@ impl StarRequest {
         }
         let unit = self.modulation.map(|m| if self.is_binary { OF_SQUARE * m } else { m });
         Ok(StarMeasurement {
-            picture: picture.name,
+            picture: picture.name.clone(),
             center_px: [star.column + region.column as f64, star.row + region.row as f64],
             radius_px: star.radius,
             n_cycles: star.n_cycles,

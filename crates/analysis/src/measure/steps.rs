@@ -5,7 +5,7 @@ use std::{fs, path::Path};
 use dioptric_pipeline::PipelineError;
 use serde::Serialize;
 
-use super::{CodeCurve, MeasuredPicture, Measurement, PixelRegion};
+use super::{MeasuredPicture, Measurement, PixelRegion};
 use crate::{Corner, LineChart, Scale, Series, palette};
 
 /// The share of a patch's samples at the highest code from which on it is blown.
@@ -18,8 +18,6 @@ const FEWEST: usize = 3;
 pub struct StepsRequest {
     /// The steps: their places and luminances.
     pub steps: Vec<Step>,
-    /// How samples stand for light.
-    pub curve: CodeCurve,
 }
 
 /// A gray step of a target.
@@ -119,20 +117,19 @@ impl StepsRequest {
         Ok(steps)
     }
 
-    /// Measures the steps of a picture file.
+    /// Measures the steps of a picture.
     ///
     /// # Errors
-    /// When the file cannot be read, a step is not within it, or two steps have one luminance.
-    pub fn measure(&self, path: &Path) -> Result<StepsMeasurement, PipelineError> {
-        let picture = MeasuredPicture::open(path, self.curve)?;
-        let in_file = |reason: String| PipelineError::Read { path: path.to_owned(), reason };
+    /// When a step is not within it, or two steps have one luminance.
+    pub fn measure(&self, picture: &MeasuredPicture) -> Result<StepsMeasurement, PipelineError> {
+        let unfit = |reason: String| picture.unfit(reason);
         let mut steps = self.steps.clone();
         steps.sort_by(|a, b| a.luminance.total_cmp(&b.luminance));
         if steps.len() < FEWEST {
-            return Err(in_file(format!("{} steps were given, expected {FEWEST} or more", steps.len())));
+            return Err(unfit(format!("{} steps were given, expected {FEWEST} or more", steps.len())));
         }
         if let Some(pair) = steps.windows(2).find(|pair| pair[0].luminance == pair[1].luminance) {
-            return Err(in_file(format!("two steps have the luminance {}, expected one each", pair[0].luminance)));
+            return Err(unfit(format!("two steps have the luminance {}, expected one each", pair[0].luminance)));
         }
         for step in &steps {
             step.region.check_within(picture.size())?;
@@ -144,12 +141,12 @@ impl StepsRequest {
                 let own = |((r, c), v): ((usize, usize), &f32)| is_own((row + r, column + c)).then(|| f64::from(*v));
                 step.region.of(plane).indexed_iter().filter_map(own).collect()
             };
-            channels.push(StepsChannel::of(&name, &steps, &samples).map_err(in_file)?);
+            channels.push(StepsChannel::of(&name, &steps, &samples).map_err(unfit)?);
         }
         if picture.planes.len() > 1 && picture.rgb().is_ok() {
             let luminance = picture.luminance();
             let samples = |step: &Step| step.region.of(&luminance).iter().map(|v| f64::from(*v)).collect::<Vec<f64>>();
-            channels.push(StepsChannel::of("luminance", &steps, &samples).map_err(in_file)?);
+            channels.push(StepsChannel::of("luminance", &steps, &samples).map_err(unfit)?);
         }
         let open: Vec<&str> =
             channels.iter().filter(|channel| !channel.is_saturated).map(|channel| channel.channel.as_str()).collect();

@@ -1,39 +1,33 @@
 //! The spatial frequency response of a texture in a picture.
 
-use std::path::{Path, PathBuf};
-
 use dioptric_sensor::{TextureNoise, TextureResponse, TextureSpectra, Viewing};
 use ndarray::Array2;
 use serde::Serialize;
 
-use super::{CodeCurve, MeasuredPicture, Measurement, PixelRegion, edge::viewing_of};
+use super::{MeasuredPicture, Measurement, PixelRegion, edge::viewing_of};
 use crate::{Corner, LineChart, Scale, Series, palette};
 use dioptric_pipeline::PipelineError;
 
 /// How a texture is measured.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct TextureRequest {
-    /// The same framing as an ideal camera pictures it.
-    pub reference: PathBuf,
     /// Where the texture is in both pictures; everywhere where it is not given.
     pub region: Option<PixelRegion>,
     /// What shows the noise of the picture.
     pub noise: TextureNoiseRequest,
     /// Pixels a degree of the viewer's field, for acutance; 60 where it is not given.
     pub pixels_per_degree: Option<f64>,
-    /// How samples stand for light.
-    pub curve: CodeCurve,
 }
 
 /// What shows the noise of a picture of a texture.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub enum TextureNoiseRequest {
     /// Nothing: the picture is taken to have none.
     None,
     /// An even patch of the picture.
     Flat(PixelRegion),
     /// Another frame of the same camera.
-    SecondFrame(PathBuf),
+    SecondFrame(MeasuredPicture),
 }
 
 /// The responses of a texture, two a channel.
@@ -92,32 +86,37 @@ pub struct TextureCurve {
 }
 
 impl TextureRequest {
-    /// Measures the texture of a picture file.
+    /// Measures the texture of a picture against the same framing as an ideal camera pictures it.
     ///
     /// In a picture of R, G and B the luminance is measured too. A channel is compared with that of the same name in the
     /// reference, or with the luminance of the reference where there is none.
     ///
     /// # Errors
-    /// When a file cannot be read, sizes differ, a region does not lie within the picture, or there is no texture.
-    pub fn measure(&self, path: &Path) -> Result<TextureMeasurement, PipelineError> {
-        let picture = MeasuredPicture::open(path, self.curve)?;
+    /// When sizes differ, a region does not lie within the picture, or there is no texture.
+    pub fn measure(
+        &self,
+        picture: &MeasuredPicture,
+        reference: &MeasuredPicture,
+    ) -> Result<TextureMeasurement, PipelineError> {
         picture.require_whole()?;
         let viewing = viewing_of(self.pixels_per_degree, picture.size())?;
-        let beside = |path: &PathBuf| -> Result<MeasuredPicture, PipelineError> {
-            let other = MeasuredPicture::open(path, self.curve)?;
+        let check_size = |other: &MeasuredPicture| {
             let ((rows, columns), (wanted_rows, wanted_columns)) = (other.size(), picture.size());
             if other.size() == picture.size() {
-                return Ok(other);
+                return Ok(());
             }
             let reason = format!(
                 "it has {columns} × {rows} pixels, expected {wanted_columns} × {wanted_rows} as {}",
                 picture.name
             );
-            Err(PipelineError::Read { path: path.clone(), reason })
+            Err(other.unfit(reason))
         };
-        let reference = beside(&self.reference)?;
+        check_size(reference)?;
         let second = match &self.noise {
-            TextureNoiseRequest::SecondFrame(path) => Some(beside(path)?),
+            TextureNoiseRequest::SecondFrame(second) => {
+                check_size(second)?;
+                Some(second)
+            }
             TextureNoiseRequest::None | TextureNoiseRequest::Flat(_) => None,
         };
         let (rows, columns) = picture.size();
@@ -127,9 +126,9 @@ impl TextureRequest {
             TextureNoiseRequest::Flat(patch) => Some(patch.check_within(picture.size())?),
             TextureNoiseRequest::None | TextureNoiseRequest::SecondFrame(_) => None,
         };
-        let channels = channels(&picture);
+        let channels = channels(picture);
         let measured = channels.iter().map(|(name, plane)| {
-            let ideal = channel_of(&reference, name);
+            let ideal = channel_of(reference, name);
             let other = second.as_ref().map(|second| channel_of(second, name));
             let noise = match (flat, &other) {
                 (Some(patch), _) => Some(TextureNoise::Flat(patch.of(plane))),
@@ -137,16 +136,13 @@ impl TextureRequest {
                 (None, None) => None,
             };
             let spectra = TextureSpectra::measure(&region.of(plane), &region.of(&ideal), noise);
-            let in_file = |error: dioptric_sensor::SensorError| PipelineError::Read {
-                path: path.to_owned(),
-                reason: format!("channel {name}: {error}"),
-            };
-            TextureChannel::of(name, spectra.map_err(in_file)?, &viewing)
+            let unfit = |error: dioptric_sensor::SensorError| picture.unfit(format!("channel {name}: {error}"));
+            TextureChannel::of(name, spectra.map_err(unfit)?, &viewing)
         });
         Ok(TextureMeasurement {
             channels: measured.collect::<Result<_, _>>()?,
-            picture: picture.name,
-            reference: reference.name,
+            picture: picture.name.clone(),
+            reference: reference.name.clone(),
             region,
             pixels_per_degree: viewing.pixels_per_degree,
         })

@@ -8,6 +8,7 @@ use dioptric_diffraction::{
 use dioptric_optics::{Lens, MonoLens, ObjectPoint, glam::DVec2};
 use dioptric_psf::{ImageSettings, ModelUse, Picture, PointImage};
 use dioptric_scene::{ExrSamples, write_planes_exr};
+use dioptric_spectrum::Cancel;
 use ndarray::Array2;
 use rayon::prelude::*;
 
@@ -45,6 +46,14 @@ impl PsfRequest {
     /// # Errors
     /// When a number makes no sense, a glass is not known at a wavelength, or the lens cannot be focused.
     pub fn compute(&self, lens: &Lens) -> Result<PsfSet, PipelineError> {
+        self.compute_until(lens, &Cancel::new())
+    }
+
+    /// Computes them until that is cancelled.
+    ///
+    /// # Errors
+    /// As [`compute`](Self::compute), and when it is cancelled.
+    pub fn compute_until(&self, lens: &Lens, cancel: &Cancel) -> Result<PsfSet, PipelineError> {
         self.check()?;
         let (lens, view) = self.lens_with_image(lens)?;
         let lens = &*lens;
@@ -54,8 +63,12 @@ impl PsfRequest {
         }
         let items = self.items(lens)?;
         let settings = self.image_settings(lens, film_distance_mm)?;
-        let computed: Result<Vec<(PsfRow, Array2<f32>)>, PipelineError> =
-            items.par_iter().map(|item| self.compute_one(item, lens, &settings)).collect();
+        let computed: Result<Vec<(PsfRow, Array2<f32>)>, PipelineError> = items
+            .par_iter()
+            .map(|item| {
+                cancel.check().map_err(PipelineError::from).and_then(|()| self.compute_one(item, lens, &settings))
+            })
+            .collect();
         let (mut rows, pictures): (Vec<PsfRow>, _) = computed?.into_iter().unzip();
         if !rows.iter().any(|row| row.energy > 0.0) {
             let found = format!("{:?}", self.fields_deg);

@@ -3,7 +3,7 @@
 mod configuration_row;
 
 use ron::extensions::Extensions;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error};
 
 use crate::{
     Aperture, Coating, CoordinateBreak, DiffractiveSurface, Glass, ImageSurface, Interface, Iris, Lens, OpticsError,
@@ -137,6 +137,11 @@ pub(super) fn file_from_ron(text: &str) -> Result<LensFile, TextError> {
     let prescription: Prescription = ron_options()
         .from_str(text)
         .map_err(|error| TextError { line: Some(error.span.start.line), reason: error.code.to_string() })?;
+    file_of_all(prescription)
+}
+
+/// Returns the lens of a prescription and its use, with all its configurations.
+fn file_of_all(prescription: Prescription) -> Result<LensFile, TextError> {
     if prescription.configurations.is_empty() {
         if prescription.configuration != 1 {
             let error = OpticsError::Configuration { number: prescription.configuration, n_configurations: 1 };
@@ -290,6 +295,14 @@ impl LensFile {
     /// Returns the lens, and what is known of its use, as the text of our own file, which reads back as the same but for an
     /// array of microlenses.
     pub fn to_ron(&self) -> String {
+        let pretty = ron::ser::PrettyConfig::new().depth_limit(2);
+        ron_options()
+            .to_string_pretty(&self.whole_prescription(), pretty)
+            .expect("numbers and text always have a RON form")
+    }
+
+    /// Returns the lens with all its configurations as it stands in our own file.
+    fn whole_prescription(&self) -> Prescription {
         let states: Vec<Prescription> = self.states().iter().map(Self::own_prescription).collect();
         let mut body = self.own_prescription();
         if let [first, ..] = states.as_slice()
@@ -307,8 +320,7 @@ impl LensFile {
             body.configurations = rows.map(|(state, name)| ConfigurationRow::between(&body, state, name)).collect();
             body.configuration = self.configuration;
         }
-        let pretty = ron::ser::PrettyConfig::new().depth_limit(2);
-        ron_options().to_string_pretty(&body, pretty).expect("numbers and text always have a RON form")
+        body
     }
 
     /// Returns the lens in use as it stands in our own file.
@@ -328,6 +340,20 @@ impl LensFile {
             row.comment.clone_from(comment);
         }
         prescription
+    }
+}
+
+/// The entries of our own file; an array of microlenses and what a reader noted are left out.
+impl Serialize for LensFile {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        self.whole_prescription().serialize(serializer)
+    }
+}
+
+/// Checked as a file is.
+impl<'de> Deserialize<'de> for LensFile {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        file_of_all(Prescription::deserialize(deserializer)?).map_err(|error| D::Error::custom(error.reason))
     }
 }
 

@@ -1,6 +1,9 @@
 //! A three-dimensional world before the camera, as a camera file says it.
 
-use std::path::PathBuf;
+use std::{
+    path::{Path, PathBuf},
+    str::FromStr,
+};
 
 use dioptric_backward::{BandSampling, LightPaths};
 use dioptric_scene::LitStillLife;
@@ -8,7 +11,7 @@ use dioptric_spectrum::WavelengthGrid;
 use serde::{Deserialize, Serialize};
 
 use super::check::Checker;
-use crate::PipelineError;
+use crate::{PipelineError, parse_numbers};
 
 /// A three-dimensional world before the camera, and how it is rendered.
 ///
@@ -109,6 +112,40 @@ pub enum WorldSky {
     /// A picture of all directions, its columns by azimuth and its rows by height (EXR, HDR, PNG, JPEG, TIFF); linear sRGB of 1 is as bright
     /// as an even sky of 1.
     Picture(PathBuf),
+}
+
+impl FromStr for WorldSky {
+    type Err = PipelineError;
+
+    /// Reads `even:RADIANCE`, `day:ELEVATION,AZIMUTH,TURBIDITY`, of which the end may be left out, or the path of a picture.
+    fn from_str(text: &str) -> Result<Self, PipelineError> {
+        let wrong = || PipelineError::Value {
+            origin: "the command line".to_owned(),
+            key: "--sky",
+            found: format!("'{text}'"),
+            expected: "even:RADIANCE, day:ELEVATION,AZIMUTH,TURBIDITY or a picture".to_owned(),
+        };
+        let (word, rest) = text.split_once(':').unwrap_or((text, ""));
+        let numbers = || if rest.is_empty() { Ok(Vec::new()) } else { parse_numbers("a sky", rest) };
+        match word {
+            "even" => match numbers()?.as_slice() {
+                [] => Ok(Self::Even(1.0)),
+                &[radiance] => Ok(Self::Even(radiance)),
+                _ => Err(wrong()),
+            },
+            "day" => {
+                let n = numbers()?;
+                if n.len() > 3 {
+                    return Err(wrong());
+                }
+                let at = |place: usize, usual: f64| n.get(place).copied().unwrap_or(usual);
+                let (azimuth_deg, turbidity) = (at(1, usual_azimuth()), at(2, usual_turbidity()));
+                Ok(Self::Day { elevation_deg: at(0, 45.0), azimuth_deg, turbidity })
+            }
+            _ if Path::new(text).extension().is_some() => Ok(Self::Picture(PathBuf::from(text))),
+            _ => Err(wrong()),
+        }
+    }
 }
 
 /// A lamp that shines alike in all directions, of the color of daylight D65.

@@ -74,7 +74,7 @@ pub use narrow_surfaces::NarrowSurfaces;
 pub use painting::PaintReach;
 pub use rendering::{RenderingSummary, write_seen_png};
 pub use results::StageCounts;
-pub use resume::{RESUME_FILE, Resumed};
+pub use resume::{Imaged, RESUME_FILE, Resumed};
 pub use scene::{ResolvedScene, SceneSummary};
 pub use unseen_points::UnseenPoints;
 pub use video::{Video, VideoFrame, VideoFrameFacts};

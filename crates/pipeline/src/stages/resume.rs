@@ -3,7 +3,7 @@
 use std::{fs, io, path::Path};
 
 use dioptric_scene::{ExrSamples, read_planes_exr};
-use dioptric_spectrum::DepthMap;
+use dioptric_spectrum::{DepthMap, SpectralImage};
 use serde::{Deserialize, Serialize};
 
 use super::{
@@ -33,6 +33,54 @@ struct Kept {
     narrow_surfaces: Option<NarrowSurfaces>,
     #[serde(default)]
     unseen_points: Option<UnseenPoints>,
+}
+
+/// What the stages behind the imaging of a scene need of it beside the irradiance, so that another process takes the picture again
+/// without imaging the scene.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Imaged {
+    scene: SceneSummary,
+    place: FilmPlace,
+    narrow_surfaces: Option<NarrowSurfaces>,
+    unseen_points: Option<UnseenPoints>,
+}
+
+impl Imaged {
+    /// Returns what a capture has of it.
+    pub fn of(capture: &Capture) -> Self {
+        Self {
+            scene: (*capture.scene).clone(),
+            place: (*capture.place).clone(),
+            narrow_surfaces: capture.irradiance.summary.narrow_surfaces,
+            unseen_points: capture.irradiance.summary.unseen_points,
+        }
+    }
+
+    /// Returns the irradiance of spectral images on the film: one, or one a photodiode that is read by itself.
+    ///
+    /// # Errors
+    /// When one has another size than the film or other bands than the scene, or their number is not that of the photodiodes.
+    fn irradiance(&self, pictures: Vec<SpectralImage>, n_photodiodes: usize) -> Result<Irradiance, PipelineError> {
+        let wrong = |reason: String| PipelineError::Unsuitable { what: "the irradiance", reason };
+        if pictures.len() != n_photodiodes {
+            return Err(wrong(format!("has {} pictures, expected {n_photodiodes}", pictures.len())));
+        }
+        let of_picture = |picture: SpectralImage| {
+            let (found, expected) = ((picture.rows(), picture.columns()), (self.place.rows, self.place.columns));
+            let is_of_scene = picture.grid().centers_nm() == self.scene.wavelengths_nm;
+            if found != expected || !is_of_scene {
+                return Err(wrong("is not that of the film and the bands that it was taken on".to_owned()));
+            }
+            Ok(Irradiance::of_image(picture, self.place.pitch_um))
+        };
+        let mut parts = pictures.into_iter().map(of_picture).collect::<Result<Vec<_>, _>>()?;
+        let irradiance = match parts.len() {
+            1 => parts.swap_remove(0),
+            _ => Irradiance::of_photodiodes(parts, u64::MAX)?,
+        };
+        Ok(irradiance.with_narrow_surfaces(self.narrow_surfaces).with_unseen_points(self.unseen_points))
+    }
 }
 
 /// A camera that continues a run.
@@ -68,6 +116,20 @@ impl KeptCamera {
         let text = ron::ser::to_string_pretty(&kept, ron::ser::PrettyConfig::new())
             .map_err(|e| PipelineError::Write { path: folder.join(RESUME_FILE), reason: e.to_string() })?;
         write_file(&folder.join(RESUME_FILE), text.as_bytes())
+    }
+
+    /// Keeps what was imaged by this camera in another process, so that a capture starts behind it.
+    ///
+    /// # Errors
+    /// When the pictures are no irradiance of this camera.
+    pub fn keep_imaged(&self, imaged: Imaged, pictures: Vec<SpectralImage>) -> Result<(), PipelineError> {
+        let n_photodiodes = self.camera().dual_pixel.map_or(1, |spec| spec.photodiodes.names().len());
+        let irradiance = imaged.irradiance(pictures, n_photodiodes)?;
+        let (inputs, results) = (self.irradiance_inputs()?, self.results());
+        results.film.put(inputs.plan.bank.film.clone(), imaged.place);
+        results.summary.put(inputs.scene.clone(), imaged.scene);
+        results.irradiance.put(inputs, irradiance);
+        Ok(())
     }
 
     /// Returns the camera of a run with the irradiance that it left in its folder.

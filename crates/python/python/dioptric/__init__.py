@@ -9,30 +9,40 @@ Radiance is W m⁻² sr⁻¹ nm⁻¹, irradiance W m⁻² nm⁻¹; lens lengths 
 Row 0 of a picture is its top. Arrays that come back are read-only views of the results, without a copy.
 """
 
+from . import measure
 from ._native import (
     Camera,
     Developed,
     Lens,
+    LightField,
     Rays,
     Scene,
     Sensor,
     Shot,
+    Video,
+    VideoFrame,
     __version__,
     develop,
     set_threads,
     threads,
 )
+from ._psf import Psf
 
 __all__ = [
     "Camera",
     "Developed",
     "Lens",
+    "LightField",
+    "Psf",
     "Rays",
     "Scene",
     "Sensor",
     "Shot",
+    "Video",
+    "VideoFrame",
     "__version__",
     "develop",
+    "measure",
     "set_threads",
     "threads",
 ]

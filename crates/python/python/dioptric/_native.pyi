@@ -8,16 +8,21 @@ from typing import Any, ClassVar, Literal, TypeAlias, final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ._psf import Psf
+
 _Path: TypeAlias = str | os.PathLike[str]
 _Numbers: TypeAlias = float | Sequence[float] | NDArray[Any]
 _Diffraction: TypeAlias = Literal["none", "hurb", "hurb-scene3d", "hurb-calibrated", "wave"]
 _Planes: TypeAlias = tuple[NDArray[Any], ...]
+_Point: TypeAlias = tuple[float, float, float]
+_Medium: TypeAlias = str | float | tuple[float, float] | dict[str, Any] | None
 _Progress: TypeAlias = bool | Callable[[str, float], object] | None
 
 __all__ = [
     "Camera",
     "Developed",
     "Lens",
+    "LightField",
     "Rays",
     "Scene",
     "Sensor",
@@ -25,8 +30,17 @@ __all__ = [
     "Maker",
     "Plan",
     "Sweep",
+    "Video",
+    "VideoFrame",
     "Memory",
+    "_measure",
     "_panic",
+    "_restore_camera",
+    "_restore_lens",
+    "_restore_scene",
+    "_restore_scene_spec",
+    "_restore_sensor",
+    "_restore_shot",
     "develop",
     "read_index",
     "read_samples",
@@ -40,6 +54,23 @@ __version__: str
 def set_threads(n: int) -> None: ...
 def threads() -> int: ...
 def _panic() -> None: ...
+def _measure(kind: str, subject: Any, options: dict[str, Any]) -> Any: ...
+def _restore_lens(text: str, stop_mm: float, glass_range: Any, notes: list[str], choice: Any) -> Lens: ...
+def _restore_sensor(text: str, spec: Any) -> Sensor: ...
+def _restore_scene_spec(spec: Any) -> Scene: ...
+def _restore_scene(
+    name: str,
+    wavelengths_nm: Sequence[float],
+    planes: Sequence[NDArray[np.float32]],
+    depth_m: NDArray[np.float32],
+    view: tuple[float, float, float],
+    light: Any,
+    notes: list[str],
+) -> Scene: ...
+def _restore_camera(text: str, lens: Lens | None, scene: Scene | None, sensor: Sensor | None) -> Camera: ...
+def _restore_shot(
+    camera: Camera, quality: str, imaged: Any, wavelengths_nm: Sequence[float], cubes: Sequence[Sequence[NDArray[np.float32]]]
+) -> Shot: ...
 def read_index(path: _Path) -> tuple[NDArray[np.uint64], NDArray[np.uint64]]: ...
 def read_samples(path: _Path) -> tuple[NDArray[Any], list[Any]]: ...
 @final
@@ -79,7 +110,7 @@ class Camera:
         rise_mm: float | None = ...,
         shift_mm: float | None = ...,
         sensor: Sensor | _Path | None = ...,
-        film: Literal["sensor", "scene"] | None = ...,
+        film: Literal["sensor", "scene", "field"] | None = ...,
         crop: tuple[int, int, int, int] | None = ...,
         pixels: tuple[int, int] | None = ...,
         pixel_um: float | None = ...,
@@ -89,6 +120,8 @@ class Camera:
         gamma: float | None = ...,
         blur: str | None = ...,
         border: str | None = ...,
+        bank: Any = ...,
+        bank_error: Any = ...,
         scene: Scene | _Path | None = ...,
         fov_deg: float | None = ...,
         depth_m: float | None = ...,
@@ -96,6 +129,7 @@ class Camera:
         distance_mm: float | None = ...,
         fill_depth: Literal["beside", "far"] | float | None = ...,
         hidden: _Path | None = ...,
+        points: _Path | None = ...,
         white_level: float | None = ...,
         quantity: Literal["radiance", "reflectance", "photons"] | None = ...,
         unit: str | None = ...,
@@ -146,6 +180,21 @@ class Camera:
         memory_bytes: int | None = None,
         memory: str | int | None = None,
     ) -> Shot: ...
+    def video(
+        self,
+        *,
+        frames: int | None = None,
+        frames_per_s: float | None = None,
+        row_time_us: float | None = None,
+        pan_deg_per_s: float | None = None,
+        tilt_deg_per_s: float | None = None,
+        roll_deg_per_s: float | None = None,
+        shake_deg: float | None = None,
+        shake_hz: float | None = None,
+        progress: _Progress = None,
+    ) -> Video: ...
+    def light_field(self, *, views: int | None = None, progress: _Progress = None) -> LightField: ...
+    def compare_methods(self, *, samples: int | None = None, progress: _Progress = None) -> dict[str, Any]: ...
     @property
     def name(self) -> str: ...
     @property
@@ -160,7 +209,9 @@ class Camera:
     def write(self, path: _Path) -> None: ...
     def __eq__(self, other: object, /) -> bool: ...
     def __ne__(self, other: object, /) -> bool: ...
-    def __reduce__(self) -> tuple[Any, tuple[str]]: ...
+    def __copy__(self) -> Camera: ...
+    def __deepcopy__(self, memo: Any) -> Camera: ...
+    def __reduce__(self) -> tuple[Any, tuple[Any, ...]]: ...
 
 @final
 class Shot:
@@ -242,6 +293,9 @@ class Shot:
     def png(self) -> bytes: ...
     def save(self, path: _Path) -> list[str]: ...
     def to_xarray(self) -> Any: ...
+    def __copy__(self) -> Shot: ...
+    def __deepcopy__(self, memo: Any) -> Shot: ...
+    def __reduce__(self) -> tuple[Any, tuple[Any, ...]]: ...
     def _repr_png_(self) -> bytes: ...
     def _repr_html_(self) -> str: ...
 
@@ -263,8 +317,16 @@ class Developed:
     def _repr_png_(self) -> bytes: ...
 
 def develop(
-    path: _Path,
+    source: _Path | ArrayLike,
     *,
+    cfa: str | None = None,
+    black: float | None = None,
+    saturation: float | None = None,
+    color_matrix: ArrayLike | None = None,
+    sensor: Sensor | _Path | None = None,
+    exposure_s: float | None = None,
+    analog_gain: float | None = None,
+    illuminant: str | None = None,
     white: str | None = ...,
     demosaic: str | None = ...,
     denoise: float | None = ...,
@@ -338,11 +400,37 @@ class Lens:
         blur_um: float | None = None,
     ) -> Any: ...
     def surfaces(self) -> list[dict[str, Any]]: ...
+    def with_surface(
+        self,
+        surface: int,
+        *,
+        radius_mm: float | None = ...,
+        thickness_mm: float | None = ...,
+        semi_aperture_mm: float | None = ...,
+        medium: _Medium = ...,
+        stop: bool | None = ...,
+        conic: float | None = ...,
+        coefficients: Sequence[float] | None = ...,
+        shape: Any = ...,
+        mirror: bool | None = ...,
+        comment: str | None = ...,
+    ) -> Lens: ...
+    @staticmethod
+    def from_surfaces(
+        surfaces: Sequence[dict[str, Any]] | dict[str, Any],
+        *,
+        name: str = "lens",
+        stop: int | None = None,
+        film_mm: float | None = None,
+    ) -> Lens: ...
+    def to_dict(self) -> dict[str, Any]: ...
+    @staticmethod
+    def from_dict(data: dict[str, Any]) -> Lens: ...
     def trace(
         self,
         origins: ArrayLike,
         directions: ArrayLike,
-        wavelength_nm: float = ...,
+        wavelength_nm: float | ArrayLike = ...,
         *,
         film_mm: float | None = None,
         clip: bool = True,
@@ -351,7 +439,8 @@ class Lens:
         self,
         *,
         field_deg: _Numbers | None = ...,
-        field_y_deg: float | None = ...,
+        field_y_deg: _Numbers | None = ...,
+        film_xy_mm: ArrayLike | None = ...,
         distance_mm: _Numbers | None = ...,
         wavelengths_nm: _Numbers | None = ...,
         focus_mm: float | None = ...,
@@ -363,12 +452,13 @@ class Lens:
         rays: int | None = ...,
         exact_grid: bool | None = ...,
         seed: int | None = ...,
-    ) -> NDArray[np.float32]: ...
+    ) -> Psf: ...
     def psf_table(
         self,
         *,
         field_deg: _Numbers | None = ...,
-        field_y_deg: float | None = ...,
+        field_y_deg: _Numbers | None = ...,
+        film_xy_mm: ArrayLike | None = ...,
         distance_mm: _Numbers | None = ...,
         wavelengths_nm: _Numbers | None = ...,
         focus_mm: float | None = ...,
@@ -405,12 +495,16 @@ class Lens:
     def __eq__(self, other: object, /) -> bool: ...
     def __ne__(self, other: object, /) -> bool: ...
     def _repr_html_(self) -> str: ...
-    def __reduce__(self) -> tuple[Any, tuple[str]]: ...
+    def __copy__(self) -> Lens: ...
+    def __deepcopy__(self, memo: Any) -> Lens: ...
+    def __reduce__(self) -> tuple[Any, tuple[Any, ...]]: ...
 
 @final
 class Rays:
     FATES: ClassVar[list[str]]
     def __len__(self) -> int: ...
+    @property
+    def shape(self) -> tuple[int, ...]: ...
     @property
     def x_mm(self) -> NDArray[np.float64]: ...
     @property
@@ -453,6 +547,48 @@ class Scene:
         name: str = "scene",
     ) -> Scene: ...
     @staticmethod
+    def world(
+        path: _Path,
+        *,
+        eye: _Point | None = None,
+        look_at: _Point | None = None,
+        up: _Point | None = None,
+        camera: str | None = None,
+        unit_m: float = 1.0,
+        sky: str | None = None,
+        lamps: Sequence[tuple[float, float, float, float]] | None = None,
+        method: Literal["backward", "forward"] = "backward",
+        samples: int | None = None,
+        noise: float | None = None,
+        bounces: int | None = None,
+        size: tuple[int, int] | None = None,
+        seed: int | None = None,
+        fov_deg: float | None = ...,
+        depth_m: float | None = ...,
+        width_mm: float | None = ...,
+        distance_mm: float | None = ...,
+        fill_depth: Literal["beside", "far"] | float | None = ...,
+        hidden: _Path | None = ...,
+        points: _Path | None = ...,
+        white_level: float | None = ...,
+        quantity: Literal["radiance", "reflectance", "photons"] | None = ...,
+        unit: str | None = ...,
+        scale: float | None = ...,
+        scene_wavelengths_nm: _Numbers | None = ...,
+        variable: str | None = ...,
+        axes: str | None = ...,
+        no_data: Literal["black", "fill", "refuse"] | None = ...,
+        depth: _Path | None = ...,
+        depth_unit: str | None = ...,
+        depth_kind: str | None = ...,
+        view: _Path | None = ...,
+        panorama: str | None = ...,
+        illuminant: str | None = ...,
+        illuminance_lux: float | None = ...,
+        light: str | None = ...,
+        mean_luminance_cd_m2: float | None = ...,
+    ) -> Scene: ...
+    @staticmethod
     def read(
         path: _Path,
         *,
@@ -462,6 +598,7 @@ class Scene:
         distance_mm: float | None = ...,
         fill_depth: Literal["beside", "far"] | float | None = ...,
         hidden: _Path | None = ...,
+        points: _Path | None = ...,
         white_level: float | None = ...,
         quantity: Literal["radiance", "reflectance", "photons"] | None = ...,
         unit: str | None = ...,
@@ -486,8 +623,29 @@ class Scene:
         columns: int = 1080,
         rows: int = 720,
         *,
+        fov_deg: float | None = ...,
+        depth_m: float | None = ...,
+        width_mm: float | None = ...,
+        distance_mm: float | None = ...,
+        fill_depth: Literal["beside", "far"] | float | None = ...,
+        hidden: _Path | None = ...,
+        points: _Path | None = ...,
+        white_level: float | None = ...,
+        quantity: Literal["radiance", "reflectance", "photons"] | None = ...,
+        unit: str | None = ...,
+        scale: float | None = ...,
+        scene_wavelengths_nm: _Numbers | None = ...,
+        variable: str | None = ...,
+        axes: str | None = ...,
+        no_data: Literal["black", "fill", "refuse"] | None = ...,
+        depth: _Path | None = ...,
+        depth_unit: str | None = ...,
+        depth_kind: str | None = ...,
+        view: _Path | None = ...,
+        panorama: str | None = ...,
         illuminant: str | None = ...,
         illuminance_lux: float | None = ...,
+        light: str | None = ...,
         mean_luminance_cd_m2: float | None = ...,
     ) -> Scene: ...
     @staticmethod
@@ -510,8 +668,25 @@ class Scene:
         depth_m: float | None = ...,
         width_mm: float | None = ...,
         distance_mm: float | None = ...,
+        fill_depth: Literal["beside", "far"] | float | None = ...,
+        hidden: _Path | None = ...,
+        points: _Path | None = ...,
+        white_level: float | None = ...,
+        quantity: Literal["radiance", "reflectance", "photons"] | None = ...,
+        unit: str | None = ...,
+        scale: float | None = ...,
+        scene_wavelengths_nm: _Numbers | None = ...,
+        variable: str | None = ...,
+        axes: str | None = ...,
+        no_data: Literal["black", "fill", "refuse"] | None = ...,
+        depth: _Path | None = ...,
+        depth_unit: str | None = ...,
+        depth_kind: str | None = ...,
+        view: _Path | None = ...,
+        panorama: str | None = ...,
         illuminant: str | None = ...,
         illuminance_lux: float | None = ...,
+        light: str | None = ...,
         mean_luminance_cd_m2: float | None = ...,
     ) -> Scene: ...
     @property
@@ -527,6 +702,11 @@ class Scene:
     def band(self, band: int) -> NDArray[np.float32]: ...
     def to_array(self) -> NDArray[np.float32]: ...
     def write(self, path: _Path) -> None: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    def __ne__(self, other: object, /) -> bool: ...
+    def __copy__(self) -> Scene: ...
+    def __deepcopy__(self, memo: Any) -> Scene: ...
+    def __reduce__(self) -> tuple[Any, tuple[Any, ...]]: ...
 
 @final
 class Sensor:
@@ -554,7 +734,47 @@ class Sensor:
     def to_ron(self) -> str: ...
     def __eq__(self, other: object, /) -> bool: ...
     def __ne__(self, other: object, /) -> bool: ...
-    def __reduce__(self) -> tuple[Any, tuple[str]]: ...
+    def __copy__(self) -> Sensor: ...
+    def __deepcopy__(self, memo: Any) -> Sensor: ...
+    def __reduce__(self) -> tuple[Any, tuple[Any, ...]]: ...
+
+@final
+class LightField:
+    @property
+    def shape(self) -> tuple[int, int, int, int, int]: ...
+    @property
+    def views(self) -> NDArray[np.float32]: ...
+    @property
+    def whole(self) -> NDArray[np.bool_]: ...
+    def disparity_px(self, depth_m: float) -> float: ...
+    def refocus(self, depth_m: float) -> NDArray[np.float32]: ...
+    def depth(self, near_m: float, far_m: float, *, radius_px: int | None = None) -> dict[str, NDArray[np.float32]]: ...
+
+@final
+class Video:
+    @property
+    def shape(self) -> tuple[int, int]: ...
+    @property
+    def frames_per_s(self) -> float: ...
+    @property
+    def exposure_s(self) -> float: ...
+    @property
+    def row_time_us(self) -> float: ...
+    @property
+    def notes(self) -> list[str]: ...
+    def __len__(self) -> int: ...
+    def __getitem__(self, frame: int, /) -> VideoFrame: ...
+
+@final
+class VideoFrame:
+    @property
+    def facts(self) -> dict[str, Any]: ...
+    @property
+    def raw(self) -> NDArray[np.uint16] | _Planes: ...
+    @property
+    def picture(self) -> NDArray[np.float32]: ...
+    @property
+    def rgb(self) -> NDArray[np.uint8]: ...
 
 @final
 class Plan:

@@ -76,7 +76,7 @@ impl LensQuestion {
 /// When the sensor cannot be read.
 pub fn sensor_answer(sensor: &SensorSpec) -> Result<NoiseData, PipelineError> {
     let request = BenchRequest {
-        sensor: sensor.clone(),
+        sensor: sensor.open()?,
         filter: None,
         side: Some(SIDE),
         n_levels: Some(LEVELS),

@@ -1,27 +1,59 @@
 //! The camera kept in a file at every change, so that nothing is lost.
 
-use std::{fs, path::PathBuf};
-
-use dioptric_pipeline::Camera;
-use etcetera::{BaseStrategy, choose_base_strategy};
+use std::{
+    fs,
+    hash::{DefaultHasher, Hash, Hasher},
+    path::{Path, PathBuf},
+    time::{SystemTime, UNIX_EPOCH},
+};
 
 use dioptric_files::write;
+use dioptric_pipeline::Camera;
+use etcetera::{BaseStrategy, choose_base_strategy};
+use serde::{Deserialize, Serialize};
 
-use super::copy::as_ron;
+use super::{Document, absolute};
 
 /// The most files that are remembered.
 const MOST_RECENT: usize = 8;
+/// The most documents that are kept as they were left.
+const MOST_LEFT: usize = 50;
 
-/// A folder of the user's that holds the camera as it was left, and which files were open lately.
+/// What a window leaves: its camera with the file that it belongs to, the snapshots, and what was looked at.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Left {
+    /// The camera.
+    pub document: Document,
+    /// A and B.
+    pub snapshots: [Option<Document>; 2],
+    /// Words of the window.
+    pub view: String,
+}
+
+impl Left {
+    /// Whether its file does not hold its camera.
+    pub fn is_unsaved(&self) -> bool {
+        let of_file = self.document.path.as_deref().and_then(|path| Camera::read(path).ok());
+        of_file.as_ref().map(absolute) != Some(absolute(&self.document.camera))
+    }
+}
+
+/// A folder of the user's that holds each document as it was left, and which files were open lately.
+///
+/// A document that is in no file has a place of its own for each window.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Autosave {
     folder: PathBuf,
+    /// What tells the documents of this window that are in no file.
+    window: String,
 }
 
 impl Autosave {
     /// Keeps everything in this folder, which need not exist yet.
     pub fn new(folder: impl Into<PathBuf>) -> Self {
-        Self { folder: folder.into() }
+        let now = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_millis());
+        Self { folder: folder.into(), window: format!("untitled-{now}-{}", std::process::id()) }
     }
 
     /// Returns the usual one of the user, where the system has one.
@@ -31,18 +63,65 @@ impl Autosave {
         Some(Self::new(state.join("dioptric").join("studio")))
     }
 
-    fn camera_file(&self) -> PathBuf {
-        self.folder.join("camera.ron")
+    /// The name of the file that keeps a document.
+    fn name(&self, path: Option<&Path>) -> String {
+        let Some(path) = path else { return format!("{}.ron", self.window) };
+        let mut hasher = DefaultHasher::new();
+        std::path::absolute(path).unwrap_or_else(|_| path.to_owned()).hash(&mut hasher);
+        format!("{:016x}.ron", hasher.finish())
     }
 
-    /// Keeps a camera. That it cannot be written is no reason to stop anybody's work: whether it was.
-    pub fn keep(&self, camera: &Camera) -> bool {
-        fs::create_dir_all(&self.folder).is_ok() && write(&self.camera_file(), as_ron(camera).as_bytes()).is_ok()
+    fn documents(&self) -> PathBuf {
+        self.folder.join("left")
     }
 
-    /// Returns the camera that was kept last, if it can be read.
-    pub fn camera(&self) -> Option<Camera> {
-        Camera::read(&self.camera_file()).ok()
+    /// Keeps what a window leaves. That it cannot be written is no reason to stop anybody's work: whether it was.
+    pub fn keep(&self, left: &Left) -> bool {
+        let name = self.name(left.document.path.as_deref());
+        let text = ron::ser::to_string_pretty(left, ron::ser::PrettyConfig::new());
+        let is_kept = fs::create_dir_all(self.documents()).is_ok()
+            && text.is_ok_and(|text| write(&self.documents().join(&name), text.as_bytes()).is_ok())
+            && write(&self.folder.join("last"), name.as_bytes()).is_ok();
+        self.prune();
+        is_kept
+    }
+
+    /// Removes what was left longest ago, beyond so many documents.
+    fn prune(&self) {
+        let mut files = self.files();
+        for (path, _) in files.drain(MOST_LEFT.min(files.len())..) {
+            // What cannot be removed stays.
+            _ = fs::remove_file(path);
+        }
+    }
+
+    /// The files of documents, the one that was kept last first.
+    fn files(&self) -> Vec<(PathBuf, SystemTime)> {
+        let entries = fs::read_dir(self.documents()).into_iter().flatten().flatten();
+        let dated = entries.filter_map(|entry| Some((entry.path(), entry.metadata().ok()?.modified().ok()?)));
+        let mut files: Vec<_> = dated.filter(|(path, _)| path.extension().is_some_and(|e| e == "ron")).collect();
+        files.sort_by_key(|(_, modified)| std::cmp::Reverse(*modified));
+        files
+    }
+
+    /// Returns what was kept last, if it can be read.
+    pub fn left(&self) -> Option<Left> {
+        let name = fs::read_to_string(self.folder.join("last")).ok()?;
+        read(&self.documents().join(name))
+    }
+
+    /// Returns what was left of a camera file, if it can be read.
+    pub fn left_of(&self, path: &Path) -> Option<Left> {
+        let left = read(&self.documents().join(self.name(Some(path))))?;
+        let path = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+        (left.document.path.as_deref() == Some(&path)).then_some(left)
+    }
+
+    /// Returns what was left of other documents and is in no file, the latest first.
+    pub fn unsaved(&self, besides: Option<&Path>) -> Vec<Left> {
+        let own = self.documents().join(self.name(besides));
+        let files = self.files().into_iter().filter(|(path, _)| *path != own);
+        files.filter_map(|(path, _)| read(&path)).filter(Left::is_unsaved).take(MOST_RECENT).collect()
     }
 
     /// Returns the files that were open lately, the last first.
@@ -52,7 +131,7 @@ impl Autosave {
     }
 
     /// Remembers a file that was opened or saved.
-    pub fn remember(&self, path: &std::path::Path) {
+    pub fn remember(&self, path: &Path) {
         let path = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
         let mut recent = self.recent();
         recent.retain(|other| *other != path);
@@ -66,22 +145,52 @@ impl Autosave {
     }
 }
 
+/// What cannot be read is as if it were not there.
+fn read(path: &Path) -> Option<Left> {
+    ron::from_str(&fs::read_to_string(path).ok()?).ok()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn left(seed: u64, path: Option<&Path>) -> Left {
+        let camera = Camera { seed, ..Camera::demo().unwrap() };
+        let document = Document { camera, path: path.map(Path::to_owned) };
+        Left { snapshots: [Some(document.clone()), None], document, view: "Picture Depth".to_owned() }
+    }
+
     #[test]
-    fn a_kept_camera_comes_back() {
+    fn what_was_left_comes_back() {
         let folder = tempfile::tempdir().unwrap();
         let autosave = Autosave::new(folder.path().join("deeper"));
-        assert_eq!(autosave.camera(), None);
-        let mut camera = Camera::demo().unwrap();
-        camera.seed = 77;
-        assert!(autosave.keep(&camera));
-        assert_eq!(autosave.camera(), Some(camera));
+        assert_eq!(autosave.left(), None);
+        assert!(autosave.keep(&left(77, None)));
+        assert_eq!(autosave.left(), Some(left(77, None)));
         // What cannot be read is as if it were not there.
-        fs::write(folder.path().join("deeper/camera.ron"), "(").unwrap();
-        assert_eq!(autosave.camera(), None);
+        let name = fs::read_to_string(folder.path().join("deeper/last")).unwrap();
+        fs::write(folder.path().join("deeper/left").join(name), "(").unwrap();
+        assert_eq!(autosave.left(), None);
+    }
+
+    #[test]
+    fn each_document_has_its_own_place() {
+        let folder = tempfile::tempdir().unwrap();
+        let autosave = Autosave::new(folder.path());
+        let [a, b] = ["a.ron", "b.ron"].map(|name| folder.path().join(name));
+        for (seed, path) in [(1, Some(a.as_path())), (2, Some(&b)), (3, None)] {
+            assert!(autosave.keep(&left(seed, path)));
+        }
+        assert_eq!(autosave.left_of(&a), Some(left(1, Some(&a))));
+        assert_eq!(autosave.left_of(&b), Some(left(2, Some(&b))));
+        assert_eq!(autosave.left(), Some(left(3, None)));
+        // Another window's camera takes the place of none.
+        let other = Autosave { window: "untitled-of-another".to_owned(), ..autosave.clone() };
+        assert!(other.keep(&left(4, None)));
+        // What is in its file need not be recovered.
+        fs::write(&a, left(1, None).document.camera.to_ron()).unwrap();
+        let seeds: Vec<u64> = other.unsaved(None).iter().map(|left| left.document.camera.seed).collect();
+        assert!(seeds.contains(&2) && seeds.contains(&3) && seeds.len() == 2, "{seeds:?}");
     }
 
     #[test]
@@ -89,7 +198,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let autosave = Autosave::new(folder.path());
         for name in ["/a.ron", "/b.ron", "/a.ron"] {
-            autosave.remember(std::path::Path::new(name));
+            autosave.remember(Path::new(name));
         }
         assert_eq!(autosave.recent(), [PathBuf::from("/a.ron"), PathBuf::from("/b.ron")]);
         (0..20).for_each(|i| autosave.remember(&PathBuf::from(format!("/{i}.ron"))));

@@ -6,15 +6,11 @@ use dioptric_pipeline::{
 };
 use dioptric_sensor::{ExposureControl, NoiseSource, NoiseSources};
 
-use super::Session;
+use super::{Session, absolute};
 
 /// Returns the text of the camera file, its paths absolute.
 pub fn as_ron(camera: &Camera) -> String {
-    let mut absolute = camera.clone();
-    if let Ok(folder) = std::env::current_dir() {
-        absolute.resolve_paths(&folder);
-    }
-    let mut text = absolute.to_ron();
+    let mut text = absolute(camera).to_ron();
     text.push('\n');
     text
 }
@@ -30,7 +26,11 @@ pub fn as_command(session: &Session) -> String {
             let options = words.into_iter().map(|Word { key, value }| format!("--{key} {}", quoted(&value)));
             parts.chain(options).collect::<Vec<_>>().join(" ")
         }
-        None => format!("cat > camera.ron <<'END'\n{}END\ndioptric run camera.ron", as_ron(session.camera())),
+        // The file lies in a folder of its own, so that none that is there is written over.
+        None => {
+            let ron = as_ron(session.camera());
+            format!("file=$(mktemp -d)/camera.ron\ncat > \"$file\" <<'END'\n{ron}END\ndioptric run \"$file\"")
+        }
     }
 }
 
@@ -77,12 +77,12 @@ struct Telling {
 
 impl Base {
     fn of(session: &Session) -> Self {
-        match session.path() {
-            Some(path) => {
+        match (session.path(), session.kept()) {
+            (Some(path), Some(kept)) => {
                 let path = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
-                Self { camera: session.kept.clone(), path: Some(path.display().to_string()) }
+                Self { camera: kept.clone(), path: Some(path.display().to_string()) }
             }
-            None => Self { camera: Camera::demo().unwrap_or_else(|_| session.camera().clone()), path: None },
+            _ => Self { camera: Camera::demo().unwrap_or_else(|_| session.camera().clone()), path: None },
         }
     }
 
@@ -347,7 +347,9 @@ mod tests {
         let session =
             changed(|camera| camera.processing.white = dioptric_sensor::WhiteBalance::Gains(vec![2.0, 1.0, 1.5]));
         let text = as_command(&session);
-        let ron = text.strip_prefix("cat > camera.ron <<'END'\n").unwrap().split("END\n").next().unwrap();
+        let start = "file=$(mktemp -d)/camera.ron\ncat > \"$file\" <<'END'\n";
+        let ron = text.strip_prefix(start).unwrap().split("END\n").next().unwrap();
+        assert!(text.ends_with("END\ndioptric run \"$file\""));
         assert_eq!(Camera::parse(ron, Path::new("/camera.ron")).unwrap(), *session.camera());
         let python = as_python(&session);
         let ron = python.split("'''").nth(1).unwrap();

@@ -1,21 +1,25 @@
 //! What can be taken back.
 
-use dioptric_pipeline::Camera;
-
 /// The most steps that are kept: a camera takes some kilobytes.
 const MOST: usize = 1000;
 
-/// Cameras before and after the present one.
-#[derive(Clone, Debug, Default)]
-pub struct History {
+/// States before and after the present one.
+#[derive(Clone, Debug)]
+pub struct History<T> {
     /// Oldest first.
-    past: Vec<Camera>,
+    past: Vec<T>,
     /// What was taken back last, last.
-    future: Vec<Camera>,
+    future: Vec<T>,
     gesture: Option<u64>,
 }
 
-impl History {
+impl<T> Default for History<T> {
+    fn default() -> Self {
+        Self { past: Vec::new(), future: Vec::new(), gesture: None }
+    }
+}
+
+impl<T> History<T> {
     /// The number of changes that can be taken back.
     pub fn n_past(&self) -> usize {
         self.past.len()
@@ -26,8 +30,8 @@ impl History {
         self.future.len()
     }
 
-    /// Notes the camera before a change; those within one gesture are one.
-    pub(super) fn note(&mut self, before: Camera, gesture: Option<u64>) {
+    /// Notes the state before a change; those within one gesture are one.
+    pub(super) fn note(&mut self, before: T, gesture: Option<u64>) {
         self.future.clear();
         if gesture.is_some() && gesture == self.gesture {
             return;
@@ -39,21 +43,33 @@ impl History {
         }
     }
 
+    /// Ends a gesture.
     pub(super) fn end_gesture(&mut self) {
         self.gesture = None;
     }
 
-    pub(super) fn undo(&mut self, present: &mut Camera) -> bool {
+    pub(super) fn undo(&mut self, present: &mut T) -> bool {
         self.gesture = None;
         let Some(before) = self.past.pop() else { return false };
         self.future.push(std::mem::replace(present, before));
         true
     }
 
-    pub(super) fn redo(&mut self, present: &mut Camera) -> bool {
+    pub(super) fn redo(&mut self, present: &mut T) -> bool {
         self.gesture = None;
         let Some(after) = self.future.pop() else { return false };
         self.past.push(std::mem::replace(present, after));
         true
+    }
+
+    /// Calls `rename` for the states next to the present one, in both directions, as long as it says that they are of its kind.
+    pub(super) fn rename(&mut self, mut rename: impl FnMut(&mut T) -> bool) {
+        for states in [&mut self.past, &mut self.future] {
+            for state in states.iter_mut().rev() {
+                if !rename(state) {
+                    break;
+                }
+            }
+        }
     }
 }

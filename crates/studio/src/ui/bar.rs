@@ -13,7 +13,7 @@ use crate::{
 
 impl Studio {
     /// The bar above: files, undo, snapshots, pause, copies.
-    pub(super) fn bar(&mut self, ui: &mut Ui, camera: &mut Camera) {
+    pub(super) fn bar(&mut self, ui: &mut Ui) {
         ui.horizontal_wrapped(|ui| {
             self.files(ui);
             ui.separator();
@@ -46,7 +46,7 @@ impl Studio {
                     if ui.button(preset.name).on_hover_text(preset.words).clicked()
                         && let Ok(other) = preset.camera()
                     {
-                        *camera = other;
+                        self.begin(other);
                         ui.close();
                     }
                 }
@@ -95,7 +95,34 @@ impl Studio {
                     ui.close();
                 }
             }
+            self.left_unsaved(ui);
         });
+    }
+
+    /// Lists cameras that were left and are in no file.
+    fn left_unsaved(&mut self, ui: &mut Ui) {
+        let unsaved = self.autosave.as_ref().map(|autosave| autosave.unsaved(self.session.path())).unwrap_or_default();
+        if !unsaved.is_empty() {
+            ui.separator();
+            ui.weak("Left unsaved:");
+        }
+        for left in unsaved {
+            let name = match &left.document.path {
+                Some(path) => path.display().to_string(),
+                None => format!("{}, in no file", left.document.camera.name),
+            };
+            if ui.button(name).on_hover_text("Go on with it as it was left").clicked() {
+                self.recover(left);
+                ui.close();
+            }
+        }
+    }
+
+    /// Begins with another camera, which is in no file.
+    fn begin(&mut self, camera: Camera) {
+        self.keep_now();
+        self.session.begin(camera);
+        self.submit();
     }
 
     fn compare(&mut self, ui: &mut Ui) {

@@ -5,6 +5,8 @@ use std::ops::RangeInclusive;
 use dioptric_pipeline::parse_numbers;
 use egui::{Color32, Key, Modifiers, RichText, Slider, TextEdit, Ui};
 
+use super::typed::number_of;
+
 /// Width of labels, points.
 const LABEL: f32 = 86.0;
 /// Width of a button beside a path, with its margin, points.
@@ -110,7 +112,7 @@ impl NumberField<'_> {
     }
 
     fn parsed(&self, text: &str) -> Option<f64> {
-        let number: f64 = text.trim().replace(',', ".").parse().ok()?;
+        let number = number_of(text, self.unit)?;
         self.range.contains(&number).then_some(number)
     }
 
@@ -133,7 +135,11 @@ impl NumberField<'_> {
     }
 
     fn tooltip(&self) -> String {
-        format!("{}\n{}; arrow keys step it", self.words, self.range_words())
+        format!(
+            "{}\n{}; arrow keys step it; 1/60, 2,8 and 1,500 are read as 1 ÷ 60, 2.8 and 1500",
+            self.words,
+            self.range_words()
+        )
     }
 }
 

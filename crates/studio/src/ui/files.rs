@@ -1,23 +1,29 @@
 //! Files in and out: opened, dropped, saved, exported.
 
-use std::path::{Path, PathBuf};
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+    time::Instant,
+};
 
 use dioptric_analysis::{Run, RunTimes};
 use dioptric_optics::Lens;
 use dioptric_pipeline::{
-    Camera, LensSpec, PipelineError, SceneSource, SceneSpec, SensorSpec, Staged, WorldSpec, write_file,
+    Camera, KeptCamera, LensSpec, PipelineError, Quality, SceneSource, SceneSpec, SensorSpec, Staged, WorldSpec,
+    write_file,
 };
 use dioptric_report::write_run;
 use egui::Ui;
 
 use super::{
-    Studio,
+    Studio, UNSAVED_IS_BACK,
     dialog::{FileDialog, Outcome, Purpose},
+    finish::Waiting,
     panels::{self, Wanted},
 };
 use crate::{
-    engine::{Product, Rung},
-    session::as_ron,
+    engine::Product,
+    session::{Left, as_ron},
 };
 
 /// Endings of files that hold a world.
@@ -41,12 +47,8 @@ impl Studio {
     pub fn open(&mut self, path: &Path) {
         let mut camera = self.session.camera().clone();
         match ending(path).as_str() {
-            "ron" => match self.session.replace_by_file(path) {
-                Ok(()) => {
-                    self.remember(path);
-                    self.submit();
-                    return;
-                }
+            "ron" => match self.open_camera(path) {
+                Ok(()) => return,
                 // A file of the same ending may hold a lens or a sensor.
                 Err(error) if SensorSpec::File(path.to_owned()).open().is_ok() => {
                     drop(error);
@@ -67,6 +69,33 @@ impl Studio {
             _ => take_scene(&mut camera, path),
         }
         self.opened(path, camera);
+    }
+
+    /// Opens a camera file with what was left of it unsaved.
+    fn open_camera(&mut self, path: &Path) -> Result<(), PipelineError> {
+        self.keep_now();
+        self.session.replace_by_file(path)?;
+        self.remember(path);
+        let left = self.autosave.as_ref().and_then(|autosave| autosave.left_of(path)).filter(Left::is_unsaved);
+        if let Some(left) = left {
+            self.session.change(left.document.camera, None);
+            self.note = Some(UNSAVED_IS_BACK.to_owned());
+        }
+        self.submit();
+        Ok(())
+    }
+
+    /// Goes on with a camera that was left unsaved; the one on the desk can be gone back to.
+    pub(super) fn recover(&mut self, left: Left) {
+        self.keep_now();
+        let Left { document, .. } = left;
+        // Of a file that is gone the camera is all that there is.
+        match document.path.as_deref().map(|path| self.session.replace_by_file(path)) {
+            Some(Ok(())) => self.session.change(document.camera, None),
+            Some(Err(_)) | None => self.session.begin(document.camera),
+        }
+        self.note = Some("the camera is as it was left; Undo goes back to the one before".to_owned());
+        self.submit();
     }
 
     fn opened(&mut self, path: &Path, camera: Camera) {
@@ -140,20 +169,18 @@ impl Studio {
             }
             Purpose::SaveCamera => self.save_as(path),
             Purpose::SaveLens => self.save_lens(path),
-            Purpose::SavePicture => {
-                let written = self.whole_product().and_then(|product| {
-                    let png = product.png().map_err(|error| error.to_string())?;
-                    dioptric_files::write(path, &png).map_err(|error| error.to_string())
-                });
-                self.note = Some(written.map_or_else(|error| error, |()| format!("saved {}", path.display())));
-            }
-            Purpose::Export => self.export(path),
+            Purpose::SavePicture => self.when_full(Waiting::Picture(path.to_owned())),
+            Purpose::Export => self.when_full(Waiting::Export(path.to_owned())),
         }
     }
 
     /// Saves the camera where it came from, or asks where.
     pub(super) fn save(&mut self) {
         match self.session.path().map(Path::to_owned) {
+            Some(path) if self.session.is_file_changed() => {
+                self.note = Some(format!("{} was changed by another program: choose where to save", path.display()));
+                self.choose(Purpose::SaveCamera);
+            }
             Some(path) => self.save_as(&path),
             None => self.choose(Purpose::SaveCamera),
         }
@@ -163,6 +190,7 @@ impl Studio {
         self.note = Some(match self.session.save(path) {
             Ok(()) => {
                 self.remember(path);
+                self.unsaved.get_or_insert_with(Instant::now);
                 format!("saved {}", path.display())
             }
             Err(error) => error.to_string(),
@@ -187,28 +215,28 @@ impl Studio {
         }
     }
 
-    /// The full picture of the camera as it stands.
-    fn whole_product(&self) -> Result<std::sync::Arc<Product>, String> {
-        let results = self
-            .results
-            .as_ref()
-            .filter(|results| results.delivery.rung == Rung::Full && results.product.camera() == self.session.camera());
-        results.map(|results| results.product.clone()).ok_or_else(|| "the full picture is not there yet".to_owned())
+    /// Writes what waited for this full picture.
+    pub(super) fn write_full(&mut self, product: &Arc<Product>, waiting: Waiting) {
+        match waiting {
+            Waiting::Picture(path) => {
+                let written = product
+                    .png()
+                    .map_err(|error| error.to_string())
+                    .and_then(|png| dioptric_files::write(&path, &png).map_err(|error| error.to_string()));
+                self.note = Some(written.map_or_else(|error| error, |()| format!("saved {}", path.display())));
+            }
+            Waiting::Export(folder) => self.export(product.clone(), folder),
+        }
     }
 
     /// Writes the files of a run into a folder, on a thread of its own.
-    fn export(&mut self, folder: &Path) {
-        match self.whole_product() {
-            Ok(product) => {
-                let (folder, work_s) = (folder.to_owned(), self.work_s());
-                self.note = Some(format!("writing {}", folder.display()));
-                self.exports.ask(move || match export(&product, &folder, work_s) {
-                    Ok(files) => format!("{}: {files}", folder.display()),
-                    Err(error) => error.to_string(),
-                });
-            }
-            Err(words) => self.note = Some(words),
-        }
+    fn export(&mut self, product: Arc<Product>, folder: PathBuf) {
+        let work_s = self.work_s();
+        self.note = Some(format!("writing {}", folder.display()));
+        self.exports.ask(move || match export(&product, &folder, work_s) {
+            Ok(files) => format!("{}: {files}", folder.display()),
+            Err(error) => error.to_string(),
+        });
     }
 
     /// How long the latest picture took, s.
@@ -232,6 +260,10 @@ fn export(product: &Product, folder: &Path, work_s: f64) -> Result<String, Pipel
     let times = || RunTimes { stages_s: vec![("full picture".to_owned(), work_s)], imaging_s: Vec::new() };
     write_run(&run, staged.path(), &times)?;
     write_file(&staged.path().join("camera.ron"), as_ron(product.camera()).as_bytes())?;
+    if product.camera().outputs.irradiance {
+        let kept = KeptCamera::new(product.camera().clone()).with_quality(Quality::Full);
+        kept.write_resume_file(&product.capture, staged.path())?;
+    }
     let names = std::fs::read_dir(staged.path()).into_iter().flatten().flatten();
     let mut names: Vec<String> = names.map(|entry| entry.file_name().to_string_lossy().into_owned()).collect();
     names.sort();

@@ -92,18 +92,21 @@ impl Studio {
     }
 
     pub(super) fn undo(&mut self) {
+        self.keep_now();
         if self.session.undo() {
             self.submit();
         }
     }
 
     pub(super) fn redo(&mut self) {
+        self.keep_now();
         if self.session.redo() {
             self.submit();
         }
     }
 
     pub(super) fn recall(&mut self, which: Snapshot) {
+        self.keep_now();
         if self.session.recall(which) {
             self.submit();
         }

@@ -61,6 +61,7 @@ impl Studio {
         let Some(method) = method(product.camera()) else { return };
         self.session.keep_snapshot_of(snapshot(method), product.camera().clone());
         self.snapshots[snapshot(method) as usize] = Some(product);
+        self.unsaved.get_or_insert_with(std::time::Instant::now);
         if comparison.is_second {
             self.comparison = None;
             (self.tab, self.shown) = (Tab::Picture, Shown::Difference);

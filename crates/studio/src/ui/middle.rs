@@ -9,7 +9,10 @@ use super::{
     Results, Shown, Studio, Tab, Texture, fields,
     views::{self, images, picture},
 };
-use crate::engine::Product;
+use crate::{
+    engine::{Product, Rung},
+    session::Snapshot,
+};
 
 /// Amplification of the difference of A and B.
 const DIFFERENCE_GAIN: f32 = 4.0;
@@ -71,7 +74,8 @@ impl Studio {
             self.wavelengths(ui, &results.product);
         }
         let Some(texture) = self.texture(ui.ctx(), &results) else {
-            ui.weak("Keep two pictures of one size as A and B: their difference is shown here.");
+            let words = self.why_no_difference();
+            ui.weak(words);
             return;
         };
         let (handle, words) = (texture.handle.clone(), texture.words.clone());
@@ -126,7 +130,8 @@ impl Studio {
     /// Returns the image that is shown, made now where it is not at hand.
     fn texture(&mut self, context: &Context, results: &Results) -> Option<&Texture> {
         let product = &results.product;
-        let of_snapshots = || self.snapshots.iter().flatten().map(|product| Arc::as_ptr(product).addr() as u64).sum();
+        let address = |product: &Option<Arc<Product>>| product.as_ref().map_or(0, |own| Arc::as_ptr(own).addr() as u64);
+        let of_snapshots = || self.snapshots.iter().fold(0, |key: u64, own| key.rotate_left(29) ^ address(own));
         let detail = match self.shown {
             Shown::Irradiance => self.wavelength_nm.to_bits(),
             Shown::Difference => of_snapshots(),
@@ -150,9 +155,19 @@ impl Studio {
                 }
                 Shown::Difference => {
                     let [Some(a), Some(b)] = &self.snapshots else { return None };
+                    // Pictures of two qualities differ by their qualities.
+                    if a.rung != b.rung || a.n_samples != b.n_samples {
+                        return None;
+                    }
                     let image = images::difference(a, b, DIFFERENCE_GAIN)?;
                     let rms = 100.0 * images::difference_rms(a, b)?;
-                    (image, format!("A − B about gray, {DIFFERENCE_GAIN} times; rms {rms:.2} % of full scale"))
+                    let quality = match a.rung {
+                        Rung::Full => String::new(),
+                        rung => format!(" of {} pictures", rung.name()),
+                    };
+                    let words =
+                        format!("A − B about gray, {DIFFERENCE_GAIN} times{quality}; rms {rms:.2} % of full scale");
+                    (image, words)
                 }
             };
             let options = TextureOptions { magnification: egui::TextureFilter::Nearest, ..TextureOptions::LINEAR };
@@ -160,6 +175,26 @@ impl Studio {
             self.texture = Some(Texture { key, handle, words });
         }
         self.texture.as_ref()
+    }
+
+    /// Says why the difference of A and B is not shown.
+    fn why_no_difference(&self) -> String {
+        let missing = Snapshot::ALL.into_iter().filter(|which| self.session.snapshot(*which).is_none());
+        let missing: Vec<&str> = missing.map(Snapshot::name).collect();
+        if !missing.is_empty() {
+            return "Keep two pictures as A and B (→A, →B): their difference is shown here.".to_owned();
+        }
+        if let Some(words) = self.finish.fault(self.session.snapshot(Snapshot::A), self.session.snapshot(Snapshot::B)) {
+            return format!("There is no picture of a snapshot: {words}");
+        }
+        match &self.snapshots {
+            [Some(a), Some(b)] if a.rung == Rung::Full && b.rung == Rung::Full => {
+                let ([ax, ay], [bx, by]) = (a.size(), b.size());
+                format!("A has {ax} × {ay} pixels, B {bx} × {by}: pictures of one size have a difference.")
+            }
+            _ => "The full pictures of A and B are being taken; their difference is shown when both are there."
+                .to_owned(),
+        }
     }
 
     pub(super) fn charts(&mut self, ui: &mut Ui) {

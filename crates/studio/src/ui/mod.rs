@@ -7,10 +7,12 @@ mod bar;
 mod dialog;
 mod fields;
 mod files;
+mod finish;
 mod keys;
 mod methods;
 mod middle;
 mod panels;
+mod typed;
 mod views;
 
 use std::{
@@ -34,11 +36,12 @@ use crate::{
         Asker, Delivery, Engine, EngineSettings, Fault, LensAnswer, LensQuestion, Probe, Product, Rung, Spread,
         sensor_answer,
     },
-    session::{Autosave, Session, Snapshot},
+    session::{Autosave, Left, Session, Snapshot},
 };
 
 use self::{
     dialog::FileDialog,
+    finish::Finish,
     methods::Comparison,
     panels::Desk,
     views::{camera_file::CameraText, images, picture},
@@ -117,8 +120,12 @@ pub struct Studio {
     is_paused: bool,
     results: Option<Results>,
     fault: Option<Fault>,
-    /// Full pictures of the snapshots.
+    /// Pictures of the cameras that are the snapshots, the best that there are.
     snapshots: [Option<Arc<Product>>; 2],
+    /// What waits for a full picture, and who takes those of other cameras than that on the desk.
+    finish: Finish,
+    /// What the window is called.
+    title: String,
     tab: Tab,
     shown: Shown,
     wavelength_nm: f64,
@@ -162,13 +169,15 @@ impl Studio {
     pub fn new(context: &Context, settings: StudioSettings) -> io::Result<Self> {
         let StudioSettings { engine, autosave, camera } = settings;
         add_signs(context);
-        let (session, note) = opened(camera.as_deref(), autosave.as_ref());
+        let Opened { session, note, view } = opened(camera.as_deref(), autosave.as_ref());
+        let (tab, shown) = view.as_deref().map_or_else(Default::default, view_of);
         let wake = |context: &Context| {
             let context = context.clone();
             move || context.request_repaint()
         };
         let mut studio = Self {
             session,
+            finish: Finish::start(engine.clone(), wake(context))?,
             engine: Engine::start(engine, wake(context))?,
             autosave,
             unsaved: None,
@@ -177,8 +186,9 @@ impl Studio {
             results: None,
             fault: None,
             snapshots: [None, None],
-            tab: Tab::default(),
-            shown: Shown::default(),
+            title: String::new(),
+            tab,
+            shown,
             wavelength_nm: 550.0,
             placement: picture::Placement::default(),
             texture: None,
@@ -203,6 +213,8 @@ impl Studio {
             note,
         };
         studio.submit();
+        // What was opened is no change yet.
+        studio.unsaved = None;
         Ok(studio)
     }
 
@@ -243,7 +255,10 @@ impl Studio {
     /// Keeps the camera and its picture as a snapshot.
     pub fn keep_snapshot(&mut self, which: Snapshot) {
         self.session.keep_snapshot(which);
-        self.snapshots[which as usize] = self.results.as_ref().map(|results| results.product.clone());
+        let of_camera = |product: &Arc<Product>| product.camera() == self.session.camera();
+        // Pictures on their way to that of the camera are of others.
+        self.snapshots[which as usize] = self.results.as_ref().map(|results| results.product.clone()).filter(of_camera);
+        self.unsaved.get_or_insert_with(Instant::now);
     }
 
     /// Draws one frame of the window.
@@ -253,7 +268,7 @@ impl Studio {
         self.drops(ui);
         let before = self.session.camera().clone();
         let mut camera = before.clone();
-        Panel::top("bar").show(ui, |ui| self.bar(ui, &mut camera));
+        Panel::top("bar").show(ui, |ui| self.bar(ui));
         Panel::bottom("notes").show(ui, |ui| self.notes(ui, &mut camera));
         let mut wanted = None;
         Panel::left("camera").default_size(330.0).size_range(280.0..=520.0).show(ui, |ui| {
@@ -282,7 +297,8 @@ impl Studio {
         }
         self.dialogs(ui);
         self.keep(ui.ctx());
-        if self.engine.is_busy() {
+        self.name_window(ui.ctx());
+        if self.engine.is_busy() || self.finish.is_busy() {
             ui.ctx().request_repaint_after(TICK);
         }
     }
@@ -308,6 +324,7 @@ impl Studio {
         for delivery in self.engine.take() {
             match delivery.outcome.clone() {
                 Ok(product) => {
+                    self.improve(&product);
                     let number = self.results.as_ref().map_or(1, |results| results.number + 1);
                     self.results = Some(Results { delivery, product, number });
                 }
@@ -331,7 +348,17 @@ impl Studio {
             self.note = Some(words);
         }
         self.go_on_comparing();
+        self.finish();
         self.ask();
+    }
+
+    /// Names the window after the camera's file.
+    fn name_window(&mut self, context: &Context) {
+        let title = self.session.title();
+        if title != self.title {
+            context.send_viewport_cmd(egui::ViewportCommand::Title(title.clone()));
+            self.title = title;
+        }
     }
 
     /// Asks what the visible views need.
@@ -369,13 +396,37 @@ impl Studio {
             context.request_repaint_after(AUTOSAVE);
             return;
         }
-        self.unsaved = None;
-        if let Some(autosave) = &self.autosave
-            && !autosave.keep(self.session.camera())
-        {
-            self.note = Some("the camera cannot be kept in the user's folder of states".to_owned());
+        self.keep_now();
+    }
+
+    /// Keeps the camera as it stands, if it was changed since it was kept: before another takes its place, and at the end.
+    fn keep_now(&mut self) {
+        if self.unsaved.take().is_none() {
+            return;
+        }
+        if let Some(autosave) = &self.autosave {
+            let view = format!("{:?} {:?}", self.tab, self.shown);
+            if !autosave.keep(&self.session.left(view)) {
+                self.note = Some("the camera cannot be kept in the user's folder of states".to_owned());
+            }
         }
     }
+}
+
+impl Drop for Studio {
+    fn drop(&mut self) {
+        self.keep_now();
+    }
+}
+
+/// Returns the tab and the picture that were looked at, in words that [`Studio`] left.
+fn view_of(words: &str) -> (Tab, Shown) {
+    let mut words = words.split(' ');
+    let (tab, shown) = (words.next().unwrap_or_default(), words.next().unwrap_or_default());
+    let tabs = [Tab::Picture, Tab::LensBench, Tab::SensorBench, Tab::CameraFile];
+    let tab = tabs.into_iter().find(|own| format!("{own:?}") == tab);
+    let shown = Shown::ALL.into_iter().map(|(own, _)| own).find(|own| format!("{own:?}") == shown);
+    (tab.unwrap_or_default(), shown.unwrap_or_default())
 }
 
 /// Adds a font for the signs that egui's own lacks.
@@ -386,26 +437,43 @@ fn add_signs(context: &Context) {
     context.add_font(FontInsert::new("DejaVu Sans", font, families.to_vec()));
 }
 
-/// Returns the session to start with, and what there is to tell of it.
-fn opened(camera: Option<&Path>, autosave: Option<&Autosave>) -> (Session, Option<String>) {
-    let demo = || Camera::demo().map(Session::new);
-    let fallback = |words: Option<String>| {
-        let session = demo().unwrap_or_else(|error| unreachable!("the demo is a camera: {error}"));
-        (session, words)
+/// The session to start with, what there is to tell of it, and what was looked at.
+struct Opened {
+    session: Session,
+    note: Option<String>,
+    view: Option<String>,
+}
+
+/// Returns the session to start with: of a file with what was left of it unsaved, else as the last window left it, else of the demo.
+fn opened(camera: Option<&Path>, autosave: Option<&Autosave>) -> Opened {
+    let fallback = |note: Option<String>| {
+        let demo = Camera::demo().unwrap_or_else(|error| unreachable!("the demo is a camera: {error}"));
+        Opened { session: Session::new(demo), note, view: None }
     };
-    match camera {
-        Some(path) => match Session::open(path) {
-            Ok(session) => {
-                if let Some(autosave) = autosave {
-                    autosave.remember(path);
-                }
-                (session, None)
+    let Some(path) = camera else {
+        return match autosave.and_then(Autosave::left) {
+            Some(left) => {
+                let view = Some(left.view.clone());
+                Opened { session: Session::resume(left), note: Some("the camera is as it was left".to_owned()), view }
             }
-            Err(error) => fallback(Some(error.to_string())),
-        },
-        None => match autosave.and_then(Autosave::camera) {
-            Some(camera) => (Session::new(camera), Some("the camera is as it was left".to_owned())),
             None => fallback(None),
-        },
+        };
+    };
+    match Session::open(path) {
+        Ok(mut session) => {
+            if let Some(autosave) = autosave {
+                autosave.remember(path);
+            }
+            let left = autosave.and_then(|autosave| autosave.left_of(path)).filter(Left::is_unsaved);
+            let note = left.map(|left| {
+                session.change(left.document.camera, None);
+                UNSAVED_IS_BACK.to_owned()
+            });
+            Opened { session, note, view: None }
+        }
+        Err(error) => fallback(Some(error.to_string())),
     }
 }
+
+/// What is told where changes that were never saved are back.
+const UNSAVED_IS_BACK: &str = "changes that were not saved are back; Undo goes to the camera of the file";

@@ -155,7 +155,7 @@ fn the_camera_is_kept_at_every_change() {
     let mut harness = window(Some(autosave.clone()));
     type_into(&mut harness, "f-number", "5.6");
     let start = Instant::now();
-    while autosave.camera().is_none_or(|kept| kept.stop != StopSpec::FNumber(5.6)) {
+    while autosave.left().is_none_or(|left| left.document.camera.stop != StopSpec::FNumber(5.6)) {
         assert!(start.elapsed() < LONG);
         thread::sleep(Duration::from_millis(20));
         harness.step();

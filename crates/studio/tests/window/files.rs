@@ -13,7 +13,7 @@ use egui_kittest::{Harness, kittest::Queryable};
 use super::desk::{LONG, draw, settle, small, studio, window, window_of};
 
 /// Types a path into the dialog that is open, and Enter.
-fn answer(harness: &mut Harness<'_, Option<Studio>>, path: &std::path::Path) {
+pub(crate) fn answer(harness: &mut Harness<'_, Option<Studio>>, path: &std::path::Path) {
     draw(harness);
     harness.key_press_modifiers(Modifiers::COMMAND, Key::A);
     harness.step();

@@ -5,5 +5,6 @@ mod desk;
 mod drags;
 mod edits;
 mod files;
+mod losses;
 mod panels;
 mod worlds;
