@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::{Affine3A, Mat2, Vec2, Vec3};
 use std::f32::consts::{FRAC_1_PI, PI, TAU};
 
-use crate::{Hit, ImageTexture, Pattern, SpectralCurve, TextureId, pattern::Found, upsample::SmoothReflectance};
+use crate::{Hit, ImageTexture, Procedural, SpectralCurve, TextureId, procedural::Found, upsample::SmoothReflectance};
 
 /// A value over a surface: a spectrum where a color is asked for, a number where a number is.
 ///
@@ -62,7 +62,7 @@ pub enum Texture {
         by: RoughnessLaw,
     },
     /// A pattern by formula.
-    Pattern(Box<Pattern>),
+    Procedural(Box<Procedural>),
     /// One texture times another.
     Product([TextureId; 2]),
     /// Two textures mixed.
@@ -195,7 +195,7 @@ impl Texture {
             Self::Curve(_) | Self::Image { .. } | Self::Channel { .. } | Self::VertexColors | Self::VertexAlpha => {
                 Vec::new()
             }
-            Self::Pattern(pattern) => pattern.parts(),
+            Self::Procedural(procedural) => procedural.parts(),
             Self::Step { of, .. } | Self::Alpha { roughness: of, .. } => vec![*of],
             Self::Checkerboard { fields: of, .. } | Self::Product(of) => of.to_vec(),
             Self::Blend { of: [a, b], amount } => vec![*a, *b, *amount],
@@ -226,7 +226,7 @@ impl Textures<'_> {
             Texture::Channel { .. } | Texture::VertexAlpha | Texture::Step { .. } | Texture::Alpha { .. } => {
                 [self.number(id, at); N]
             }
-            Texture::Pattern(pattern) => match pattern.at(at) {
+            Texture::Procedural(procedural) => match procedural.at(at) {
                 Found::Number(value) => [value; N],
                 Found::Color(rgb) => SmoothReflectance::of_rgb(rgb).at(wavelengths_nm),
                 Found::Texture(of) => self.spectral(of, at, wavelengths_nm),
@@ -269,7 +269,7 @@ impl Textures<'_> {
             Texture::VertexColors => at.color[..3].iter().sum::<f32>() / 3.0,
             Texture::VertexAlpha => at.color[3],
             Texture::Alpha { roughness, by } => by.alpha(self.number(*roughness, at)),
-            Texture::Pattern(pattern) => match pattern.at(at) {
+            Texture::Procedural(procedural) => match procedural.at(at) {
                 Found::Number(value) => value,
                 Found::Color(rgb) => rgb.iter().sum::<f32>() / 3.0,
                 Found::Texture(of) => self.number(of, at),

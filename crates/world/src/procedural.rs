@@ -7,7 +7,7 @@ use crate::{TextureId, UvMapping, texture::TexturePoint};
 
 /// A number or color over a surface or through space by formula.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Pattern {
+pub enum Procedural {
     /// Sums of noise.
     Noise {
         /// Which.
@@ -78,7 +78,7 @@ pub(crate) enum Found {
     Mixture([(TextureId, f32); 4]),
 }
 
-impl Pattern {
+impl Procedural {
     pub(crate) fn parts(&self) -> Vec<TextureId> {
         match self {
             Self::Noise { .. } | Self::Marble { .. } | Self::Coordinates { .. } => Vec::new(),
