@@ -87,7 +87,7 @@ impl Procedural {
         }
     }
 
-    pub(crate) fn at(&self, at: &TexturePoint) -> Found {
+    pub(crate) fn at(&self, at: &TexturePoint<'_>) -> Found {
         match self {
             Self::Noise { kind, octaves, roughness, frame } => {
                 let p = frame.transform_point3(at.point);

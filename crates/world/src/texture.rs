@@ -2,10 +2,13 @@
 
 use std::sync::Arc;
 
-use glam::{Affine3A, Mat2, Vec2, Vec3};
+use glam::{Affine3A, DVec3, Mat2, Vec2, Vec3};
 use std::f32::consts::{FRAC_1_PI, PI, TAU};
 
-use crate::{Hit, ImageTexture, Procedural, SpectralCurve, TextureId, procedural::Found, upsample::SmoothReflectance};
+use crate::{
+    Hit, ImageTexture, PatternPoint, PatternRef, Procedural, SpectralCurve, TextureId, pattern::MOST_SHARES,
+    patterned::OwnFrame, procedural::Found, upsample::SmoothReflectance,
+};
 
 /// A value over a surface: a spectrum where a color is asked for, a number where a number is.
 ///
@@ -72,6 +75,13 @@ pub enum Texture {
         /// The share of the second, 0–1.
         amount: TextureId,
     },
+    /// Textures that share the surface by a formula of the place, in the frame of the shape.
+    Pattern {
+        /// Up to 32 textures.
+        of: Vec<TextureId>,
+        /// What each counts where.
+        by: PatternRef,
+    },
 }
 
 /// How a roughness from 0 to 1 becomes GGX's α.
@@ -136,7 +146,7 @@ impl UvMapping {
         Self { matrix: Mat2::from_diagonal(scale), offset, ..Self::IDENTITY }
     }
 
-    pub(crate) fn at(&self, at: &TexturePoint) -> Vec2 {
+    pub(crate) fn at(&self, at: &TexturePoint<'_>) -> Vec2 {
         let uv = match &self.from {
             Coordinates::First => at.uv,
             Coordinates::Second => at.second_uv,
@@ -162,26 +172,41 @@ fn azimuth(d: Vec3) -> f32 {
 
 /// What textures can depend on.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct TexturePoint {
+pub(crate) struct TexturePoint<'a> {
     pub(crate) uv: Vec2,
     pub(crate) second_uv: Vec2,
     /// Linear sRGB and alpha of the vertices.
     pub(crate) color: [f32; 4],
     /// In the world, m.
     pub(crate) point: Vec3,
+    pub(crate) normal: Vec3,
+    pub(crate) footprint_m: f32,
+    /// The frame of the shape, in which patterns are asked.
+    pub(crate) frame: OwnFrame<'a>,
 }
 
-impl TexturePoint {
+impl<'a> TexturePoint<'a> {
+    pub(crate) fn of(hit: &Hit, frame: OwnFrame<'a>) -> Self {
+        Self {
+            uv: hit.uv,
+            second_uv: hit.second_uv,
+            color: hit.color,
+            point: hit.point,
+            normal: hit.shading_normal,
+            footprint_m: hit.footprint_m,
+            frame,
+        }
+    }
+
+    /// Returns the point in the frame of the shape.
+    pub(crate) fn own(&self) -> PatternPoint {
+        self.frame.own(self.point, self.normal, self.footprint_m)
+    }
+
     /// Returns a point beside this one, so far along both coordinates.
     pub(crate) fn beside(&self, (du, dv): (f32, f32), [dp_du, dp_dv]: [Vec3; 2]) -> Self {
         let by = Vec2::new(du, dv);
         Self { uv: self.uv + by, second_uv: self.second_uv + by, point: self.point + du * dp_du + dv * dp_dv, ..*self }
-    }
-}
-
-impl From<&Hit> for TexturePoint {
-    fn from(hit: &Hit) -> Self {
-        Self { uv: hit.uv, second_uv: hit.second_uv, color: hit.color, point: hit.point }
     }
 }
 
@@ -196,6 +221,7 @@ impl Texture {
                 Vec::new()
             }
             Self::Procedural(procedural) => procedural.parts(),
+            Self::Pattern { of, .. } => of.clone(),
             Self::Step { of, .. } | Self::Alpha { roughness: of, .. } => vec![*of],
             Self::Checkerboard { fields: of, .. } | Self::Product(of) => of.to_vec(),
             Self::Blend { of: [a, b], amount } => vec![*a, *b, *amount],
@@ -212,7 +238,7 @@ impl Textures<'_> {
     pub(crate) fn spectral<const N: usize>(
         self,
         id: TextureId,
-        at: &TexturePoint,
+        at: &TexturePoint<'_>,
         wavelengths_nm: &[f32; N],
     ) -> [f32; N] {
         match &self.0[id.0 as usize] {
@@ -252,11 +278,27 @@ impl Textures<'_> {
                 let amount = self.number(*amount, at).clamp(0.0, 1.0);
                 std::array::from_fn(|i| a[i] + amount * (b[i] - a[i]))
             }
+            Texture::Pattern { of, by } => {
+                let mut sum = [0.0; N];
+                for (share, part) in shares(of, by, at) {
+                    let value = self.spectral(part, at, wavelengths_nm);
+                    sum.iter_mut().zip(value).for_each(|(sum, value)| *sum += share * value);
+                }
+                sum
+            }
+        }
+    }
+
+    /// Returns the relief of a pattern at the point: what is added to its normal.
+    pub(crate) fn tilt(self, id: TextureId, at: &TexturePoint<'_>) -> DVec3 {
+        match &self.0[id.0 as usize] {
+            Texture::Pattern { by, .. } => by.tilt(&at.own()),
+            _ => DVec3::ZERO,
         }
     }
 
     /// Returns the number at a point.
-    pub(crate) fn number(self, id: TextureId, at: &TexturePoint) -> f32 {
+    pub(crate) fn number(self, id: TextureId, at: &TexturePoint<'_>) -> f32 {
         match &self.0[id.0 as usize] {
             Texture::Curve(curve) => curve.mean_visible(),
             Texture::Image { image, mapping, scale } => scale * image.rgb_at(mapping.at(at)).iter().sum::<f32>() / 3.0,
@@ -281,16 +323,28 @@ impl Textures<'_> {
                 let [a, b] = [*a, *b].map(|t| self.number(t, at));
                 a + self.number(*amount, at).clamp(0.0, 1.0) * (b - a)
             }
+            Texture::Pattern { of, by } => shares(of, by, at).map(|(share, part)| share * self.number(part, at)).sum(),
         }
     }
 
     /// Returns the linear sRGB color at a point of a picture, or of the pictures a texture is made of, for normal maps.
-    pub(crate) fn rgb(self, id: TextureId, at: &TexturePoint) -> [f32; 3] {
+    pub(crate) fn rgb(self, id: TextureId, at: &TexturePoint<'_>) -> [f32; 3] {
         match &self.0[id.0 as usize] {
             Texture::Image { image, mapping, .. } => image.rgb_at(mapping.at(at)),
             _ => [self.number(id, at); 3],
         }
     }
+}
+
+/// Returns the textures of a pattern that count at the point, each with its share.
+fn shares<'b>(
+    of: &'b [TextureId],
+    by: &PatternRef,
+    at: &TexturePoint<'_>,
+) -> impl Iterator<Item = (f32, TextureId)> + use<'b> {
+    let mut shares = [0.0; MOST_SHARES];
+    by.shares(&at.own(), &mut shares[..of.len()]);
+    shares.into_iter().zip(of.iter().copied()).filter(|(share, _)| *share != 0.0)
 }
 
 fn field(at: Vec2) -> usize {
