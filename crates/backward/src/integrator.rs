@@ -58,13 +58,13 @@ pub(crate) struct Integrator<'a> {
 
 /// A path on its way.
 #[derive(Clone, Copy)]
-struct Path<const N: usize> {
-    ray: Ray,
+pub(crate) struct Path<const N: usize> {
+    pub(crate) ray: Ray,
     /// The share of radiance that reaches the camera.
-    throughput: [f32; N],
+    pub(crate) throughput: [f32; N],
     /// Where it was scattered last and the density of its direction; `None` where no drawn light could have found it.
-    scattered: Option<(Receiver, f32)>,
-    n_scatterings: u32,
+    pub(crate) scattered: Option<(Receiver, f32)>,
+    pub(crate) n_scatterings: u32,
 }
 
 impl Integrator<'_> {
@@ -73,7 +73,13 @@ impl Integrator<'_> {
         self.follow(Path { ray, throughput: [1.0; N], scattered: None, n_scatterings: 0 }, wavelengths_nm, random)
     }
 
-    fn follow<const N: usize>(&self, mut path: Path<N>, wavelengths_nm: &[f32; N], random: &Sampler) -> [f32; N] {
+    /// Returns an estimate of the light that a path on its way still finds.
+    pub(crate) fn follow<const N: usize>(
+        &self,
+        mut path: Path<N>,
+        wavelengths_nm: &[f32; N],
+        random: &Sampler,
+    ) -> [f32; N] {
         let mut sum = [0.0; N];
         loop {
             let Path { ray, throughput, scattered, n_scatterings } = path;

@@ -1,5 +1,7 @@
 //! How one point of a surface scatters light.
 
+mod parts;
+
 use glam::Vec3;
 use std::f32::consts::FRAC_1_PI;
 

@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
-use glam::Vec2;
+use glam::{DVec3, Vec2};
 
 use crate::{
-    ImageTexture, Pattern, SpectralCurve, TextureId, UvMapping, pattern::Found, upsample::SmoothReflectance,
-    uv::TexturePoint,
+    ImageTexture, PatternRef, Procedural, SpectralCurve, TextureId, UvMapping, pattern::MOST_SHARES,
+    procedural::Found, upsample::SmoothReflectance, uv::TexturePoint,
 };
 
 /// A value over a surface: a spectrum where a color is asked for, a number where a number is.
@@ -64,7 +64,7 @@ pub enum Texture {
         by: RoughnessLaw,
     },
     /// A pattern by formula.
-    Pattern(Box<Pattern>),
+    Procedural(Box<Procedural>),
     /// One texture times another.
     Product([TextureId; 2]),
     /// Two textures mixed.
@@ -73,6 +73,13 @@ pub enum Texture {
         of: [TextureId; 2],
         /// The share of the second, 0–1.
         amount: TextureId,
+    },
+    /// Textures that share the surface by a formula of the place, in the frame of the shape.
+    Pattern {
+        /// Up to 32 textures.
+        of: Vec<TextureId>,
+        /// What each counts where.
+        by: PatternRef,
     },
 }
 
@@ -113,7 +120,8 @@ impl Texture {
             Self::Curve(_) | Self::Image { .. } | Self::Channel { .. } | Self::VertexColors | Self::VertexAlpha => {
                 Vec::new()
             }
-            Self::Pattern(pattern) => pattern.parts(),
+            Self::Procedural(procedural) => procedural.parts(),
+            Self::Pattern { of, .. } => of.clone(),
             Self::Step { of, .. } | Self::Alpha { roughness: of, .. } => vec![*of],
             Self::Checkerboard { fields: of, .. } | Self::Product(of) => of.to_vec(),
             Self::Blend { of: [a, b], amount } => vec![*a, *b, *amount],
@@ -130,7 +138,7 @@ impl Textures<'_> {
     pub(crate) fn spectral<const N: usize>(
         self,
         id: TextureId,
-        at: &TexturePoint,
+        at: &TexturePoint<'_>,
         wavelengths_nm: &[f32; N],
     ) -> [f32; N] {
         match &self.0[id.0 as usize] {
@@ -144,7 +152,7 @@ impl Textures<'_> {
             Texture::Channel { .. } | Texture::VertexAlpha | Texture::Step { .. } | Texture::Alpha { .. } => {
                 [self.number(id, at); N]
             }
-            Texture::Pattern(pattern) => match pattern.at(at) {
+            Texture::Procedural(procedural) => match procedural.at(at) {
                 Found::Number(value) => [value; N],
                 Found::Color(rgb) => SmoothReflectance::of_rgb(rgb).at(wavelengths_nm),
                 Found::Texture(of) => self.spectral(of, at, wavelengths_nm),
@@ -170,11 +178,27 @@ impl Textures<'_> {
                 let amount = self.number(*amount, at).clamp(0.0, 1.0);
                 std::array::from_fn(|i| a[i] + amount * (b[i] - a[i]))
             }
+            Texture::Pattern { of, by } => {
+                let mut sum = [0.0; N];
+                for (share, part) in shares(of, by, at) {
+                    let value = self.spectral(part, at, wavelengths_nm);
+                    sum.iter_mut().zip(value).for_each(|(sum, value)| *sum += share * value);
+                }
+                sum
+            }
+        }
+    }
+
+    /// Returns the relief of a pattern at the point: what is added to its normal.
+    pub(crate) fn tilt(self, id: TextureId, at: &TexturePoint<'_>) -> DVec3 {
+        match &self.0[id.0 as usize] {
+            Texture::Pattern { by, .. } => by.tilt(&at.own()),
+            _ => DVec3::ZERO,
         }
     }
 
     /// Returns the number at a point.
-    pub(crate) fn number(self, id: TextureId, at: &TexturePoint) -> f32 {
+    pub(crate) fn number(self, id: TextureId, at: &TexturePoint<'_>) -> f32 {
         match &self.0[id.0 as usize] {
             Texture::Curve(curve) => curve.mean_visible(),
             Texture::Image { image, mapping, scale } => scale * image.rgb_at(mapping.at(at)).iter().sum::<f32>() / 3.0,
@@ -187,7 +211,7 @@ impl Textures<'_> {
             Texture::VertexColors => at.color[..3].iter().sum::<f32>() / 3.0,
             Texture::VertexAlpha => at.color[3],
             Texture::Alpha { roughness, by } => by.alpha(self.number(*roughness, at)),
-            Texture::Pattern(pattern) => match pattern.at(at) {
+            Texture::Procedural(procedural) => match procedural.at(at) {
                 Found::Number(value) => value,
                 Found::Color(rgb) => rgb.iter().sum::<f32>() / 3.0,
                 Found::Texture(of) => self.number(of, at),
@@ -199,16 +223,28 @@ impl Textures<'_> {
                 let [a, b] = [*a, *b].map(|t| self.number(t, at));
                 a + self.number(*amount, at).clamp(0.0, 1.0) * (b - a)
             }
+            Texture::Pattern { of, by } => shares(of, by, at).map(|(share, part)| share * self.number(part, at)).sum(),
         }
     }
 
     /// Returns the linear sRGB color at a point of a picture, or of the pictures a texture is made of, for normal maps.
-    pub(crate) fn rgb(self, id: TextureId, at: &TexturePoint) -> [f32; 3] {
+    pub(crate) fn rgb(self, id: TextureId, at: &TexturePoint<'_>) -> [f32; 3] {
         match &self.0[id.0 as usize] {
             Texture::Image { image, mapping, .. } => image.rgb_at(mapping.at(at)),
             _ => [self.number(id, at); 3],
         }
     }
+}
+
+/// Returns the textures of a pattern that count at the point, each with its share.
+fn shares<'b>(
+    of: &'b [TextureId],
+    by: &PatternRef,
+    at: &TexturePoint<'_>,
+) -> impl Iterator<Item = (f32, TextureId)> + use<'b> {
+    let mut shares = [0.0; MOST_SHARES];
+    by.shares(&at.own(), &mut shares[..of.len()]);
+    shares.into_iter().zip(of.iter().copied()).filter(|(share, _)| *share != 0.0)
 }
 
 fn field(at: Vec2) -> usize {
