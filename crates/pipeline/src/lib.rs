@@ -15,6 +15,7 @@ pub mod display;
 mod error;
 pub mod figures;
 mod frame_files;
+mod gathered;
 mod json;
 mod keys;
 mod light_field;
@@ -29,6 +30,7 @@ mod schema;
 mod sense;
 mod shown;
 mod stages;
+mod still_life;
 mod video_files;
 mod words;
 

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use glam::{DVec3, Vec2};
 
 use crate::{
-    ImageTexture, PatternRef, Procedural, SpectralCurve, TextureId, UvMapping, pattern::MOST_SHARES,
-    procedural::Found, upsample::SmoothReflectance, uv::TexturePoint,
+    ImageTexture, PatternRef, Procedural, SpectralCurve, TextureId, UvMapping, pattern::MOST_SHARES, procedural::Found,
+    upsample::SmoothReflectance, uv::TexturePoint,
 };
 
 /// A value over a surface: a spectrum where a color is asked for, a number where a number is.

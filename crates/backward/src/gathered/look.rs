@@ -93,7 +93,7 @@ impl<const N: usize> Gatherer<'_, N> {
                     mirrored.push((ray, value));
                 }
             }
-            let normal = if bsdf.normal().dot(ray.direction) > 0.0 { -bsdf.normal() } else { bsdf.normal() };
+            let normal = seen_side(&hit, bsdf.normal(), ray.direction);
             let width_m = pitch * gone_m / normal.dot(ray.direction).abs().max(0.05);
             let Some((direction, value)) = next else {
                 look.guide = Guide { key, point: hit.point, normal, width_m };
@@ -154,7 +154,7 @@ impl<const N: usize> Gatherer<'_, N> {
                 (0..N).for_each(|lane| sum[lane] += value[lane] * seen[lane]);
             }
         }
-        let normal = if bsdf.normal().dot(ray.direction) > 0.0 { -bsdf.normal() } else { bsdf.normal() };
+        let normal = seen_side(&hit, bsdf.normal(), ray.direction);
         let is_diffuse = bsdf.diffuse_reflectance().iter().any(|&r| r > 0.0);
         let (gloss, mirrored, through) = (bsdf.gloss(), Vec::new(), [1.0; N]);
         let surface = LitSurface { hit, bsdf, normal, gloss, is_diffuse, mirrored, through, is_mirrored: false };
@@ -191,16 +191,21 @@ impl<const N: usize> Look<N> {
         (0..N).for_each(|lane| self.own[lane] += self.through[lane] * radiance[lane]);
     }
 
-    /// Tells whether two looks are so alike that nothing need be looked at between them; `bright` is a radiance that is worth a look.
-    pub(super) fn is_like(&self, other: &Self, bright: f32) -> bool {
+    /// Tells whether two looks differ by less than a step: in reflectance, and in what glows as a fraction of `bright`.
+    pub(super) fn is_like(&self, other: &Self, step: f32, bright: f32) -> bool {
         const LEAST_COSINE: f32 = 0.97;
-        const LARGEST_STEP: f32 = 0.12;
         let steps = |a: &[f32; N], b: &[f32; N], most: f32| a.iter().zip(b).all(|(a, b)| (a - b).abs() < most);
         self.guide.key == other.guide.key
             && self.guide.normal.dot(other.guide.normal) > LEAST_COSINE
-            && steps(&self.reflectance, &other.reflectance, LARGEST_STEP)
-            && steps(&self.own, &other.own, LARGEST_STEP * bright)
+            && steps(&self.reflectance, &other.reflectance, step)
+            && steps(&self.own, &other.own, step * bright)
     }
+}
+
+/// Returns the normal on the side of the surface that is seen along a direction: by the shape, since relief can turn away from the eye.
+fn seen_side(hit: &Hit, normal: Vec3, along: Vec3) -> Vec3 {
+    let outward = if normal.dot(hit.geometric_normal) < 0.0 { -normal } else { normal };
+    if hit.geometric_normal.dot(along) > 0.0 { -outward } else { outward }
 }
 
 /// Returns the size of details that a pixel blurs away, m, where it is `width_m` wide.

@@ -3,7 +3,7 @@
 //! Outlines, textures and mirrors are sharp, since only the light on surfaces is smoothed, not the picture. Pixels share what is seen
 //! through their corners, and more points are looked at only where the corners of one are not alike. Light straight from its sources is
 //! gathered at each corner, or at every other one each way; light that has bounced, by paths, at every other one. Both are smoothed
-//! (Dammertz et al. 2010, without their stop at edges of light) and taken from between the corners. What is scattered evenly is the
+//! (Dammertz et al. 2010; edges of light stop the last pass alone) and taken from between the corners. What is scattered evenly is the
 //! irradiance times the reflectance of each point, so that no texture is smoothed; gloss is smoothed as it is sent out.
 //!
 //! It is no unbiased estimate, as [`Renderer`](crate::Renderer) makes: edges of shadows are as wide as the smoothing, the light of single

@@ -16,7 +16,7 @@ use super::{
     ViewDetail,
     light::{Gatherer, LightRays},
     look::{Look, depth_m},
-    smooth::{Guide, Lanes, Smoothing},
+    smooth::{Guide, Lanes, Passes, Smoothing},
 };
 use crate::{Pinhole, Sampler, peeling::Surfaces};
 
@@ -34,24 +34,32 @@ struct Effort {
     rays: LightRays,
     /// Light straight from its sources, light that gloss and mirrors send on and light that has bounced are gathered at every so manyth
     /// corner each way, and smoothed by passes of these steps.
-    lattices: [(usize, &'static [usize]); 3],
-    /// Points looked at within a pixel whose corners are alike, whose corners show one surface that varies, and where an outline passes: their
+    lattices: [(usize, Passes); 3],
+    /// Points looked at within a pixel by what its corners show: the same, much the same, one surface that varies, or an outline; their
     /// number, and what each counts.
-    within: [(usize, f32); 3],
+    within: [(usize, f32); 4],
 }
 
 impl ViewDetail {
     fn effort(self) -> Effort {
         match self {
             Self::Fine => Effort {
-                rays: LightRays { n_lights: 4, n_bounces: 2, n_gloss: 2 },
-                lattices: [(1, &[1, 2]), (1, &[1, 2]), (2, &[1, 2, 4, 8])],
-                within: [(2, 0.3), (4, 0.2), (12, 0.0734)],
+                rays: LightRays { n_lights: 2, n_bounces: 2, n_gloss: 1 },
+                lattices: [
+                    (1, Passes { steps: &[1, 2, 4], keeps_edges_from: 4 }),
+                    (1, Passes::by_surface(&[1, 2, 4])),
+                    (2, Passes::by_surface(&[1, 2, 4])),
+                ],
+                within: [(0, 0.0), (2, 0.3), (4, 0.2), (12, 0.0734)],
             },
             Self::Quick => Effort {
                 rays: LightRays { n_lights: 4, n_bounces: 2, n_gloss: 1 },
-                lattices: [(2, &[1]), (2, &[1, 2]), (2, &[1, 2, 4, 8])],
-                within: [(0, 0.0), (2, 0.34), (4, 0.1875)],
+                lattices: [
+                    (2, Passes { steps: &[1, 2], keeps_edges_from: 2 }),
+                    (2, Passes::by_surface(&[1, 2])),
+                    (2, Passes::by_surface(&[1, 2, 4, 8])),
+                ],
+                within: [(0, 0.0), (0, 0.0), (2, 0.34), (4, 0.1875)],
             },
         }
     }
@@ -104,6 +112,9 @@ pub(super) struct Painter<'a, const N: usize> {
     cancel: &'a Cancel,
 }
 
+/// Steps of reflectance between corners of a pixel: finer textures than its own would show as waves where they were left out.
+const SAME: f32 = 0.004;
+const MUCH_THE_SAME: f32 = 0.12;
 /// Places each way that the mean radiance is measured at.
 const METER: u32 = 16;
 /// How much brighter than the mean what one path finds may be.
@@ -189,7 +200,7 @@ impl<'a, const N: usize> Painter<'a, N> {
         let mut z_m = Array2::zeros((rows, columns));
         let mut finishing = Finishing {
             painter: self,
-            lights: self.effort.lattices.map(|(pitch, steps)| Smoothing::of_rows(rows / pitch + 1, steps)),
+            lights: self.effort.lattices.map(|(pitch, passes)| Smoothing::of_rows(rows / pitch + 1, passes)),
             corners: VecDeque::new(),
             n_finished: 0,
             lines: lines(&mut planes, columns),
@@ -275,12 +286,12 @@ impl<'a, const N: usize> Painter<'a, N> {
             let places = [(0, column), (0, column + 1), (1, column), (1, column + 1)];
             let looks = places.map(|(side, column)| &corners[side].looks[column]);
             let [first, rest @ ..] = looks;
-            let differs = if rest.iter().all(|look| look.is_like(first, self.bright)) {
-                0
-            } else if rest.iter().all(|look| look.guide.key == first.guide.key) {
-                1
-            } else {
-                2
+            let are_within = |step: f32| rest.iter().all(|look| look.is_like(first, step, self.bright));
+            let differs = match rest.iter().all(|look| look.guide.key == first.guide.key) {
+                true if are_within(SAME) => 0,
+                true if are_within(MUCH_THE_SAME) => 1,
+                true => 2,
+                false => 3,
             };
             let (n_within, share) = self.effort.within[differs];
             let within: Vec<Look<N>> = POINTS[..n_within]

@@ -3,8 +3,6 @@
 mod leaves;
 mod pattern;
 
-pub(crate) use pattern::patch_at;
-
 use dioptric_spectrum::{
     Illuminant, Observer, Quantity, SpectralImage, Spectrum, WavelengthGrid, color_checker_reflectances,
 };
