@@ -4,4 +4,4 @@
 
 use libfuzzer_sys::fuzz_target;
 
-fuzz_target!(|data: &[u8]| dioptric_fuzz::read(data, "hdr", |path| dioptric_scene::read_envi(path).is_ok()));
+fuzz_target!(|data: &[u8]| dioptric_fuzz::read(data, "hdr", |path| dioptric_scene::read_scene(path, &dioptric_scene::ReadOptions::default()).is_ok()));

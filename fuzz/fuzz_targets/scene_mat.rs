@@ -4,4 +4,4 @@
 
 use libfuzzer_sys::fuzz_target;
 
-fuzz_target!(|data: &[u8]| dioptric_fuzz::read(data, "mat", |path| dioptric_scene::read_iset_mat(path).is_ok()));
+fuzz_target!(|data: &[u8]| dioptric_fuzz::read(data, "mat", |path| dioptric_scene::read_scene(path, &dioptric_scene::ReadOptions::default()).is_ok()));

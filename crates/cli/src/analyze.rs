@@ -128,7 +128,7 @@ fn tables(analysis: &LensAnalysis) -> Result<String, std::fmt::Error> {
     text += "\n";
     text += &field_table(analysis);
     text += "\n";
-    text += &line(&["λ nm", "axial mm", "by spot mm"].map(str::to_owned));
+    text += &line(&["λ nm", "axial mm", "by spot mm"].map(|name| in_units(name, analysis)));
     for row in &analysis.axial_color {
         text += &line(&[
             format!("{:.2}", row.wavelength_nm),
@@ -142,9 +142,15 @@ fn tables(analysis: &LensAnalysis) -> Result<String, std::fmt::Error> {
 /// Returns the part about the whole lens.
 fn head(analysis: &LensAnalysis) -> Result<String, std::fmt::Error> {
     let LensAnalysis { lens, efl_mm, f_number, film_distance_mm, film, .. } = analysis;
-    let mut text = format!(
-        "{lens}: f = {efl_mm:.4} mm, f/{f_number:.3}, film {film_distance_mm:.4} mm behind the last vertex: {film}\n"
-    );
+    let mut text = match &analysis.afocal {
+        Some(view) => format!(
+            "{lens}: afocal, exit pupil {:.4} mm across, {:.4} mm behind the last vertex\n",
+            view.exit_pupil_diameter_mm, view.exit_pupil_z_mm
+        ),
+        None => format!(
+            "{lens}: f = {efl_mm:.4} mm, f/{f_number:.3}, film {film_distance_mm:.4} mm behind the last vertex: {film}\n"
+        ),
+    };
     if let Some(x) = analysis.x_plane {
         writeln!(text, "along x: f = {:.4} mm, f/{:.3}", x.efl_mm, x.f_number)?;
     }
@@ -184,7 +190,7 @@ fn spot_table(analysis: &LensAnalysis) -> String {
     let header = [
         "field",
         "λ nm",
-        "height mm",
+        height_header(analysis),
         "rms µm",
         "chief µm",
         "radius µm",
@@ -194,13 +200,13 @@ fn spot_table(analysis: &LensAnalysis) -> String {
         "rms waves",
         "Strehl",
     ];
-    let mut text = line(&header.map(str::to_owned));
+    let mut text = line(&header.map(|name| in_units(name, analysis)));
     for spot in &analysis.spots {
         let wavefront = spot.wavefront.as_ref();
         text += &line(&[
             field_cell(&spot.place),
             format!("{:.2}", spot.wavelength_nm),
-            cell(spot.height_mm, 4),
+            height_cell(spot.height_mm, analysis),
             cell(spot.rms_um, 3),
             cell(spot.rms_about_chief_um, 3),
             cell(spot.radius_um, 3),
@@ -217,8 +223,8 @@ fn spot_table(analysis: &LensAnalysis) -> String {
 fn field_table(analysis: &LensAnalysis) -> String {
     let is_round = analysis.x_plane.is_none();
     let (first, second) = if is_round { ("sag. mm", "tan. mm") } else { ("x foc. mm", "y foc. mm") };
-    let header = ["field", "height mm", "f tan θ %", "f θ %", first, second, "light"];
-    let mut text = line(&header.map(str::to_owned));
+    let header = ["field", height_header(analysis), "f tan θ %", "f θ %", first, second, "light"];
+    let mut text = line(&header.map(|name| in_units(name, analysis)));
     let foci = |row: &FieldRow| match is_round {
         true => [row.sagittal_focus_mm, row.tangential_focus_mm],
         false => [row.x_focus_mm, row.y_focus_mm],
@@ -227,7 +233,7 @@ fn field_table(analysis: &LensAnalysis) -> String {
         let [first, second] = foci(row).map(|focus| cell(focus, 4));
         text += &line(&[
             field_cell(&row.place),
-            cell(row.height_mm, 4),
+            height_cell(row.height_mm, analysis),
             cell(row.distortion_tangent_percent, 4),
             cell(row.distortion_angle_percent, 4),
             first,
@@ -236,6 +242,26 @@ fn field_table(analysis: &LensAnalysis) -> String {
         ]);
     }
     text
+}
+
+/// Returns the head of a column of heights: of light that leaves in parallel, of angles.
+fn height_header(analysis: &LensAnalysis) -> &'static str {
+    if analysis.afocal.is_some() { "angle °" } else { "height mm" }
+}
+
+fn height_cell(height_mm: Option<f64>, analysis: &LensAnalysis) -> String {
+    let value = height_mm.map(|height_mm| analysis.afocal.map_or(height_mm, |view| view.angle_deg(height_mm)));
+    cell(value, 4)
+}
+
+/// Returns the head of a column in the units of what is analyzed: on the film of the ideal lens of 1000 mm behind an afocal lens 1 µm is
+/// 1 µrad, and 1 mm of focus 1/1000 dioptre.
+fn in_units(name: &str, analysis: &LensAnalysis) -> String {
+    match analysis.afocal {
+        // Columns have room for ten letters.
+        Some(_) => name.replace("radius µm", "max µrad").replace("µm", "µrad").replace("mm", "mD"),
+        None => name.to_owned(),
+    }
 }
 
 /// Returns the name of a field: degrees with three decimals where it lies above the axis.

@@ -163,7 +163,7 @@ pub(crate) enum QualityKind {
 pub(crate) struct RunArgs {
     /// The camera file; without it, the built-in demo camera
     pub(crate) camera: Option<PathBuf>,
-    /// Scene to photograph: spectral EXR, ENVI, .mat, .npy, TIFF stack, folder of band pictures, or a picture
+    /// Scene to photograph: spectral EXR, ENVI, .mat, .h5, .npy, .npz, TIFF stack, folder of band pictures, table of reflectances (.csv), or a picture
     #[arg(long, value_name = "FILE", help_heading = heading::SCENE)]
     pub(crate) scene: Option<PathBuf>,
     /// Folder for the results [default: dioptric-out; with --from DIR, DIR-changed]

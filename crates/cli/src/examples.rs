@@ -56,7 +56,14 @@ const EXAMPLES: &[(&str, &[&str])] = &[
     ("sweep", &["dioptric sweep --init -o plan.ron", "dioptric sweep plan.ron --shard 3/16"]),
     ("sweep index", &["dioptric sweep index plan.ron"]),
     ("sweep pack", &["dioptric sweep pack plan.ron --webdataset pictures.tar --items-per-tar 1000"]),
-    ("measure mtf", &["dioptric measure mtf edge.png --region 20,20,120,120 --out edge/"]),
+    (
+        "measure mtf",
+        &["dioptric measure mtf edge.png --region 20,20,120,120 --out edge/", "dioptric measure mtf chart.png --all"],
+    ),
+    ("measure star", &["dioptric measure star star.png --cycles 72 --binary --modulation 0.8"]),
+    ("measure grid", &["dioptric measure grid dots.png --out distortion/"]),
+    ("measure shading", &["dioptric measure shading even.dng"]),
+    ("measure steps", &["dioptric measure steps gray.png --steps gray.csv"]),
     ("measure spot", &["dioptric measure spot stars.png --pixel-um 3.45"]),
     (
         "measure region",

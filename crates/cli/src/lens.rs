@@ -4,8 +4,8 @@ use std::{fmt::Write, fs, path::Path};
 
 use anyhow::Context;
 use dioptric_analysis::{
-    ConfigurationData, FilmPlace, FilmUse, LensData, LensInfoRequest, SurfaceRow, built_in_lenses, convert_lens,
-    ends_of, placement_lines, surface_rows,
+    AfocalView, ConfigurationData, ConvertedLens, FilmPlace, FilmUse, LensData, LensInfoRequest, SurfaceRow,
+    built_in_lenses, convert_lens, ends_of, placement_lines, surface_rows,
 };
 use dioptric_files::{Staged, write};
 use dioptric_pipeline::{
@@ -71,14 +71,18 @@ fn convert(
     common: &Common,
 ) -> anyhow::Result<()> {
     let converted = convert_lens(input, output, reading)?;
+    if is_strict && !converted.unread.is_empty() {
+        let losses = converted.unread.join("; ");
+        anyhow::bail!("{input}: not all that the file says is read, which --strict asks for: {losses}");
+    }
     if is_strict && !converted.losses.is_empty() {
         let (output, losses) = (output.display(), converted.losses.join("; "));
         anyhow::bail!("{output}: the format does not hold all of {input}, which --strict asks for: {losses}");
     }
-    if let Some(glasses) = converted.glasses {
+    if let Some(glasses) = &converted.glasses {
         let beside = output.with_extension("agf");
         // A catalogue that is not this lens's own is left alone.
-        if fs::read_to_string(&beside).is_ok_and(|there| there != glasses) || beside.is_dir() {
+        if fs::read_to_string(&beside).is_ok_and(|there| there != *glasses) || beside.is_dir() {
             let beside = beside.display();
             anyhow::bail!(
                 "{beside}: the lens needs a glass catalogue of this name, which is there already; choose another name"
@@ -89,9 +93,19 @@ fn convert(
     }
     write(output, converted.text.as_bytes())?;
     tell(&converted.notes, common);
-    tell(&converted.losses, common);
     remark(common.quiet, &format!("wrote {}", output.display()));
+    if let Some(table) = loss_table(&converted) {
+        remark(common.quiet, &table);
+    }
     Ok(())
+}
+
+/// Lists what of a lens is not in the file written, and where it was lost; `None` where nothing was.
+fn loss_table(converted: &ConvertedLens) -> Option<String> {
+    let of =
+        |step: &str, lost: &[String]| -> Vec<String> { lost.iter().map(|what| format!("  {step}  {what}")).collect() };
+    let lines: Vec<String> = [of("reading", &converted.unread), of("writing", &converted.losses)].concat();
+    (!lines.is_empty()).then(|| format!("not carried over as the file read has it:\n{}", lines.join("\n")))
 }
 
 fn list(common: &Common) -> anyhow::Result<()> {
@@ -150,6 +164,7 @@ fn info(arguments: &LensInfoArgs, common: &Common) -> anyhow::Result<()> {
             })
         })
         .collect::<Result<_, _>>()?;
+    tell(&Vec::from_iter(data.iter().find_map(LensData::note_on_light)), common);
     if common.json {
         return print_json(&data);
     }
@@ -294,15 +309,22 @@ fn draw(arguments: &LensDrawArgs, common: &Common) -> anyhow::Result<()> {
     tell(&used.lens.notes_on_glass_range(&wavelengths_nm), common);
     let focus_nm = if asked_nm.is_none() { used.wavelengths_or(&USUAL_NM) } else { wavelengths_nm.clone() };
     let of = FilmUse { wavelengths_nm: &focus_nm, reference_nm: wavelength_nm, distance_mm };
-    let FilmPlace { distance_mm: film_distance_mm, origin } = arguments.film.of(&used).place(&used.lens, of)?;
-    remark(common.quiet, &format!("film {film_distance_mm:.4} mm behind the last vertex: {origin}"));
-    let drawing = LensDrawing {
-        fields_deg,
-        distance_mm,
-        wavelengths_nm,
-        film_distance_mm,
-        film_label: format!("film: {origin}"),
+    let film = arguments.film.of(&used);
+    let (film_distance_mm, film_label) = match AfocalView::of(&used.lens, film, &of)? {
+        Some(view) => {
+            let depth_mm = used.lens.vertices_z_mm().into_iter().fold(0.0, |deepest: f64, z_mm| deepest.max(z_mm));
+            let drawn_to_mm = view.drawn_to_mm(depth_mm.max(used.lens.front_semi_aperture_mm()));
+            let words = "light leaves in parallel".to_owned();
+            remark(common.quiet, &format!("{words}: drawn to {drawn_to_mm:.4} mm behind the last vertex"));
+            (drawn_to_mm, words)
+        }
+        None => {
+            let FilmPlace { distance_mm, origin } = film.place(&used.lens, of)?;
+            remark(common.quiet, &format!("film {distance_mm:.4} mm behind the last vertex: {origin}"));
+            (distance_mm, format!("film: {origin}"))
+        }
     };
+    let drawing = LensDrawing { fields_deg, distance_mm, wavelengths_nm, film_distance_mm, film_label };
     let path = &arguments.output;
     let bytes = drawing_file(&drawing.to_svg(&used.lens)?, path)?;
     fs::write(staged.path(), bytes).with_context(|| format!("cannot write {}", path.display()))?;

@@ -25,7 +25,7 @@ pub(crate) enum LensCommand {
         input: String,
         /// File to write; a .zmx file of a lens with glasses of its own gets a catalogue (.agf) beside it
         output: PathBuf,
-        /// Refuses to leave out anything that the format has no place for
+        /// Refuses to leave out anything: what of the file read is not understood, or what the format written has no place for
         #[arg(long)]
         strict: bool,
         #[command(flatten)]
@@ -127,6 +127,10 @@ pub(crate) struct LensFilmArgs {
     /// image plane]
     #[arg(long)]
     best_focus: bool,
+    /// Looks at light that leaves in parallel, or nearly so, by its angles: through an ideal lens of 1000 mm right behind the last
+    /// surface, in focus for parallel light [default of lenses that form no image, there with the best focus]
+    #[arg(long)]
+    afocal: bool,
 }
 
 impl LensFilmArgs {
@@ -136,6 +140,7 @@ impl LensFilmArgs {
             (Some(film_mm), _) => AnalysisFilm::FilmMm(film_mm),
             (None, Some(distance_mm)) => AnalysisFilm::FocusMm(distance_mm),
             (None, None) if self.best_focus => AnalysisFilm::BestFocus,
+            (None, None) if self.afocal => AnalysisFilm::Afocal,
             (None, None) => used.film(),
         }
     }

@@ -17,6 +17,8 @@ mod lens_args;
 mod light_field;
 mod measure;
 mod measure_args;
+mod measure_charts;
+mod measure_output;
 mod memory;
 mod movement_args;
 mod paintings;

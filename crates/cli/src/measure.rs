@@ -1,22 +1,20 @@
 //! `dioptric measure`: a laboratory's measurements of pictures, frames and sensors.
 
-use std::{fmt::Write, path::Path};
+use std::fmt::Write;
 
 use dioptric_analysis::measure::{
-    BenchRequest, ChartMeasurement, ChartRequest, CodeCurve, CompareRequest, Comparison, EdgeMeasurement, EdgeRequest,
-    Measurement, NoiseData, PictureViewing, PixelRegion, PointRequest, PointSet, RegionMeasurement, RegionRequest,
-    TextureCurve, TextureMeasurement, TextureNoiseRequest, TextureRequest, measure_bench, measure_frames,
-    notes_on_picture,
+    BenchRequest, ChartMeasurement, ChartRequest, CompareRequest, Comparison, EdgeMeasurement, EdgeRequest, NoiseData,
+    PictureViewing, PixelRegion, PointRequest, PointSet, RegionMeasurement, RegionRequest, TextureCurve,
+    TextureMeasurement, TextureNoiseRequest, TextureRequest, measure_bench, measure_frames, notes_on_picture,
 };
 use dioptric_pipeline::{SensorSpec, Staged, open_display, parse_illuminant};
-
-use dioptric_report::{MeasurementWords, write_measurement};
 
 use crate::{
     args::Common,
     lens::tell,
-    measure_args::{ColorArgs, CurveKind, MeasureCommand, MtfArgs, NoiseArgs, RegionArgs, SpotArgs, TextureArgs},
-    terminal::{print, print_json, remark_on_png},
+    measure_args::{ColorArgs, MeasureCommand, MtfArgs, NoiseArgs, RegionArgs, SpotArgs, TextureArgs},
+    measure_charts,
+    measure_output::{Finish, curve, file_name, or_dash},
 };
 
 /// The seed where the user gives none.
@@ -27,6 +25,10 @@ pub(crate) fn run(command: &MeasureCommand, common: &Common) -> anyhow::Result<(
         MeasureCommand::Mtf(arguments) => mtf(arguments, common),
         MeasureCommand::Texture(arguments) => texture(arguments, common),
         MeasureCommand::Spot(arguments) => spot(arguments, common),
+        MeasureCommand::Star(arguments) => measure_charts::star(arguments, common),
+        MeasureCommand::Grid(arguments) => measure_charts::grid(arguments, common),
+        MeasureCommand::Shading(arguments) => measure_charts::shading(arguments, common),
+        MeasureCommand::Steps(arguments) => measure_charts::steps(arguments, common),
         MeasureCommand::Region(arguments) => region(arguments, common),
         MeasureCommand::Noise(arguments) => noise(arguments, common),
         MeasureCommand::Color(arguments) => color(arguments, common),
@@ -34,15 +36,19 @@ pub(crate) fn run(command: &MeasureCommand, common: &Common) -> anyhow::Result<(
 }
 
 fn mtf(arguments: &MtfArgs, common: &Common) -> anyhow::Result<()> {
-    tell(&notes_on_picture(&arguments.picture), common);
+    let curve = curve(arguments.picture_args.curve);
+    tell(&notes_on_picture(&arguments.picture, curve), common);
     let request = EdgeRequest {
         region: arguments.region.as_deref().map(PixelRegion::parse).transpose()?,
         side: arguments.size,
         mosaic: arguments.mosaic.clone(),
         pixel_um: arguments.pixel_um,
         pixels_per_degree: arguments.pixels_per_degree,
-        curve: curve(arguments.picture_args.curve),
+        curve,
     };
+    if arguments.all {
+        return measure_charts::edges(request, arguments, common);
+    }
     let finish = Finish::new(
         ("mtf", "Edge response"),
         file_name(&arguments.picture),
@@ -53,7 +59,7 @@ fn mtf(arguments: &MtfArgs, common: &Common) -> anyhow::Result<()> {
 }
 
 fn texture(arguments: &TextureArgs, common: &Common) -> anyhow::Result<()> {
-    tell(&notes_on_picture(&arguments.picture), common);
+    tell(&notes_on_picture(&arguments.picture, curve(arguments.picture_args.curve)), common);
     let region = |text: &Option<String>| text.as_deref().map(PixelRegion::parse).transpose();
     let request = TextureRequest {
         reference: arguments.reference.clone(),
@@ -72,7 +78,7 @@ fn texture(arguments: &TextureArgs, common: &Common) -> anyhow::Result<()> {
 }
 
 fn spot(arguments: &SpotArgs, common: &Common) -> anyhow::Result<()> {
-    tell(&notes_on_picture(&arguments.picture), common);
+    tell(&notes_on_picture(&arguments.picture, curve(arguments.picture_args.curve)), common);
     let request = PointRequest {
         window: arguments.window,
         pixel_um: arguments.pixel_um,
@@ -85,7 +91,7 @@ fn spot(arguments: &SpotArgs, common: &Common) -> anyhow::Result<()> {
 }
 
 fn region(arguments: &RegionArgs, common: &Common) -> anyhow::Result<()> {
-    tell(&notes_on_picture(&arguments.picture), common);
+    tell(&notes_on_picture(&arguments.picture, curve(arguments.picture_args.curve)), common);
     let parsed = |text: &Option<String>| text.as_deref().map(PixelRegion::parse).transpose();
     let request = RegionRequest {
         region: parsed(&arguments.region)?,
@@ -127,12 +133,13 @@ fn noise(arguments: &NoiseArgs, common: &Common) -> anyhow::Result<()> {
         }
         (None, None) => anyhow::bail!("frames or --sensor are needed"),
     };
+    tell(&data.notes, common);
     finish.with(&data, noise_table)
 }
 
 fn color(arguments: &ColorArgs, common: &Common) -> anyhow::Result<()> {
-    tell(&notes_on_picture(&arguments.picture), common);
     let curve = curve(arguments.picture_args.curve);
+    tell(&notes_on_picture(&arguments.picture, curve), common);
     let out = arguments.picture_args.out.as_deref();
     if let Some(against) = &arguments.against {
         let request = CompareRequest {
@@ -160,64 +167,6 @@ fn viewing(arguments: &ColorArgs) -> anyhow::Result<PictureViewing> {
         }
         None => PictureViewing::PixelsPerDegree(arguments.pixels_per_degree),
     })
-}
-
-fn curve(kind: CurveKind) -> CodeCurve {
-    match kind {
-        CurveKind::ByFile => CodeCurve::ByFile,
-        CurveKind::Linear => CodeCurve::Linear,
-        CurveKind::Srgb => CodeCurve::Srgb,
-    }
-}
-
-/// What becomes of a measurement: files in a folder, and numbers on standard output.
-struct Finish<'a> {
-    name: &'static str,
-    title: &'static str,
-    /// What is measured, as the user named it.
-    subject: String,
-    common: &'a Common,
-    staged: Option<Staged>,
-}
-
-impl<'a> Finish<'a> {
-    /// Tries the place before the work.
-    fn new(
-        (name, title): (&'static str, &'static str),
-        subject: String,
-        folder: Option<&Path>,
-        common: &'a Common,
-    ) -> anyhow::Result<Self> {
-        let staged = folder.map(Staged::folder).transpose()?;
-        Ok(Self { name, title, subject, common, staged })
-    }
-
-    fn with<M: Measurement>(
-        self,
-        measured: &M,
-        table: impl Fn(&M) -> Result<String, std::fmt::Error>,
-    ) -> anyhow::Result<()> {
-        let table = table(measured)?;
-        if let Some(staged) = self.staged {
-            let words = MeasurementWords { name: self.name, title: self.title, subject: &self.subject, table: &table };
-            write_measurement(measured, &words, staged.path())?;
-            staged.commit()?;
-            remark_on_png(self.common.quiet);
-        }
-        match (self.common.json, self.common.quiet) {
-            (true, _) => print_json(measured),
-            (false, true) => Ok(()),
-            (false, false) => print(&table),
-        }
-    }
-}
-
-fn file_name(path: &Path) -> String {
-    path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
-}
-
-fn or_dash(value: Option<f64>, digits: usize) -> String {
-    value.map_or_else(|| "–".to_owned(), |v| format!("{v:.digits$}"))
 }
 
 fn mtf_table(measured: &EdgeMeasurement) -> Result<String, std::fmt::Error> {
@@ -258,6 +207,14 @@ fn mtf_table(measured: &EdgeMeasurement) -> Result<String, std::fmt::Error> {
     }
     for channel in &measured.not_measured {
         writeln!(text, "{:<12} {}", channel.channel, channel.reason)?;
+    }
+    let shading = measured.channels.iter().map(|channel| channel.shading).fold(0.0, f64::max);
+    if shading > 0.0 {
+        writeln!(
+            text,
+            "\nlight changes by up to {:.1} % of the step beside the edge, which was taken off; even light is more certain",
+            100.0 * shading
+        )?;
     }
     if measured.clipped_share > TOLD_CLIPPED {
         writeln!(
@@ -407,13 +364,15 @@ fn noise_table(data: &NoiseData) -> Result<String, std::fmt::Error> {
     for (name, measured, expected, digits) in [
         ("system gain K, DN/e", Some(data.gain_dn_per_e), sheet.map(|s| s.gain_dn_per_e), 5),
         ("quantum efficiency", data.quantum_efficiency, sheet.map(|s| s.quantum_efficiency), 4),
-        (dark_noise, Some(data.dark_noise_e), sheet.map(|s| s.dark_noise_e), 3),
-        ("saturation, e", Some(data.saturation_e), sheet.map(|s| s.saturation_e), 0),
+        (dark_noise, data.dark_noise_e, sheet.map(|s| s.dark_noise_e), 3),
+        ("saturation, e", data.saturation_e, sheet.map(|s| s.saturation_e), 0),
         ("DSNU, e", data.dsnu_e, sheet.map(|s| s.dsnu_e), 3),
+        ("  ± one standard error", data.dsnu_error_e, None, 3),
         ("  of rows", data.dsnu_parts_e.map(|p| p.row), None, 3),
         ("  of columns", data.dsnu_parts_e.map(|p| p.column), None, 3),
         ("  of single pixels", data.dsnu_parts_e.map(|p| p.pixel), None, 3),
         ("PRNU, %", data.prnu_percent, sheet.map(|s| s.prnu_percent), 3),
+        ("  ± one standard error", data.prnu_error_percent, None, 3),
         ("  of rows", data.prnu_parts_percent.map(|p| p.row), None, 3),
         ("  of columns", data.prnu_parts_percent.map(|p| p.column), None, 3),
         ("  of single pixels", data.prnu_parts_percent.map(|p| p.pixel), None, 3),
@@ -428,9 +387,9 @@ fn noise_table(data: &NoiseData) -> Result<String, std::fmt::Error> {
             3,
         ),
         ("absolute threshold, photons", data.threshold_photons, None, 2),
-        ("largest SNR, dB", Some(data.max_snr_db), None, 2),
-        ("dynamic range, dB", Some(data.dynamic_range_db), None, 2),
-        ("dynamic range, stops", Some(data.dynamic_range_stops), None, 2),
+        ("largest SNR, dB", data.max_snr_db, None, 2),
+        ("dynamic range, dB", data.dynamic_range_db, None, 2),
+        ("dynamic range, stops", data.dynamic_range_stops, None, 2),
         ("ISO by saturation (D55)", None, sheet.map(|s| s.iso_by_saturation), 1),
         ("ISO by noise, SNR 40", None, sheet.and_then(|s| s.iso_by_noise_40), 1),
         ("ISO by noise, SNR 10", None, sheet.and_then(|s| s.iso_by_noise_10), 1),

@@ -13,6 +13,14 @@ pub(crate) enum MeasureCommand {
     Texture(TextureArgs),
     /// Pictures of points: centroid, second moments, encircled energy
     Spot(SpotArgs),
+    /// Response of a Siemens star, sinusoidal or black and white: MTF50, MTF10 of each channel and segment
+    Star(StarArgs),
+    /// Distortion (ISO 17850) and lateral color (ISO 19084) of a grid of dots
+    Grid(GridArgs),
+    /// Shading of an even plane in luminance and color (ISO 17957)
+    Shading(ShadingArgs),
+    /// Gray steps of known luminance: conversion (ISO 14524), noise and dynamic range (ISO 15739)
+    Steps(StepsArgs),
     /// Numbers of a region: mean, noise, percentiles, uniformity, profiles, color
     Region(RegionArgs),
     /// Photon transfer after EMVA 1288, of flat and dark frames or of a sensor on a simulated bench
@@ -36,7 +44,7 @@ pub(crate) struct PictureArgs {
 /// How samples stand for light.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum CurveKind {
-    /// Linear for 16-bit gray, EXR and DNG, sRGB for everything else
+    /// Linear for 16-bit gray, EXR and DNG; for everything else the curve that the file states, or sRGB
     ByFile,
     /// Linear
     Linear,
@@ -52,9 +60,12 @@ pub(crate) struct MtfArgs {
     /// Where the edge is, pixels [default: the most edge-like square of the picture]
     #[arg(long, value_name = "x,y,w,h")]
     pub(crate) region: Option<String>,
-    /// Side of the square that is looked for, pixels [default: 64 samples of a channel]
+    /// Side of the square that is looked for, pixels [default: 64 samples of a channel, more where noise asks for it]
     #[arg(long, value_name = "N", conflicts_with = "region")]
     pub(crate) size: Option<usize>,
+    /// Measure every slanted edge of the picture: the response over the field
+    #[arg(long, conflicts_with = "region")]
+    pub(crate) all: bool,
     /// Mosaic of a raw frame, a letter a filter from the top left pixel on, e.g. RGGB
     #[arg(long, value_name = "LETTERS")]
     pub(crate) mosaic: Option<String>,
@@ -108,6 +119,61 @@ pub(crate) struct SpotArgs {
     /// Light between the points, highest code 1 [default: the median of the picture]
     #[arg(long, value_name = "L")]
     pub(crate) background: Option<f64>,
+    /// The picture and the results
+    #[command(flatten)]
+    pub(crate) picture_args: PictureArgs,
+}
+
+/// A Siemens star.
+#[derive(Debug, Args)]
+pub(crate) struct StarArgs {
+    /// Picture: PNG, TIFF, JPEG, EXR
+    pub(crate) picture: PathBuf,
+    /// The square about the star, pixels [default: all of the picture]
+    #[arg(long, value_name = "x,y,w,h")]
+    pub(crate) region: Option<String>,
+    /// Cycles of the star, 8 to 360 [default: the strongest wave about its center]
+    #[arg(long, value_name = "N")]
+    pub(crate) cycles: Option<usize>,
+    /// The star is black and white, not sinusoidal
+    #[arg(long)]
+    pub(crate) binary: bool,
+    /// Modulation of the star itself, (most − least) / (most + least) [default: the response is 1 at the coarsest ring]
+    #[arg(long, value_name = "M")]
+    pub(crate) modulation: Option<f64>,
+    /// The picture and the results
+    #[command(flatten)]
+    pub(crate) picture_args: PictureArgs,
+}
+
+/// A grid of dots.
+#[derive(Debug, Args)]
+pub(crate) struct GridArgs {
+    /// Picture of dots, brighter or darker than what lies between them: PNG, TIFF, JPEG, EXR
+    pub(crate) picture: PathBuf,
+    /// The picture and the results
+    #[command(flatten)]
+    pub(crate) picture_args: PictureArgs,
+}
+
+/// An even plane.
+#[derive(Debug, Args)]
+pub(crate) struct ShadingArgs {
+    /// Picture or raw frame of an even plane: PNG, TIFF, JPEG, EXR, DNG
+    pub(crate) picture: PathBuf,
+    /// The picture and the results
+    #[command(flatten)]
+    pub(crate) picture_args: PictureArgs,
+}
+
+/// Gray steps.
+#[derive(Debug, Args)]
+pub(crate) struct StepsArgs {
+    /// Picture or raw frame of the steps: PNG, TIFF, JPEG, EXR, DNG
+    pub(crate) picture: PathBuf,
+    /// Table of the steps: a header x,y,w,h,luminance and a line a step, pixels and cd/m² or any unit that all share
+    #[arg(long, value_name = "FILE.csv")]
+    pub(crate) steps: PathBuf,
     /// The picture and the results
     #[command(flatten)]
     pub(crate) picture_args: PictureArgs,

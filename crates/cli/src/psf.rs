@@ -138,7 +138,7 @@ fn points(arguments: &PsfArgs, used: &LensDefaults, common: &Common) -> anyhow::
             taken.push(format!("an object at {} mm", list_of(&[used.distance_mm])));
             vec![used.distance_mm]
         }
-        None if film == AnalysisFilm::BestFocus => vec![f64::INFINITY],
+        None if matches!(film, AnalysisFilm::BestFocus | AnalysisFilm::Afocal) => vec![f64::INFINITY],
         None => vec![USUAL_DISTANCE_MM],
     };
     let focus_nm = if asked_nm.is_none() { used.wavelengths_or(&USUAL_NM) } else { Vec::new() };
@@ -220,7 +220,14 @@ fn table(set: &PsfSet, rows: &[PsfRow]) -> Result<String, std::fmt::Error> {
             write!(text, "{:>31} waves {:.0} %", "model", 100.0 * share)?;
             writeln!(text, "{}", row.strehl.map_or_else(String::new, |strehl| format!(", Strehl ratio {strehl:.4}")))?;
         }
-        if row.measured_on != "picture" {
+        if row.measured_on == "coarser pixels" {
+            let share = 100.0 * row.picture_share;
+            writeln!(
+                text,
+                "{:>31} holds {share:.1} % of the light: LSF and EE50 are of all, on coarser pixels",
+                "picture"
+            )?;
+        } else if row.measured_on != "picture" {
             writeln!(text, "{:>31} LSF, EE50 and MTF by {}, free of pixels", "measured", row.measured_on)?;
         }
         if let Some(reason) = &row.fallback {

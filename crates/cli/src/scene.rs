@@ -1,4 +1,4 @@
-//! `dioptric scene`: what a file of a scene holds, and spectral EXR of it.
+//! `dioptric scene`: what a file of a scene holds, and spectral EXR or a file of ISETCam of it.
 
 use std::{fmt::Write as _, path::PathBuf};
 
@@ -17,14 +17,14 @@ use crate::{
 pub(crate) enum SceneCommand {
     /// Says what a file of a scene holds, how it is understood and what of it is not used
     Info(SceneInfoArgs),
-    /// Writes a scene, or a part of it, as spectral EXR
+    /// Writes a scene, or a part of it, as spectral EXR or for ISETCam
     Convert(SceneConvertArgs),
 }
 
 /// A file of a scene, and what of it is wanted.
 #[derive(Debug, Args)]
 pub(crate) struct SceneArgs {
-    /// Scene: spectral EXR, ENVI, .mat, .npy, TIFF stack, folder of band pictures, or a picture
+    /// Scene: spectral EXR, ENVI, .mat, .h5, .npy, .npz, TIFF stack, folder of band pictures, table of reflectances (.csv), or a picture
     pub(crate) file: PathBuf,
     #[command(flatten)]
     pub(crate) says: SceneFileArgs,
@@ -72,12 +72,12 @@ pub(crate) struct SceneInfoArgs {
 pub(crate) struct SceneConvertArgs {
     #[command(flatten)]
     pub(crate) scene: SceneArgs,
-    /// Scene to write: spectral radiance with depth and view, EXR
+    /// Scene to write: spectral radiance with depth and view, EXR; or .mat, as ISETCam has it
     #[arg(value_name = "OUT.exr")]
     pub(crate) out: PathBuf,
-    /// How the file holds its samples: single, half or uncompressed
-    #[arg(long, value_name = "KIND", default_value = "single")]
-    pub(crate) exr_samples: ExrSamples,
+    /// How an EXR file holds its samples: single, half or uncompressed [default: single]
+    #[arg(long, value_name = "KIND")]
+    pub(crate) exr_samples: Option<ExrSamples>,
 }
 
 pub(crate) fn run(command: &SceneCommand, common: &Common) -> anyhow::Result<()> {

@@ -4,7 +4,9 @@ use std::path::PathBuf;
 
 use anyhow::bail;
 use clap::Args;
-use dioptric_pipeline::{DepthKind, FileQuantity, FileReading, NoData, PipelineError, SceneSpec, parse_numbers};
+use dioptric_pipeline::{
+    DepthKind, FileQuantity, FileReading, NoData, Panorama, PipelineError, SceneSpec, parse_numbers,
+};
 
 /// What a scene's file does not state.
 #[derive(Clone, Debug, Default, Args)]
@@ -23,7 +25,11 @@ pub(crate) struct SceneFileArgs {
     /// Camera data of the scene: our JSON, `Open3D`'s, nerfstudio's, COLMAP's cameras.txt or `OpenCV`'s YAML
     #[arg(long, value_name = "FILE")]
     pub(crate) view: Option<PathBuf>,
-    /// What a cube's numbers are: radiance, reflectance or photons
+    /// Picture of all directions: equirectangular or cube, of which the field of view straight ahead is seen, or that `:YAW,PITCH`
+    /// degrees to the right and up
+    #[arg(long, value_name = "KIND")]
+    pub(crate) panorama: Option<Panorama>,
+    /// What a cube's numbers are: radiance, reflectance or photons; reflectance of a picture: its colors are those of things under a light
     #[arg(long, value_name = "WHAT")]
     pub(crate) quantity: Option<FileQuantity>,
     /// Unit of a cube's numbers, as W/m^2/sr/nm, uW/(cm^2 sr nm) or photons/s/m^2/sr/nm
@@ -38,7 +44,7 @@ pub(crate) struct SceneFileArgs {
     /// Center of each band of a file that does not state them, nm: a list or first:last:step
     #[arg(long, value_name = "LIST")]
     pub(crate) scene_wavelengths_nm: Option<String>,
-    /// Variable of a MATLAB file that holds the cube
+    /// Variable of a MATLAB, HDF5 or .npz file that holds the cube
     #[arg(long, value_name = "NAME")]
     pub(crate) variable: Option<String>,
     /// Order of the axes of an array: rows y, columns x and bands b, as yxb
@@ -78,6 +84,7 @@ impl SceneFileArgs {
             depth_unit: self.depth_unit.clone().or(own.depth_unit),
             depth_kind: self.depth_kind.or(own.depth_kind),
             view: self.view.clone().or(own.view),
+            panorama: self.panorama.or(own.panorama),
         };
         if reading.quantity == Some(FileQuantity::Reflectance) && reading.unit.is_some() {
             bail!("--unit is of light, expected it without --quantity reflectance");

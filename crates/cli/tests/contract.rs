@@ -483,6 +483,25 @@ fn glasses_of_a_lens_alone_are_converted_with_it() {
 }
 
 #[test]
+fn what_reading_and_writing_lose_is_one_table_that_strict_refuses() {
+    let folder = tempfile::tempdir().unwrap();
+    let lens = "RDM;LEN\nTITLE 'own'\nEPD 10\nWL 550\nYAN 0 5\nFOO 3\nSO 0 1E10\nS 50 5 NBK7_SCHOTT\n STO\nS -50 47\nSI 0\nGO\n";
+    fs::write(folder.path().join("own.seq"), lens).unwrap();
+    fs::write(folder.path().join("plain.seq"), lens.replace("FOO 3\n", "")).unwrap();
+    let said = dioptric(folder.path(), &["lens", "convert", "own.seq", "own.json"]);
+    let said = String::from_utf8_lossy(&said.stderr).into_owned();
+    assert!(said.contains("  reading  not understood") && said.contains("FOO (line 6)"), "{said}");
+    assert!(said.contains("  writing  a .json file has no place for"), "{said}");
+    let strict = |from: &str, to: &str, words: &[&str]| {
+        check_error(folder.path(), &["lens", "convert", from, to, "--strict"], words);
+        assert!(!folder.path().join(to).exists());
+    };
+    strict("own.seq", "a.zmx", &["own.seq: not all that the file says is read", "FOO (line 6)"]);
+    strict("plain.seq", "b.json", &["b.json: the format does not hold all of plain.seq", "fields"]);
+    output(folder.path(), &["lens", "convert", "plain.seq", "c.zmx", "--strict"]);
+}
+
+#[test]
 fn threads_change_no_bit_of_any_frame() {
     let folder = tempfile::tempdir().unwrap();
     let run = |threads: &str, out: &str| {

@@ -367,3 +367,86 @@ fn a_raw_file_is_measured_by_its_frame_and_its_mosaic() {
         &["raw.dng", "mosaic", "dioptric develop"],
     );
 }
+
+/// A PNG file of one color of 8 bits, with what `state` says of its colors.
+fn color_file(path: &Path, codes: [u8; 3], state: impl FnOnce(&mut png::Info<'_>)) {
+    let mut info = png::Info::with_size(64, 48);
+    (info.color_type, info.bit_depth) = (png::ColorType::Rgb, png::BitDepth::Eight);
+    state(&mut info);
+    let points = info.coding_independent_code_points;
+    let encoder = png::Encoder::with_info(fs::File::create(path).unwrap(), info).unwrap();
+    let mut writer = encoder.write_header().unwrap();
+    // The encoder leaves this chunk to its user.
+    if let Some(points) = points {
+        let numbers = [points.color_primaries, points.transfer_function, 0, 1];
+        writer.write_chunk(png::chunk::cICP, &numbers).unwrap();
+    }
+    writer.write_image_data(&codes.repeat(64 * 48)).unwrap();
+}
+
+/// The chromaticity of a picture's mean, and its luminance.
+fn color_of(folder: &Path, file: &str) -> [f64; 3] {
+    let color = &json(folder, &["measure", "region", file, "--json"])["color"];
+    [number(&color["xy"][0]), number(&color["xy"][1]), number(&color["xyz"][1])]
+}
+
+#[test]
+fn colors_are_those_that_a_file_states() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    // Pure primaries have the chromaticities of their standards: Display P3's red, Adobe RGB's green by gAMA and cHRM, BT.2020's blue by cICP.
+    let profile = dioptric_pictures::CodeSpace::DisplayP3.icc_profile();
+    color_file(&at("p3.png"), [255, 0, 0], |info| info.icc_profile = Some(profile.into()));
+    color_file(&at("adobe.png"), [0, 186, 0], |info| {
+        info.source_gamma = Some(png::ScaledFloat::new(1.0 / 2.2));
+        let primaries = ((0.3127, 0.329), (0.64, 0.33), (0.21, 0.71), (0.15, 0.06));
+        info.source_chromaticities =
+            Some(png::SourceChromaticities::new(primaries.0, primaries.1, primaries.2, primaries.3));
+    });
+    let points = |transfer_function: u8| png::CodingIndependentCodePoints {
+        color_primaries: 9,
+        transfer_function,
+        matrix_coefficients: 0,
+        is_video_full_range_image: true,
+    };
+    color_file(&at("2020.png"), [0, 0, 255], |info| info.coding_independent_code_points = Some(points(13)));
+    color_file(&at("pq.png"), [0, 0, 255], |info| info.coding_independent_code_points = Some(points(16)));
+    color_file(&at("plain.png"), [255, 0, 0], |_| ());
+    for (file, xy) in [
+        ("p3.png", [0.680, 0.320]),
+        ("adobe.png", [0.21, 0.71]),
+        ("2020.png", [0.131, 0.046]),
+        ("plain.png", [0.64, 0.33]),
+    ] {
+        let [x, y, _] = color_of(folder.path(), file);
+        assert!((x - xy[0]).abs() < 1e-3 && (y - xy[1]).abs() < 1e-3, "{file}: {x}, {y}");
+    }
+    // Half the light of the green: 186 / 255 to the power of 2.2.
+    let [.., luminance] = color_of(folder.path(), "adobe.png");
+    assert!((luminance / (0.6274 * (186.0_f64 / 255.0).powf(2.2)) - 1.0).abs() < 2e-3, "{luminance}");
+    check_error(folder.path(), &["measure", "region", "pq.png"], &["pq.png", "cICP 9, 16", "PQ"]);
+}
+
+#[test]
+fn photographs_become_scenes_of_their_own_colors() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let profile = dioptric_pictures::CodeSpace::DisplayP3.icc_profile();
+    // A color within both gamuts, as codes of each: linear (0.5, 0.4, 0.3) of P3 is by the matrix from P3 to sRGB (0.5225, 0.3942, 0.2894).
+    let code = |v: f64| (255.0 * (1.055 * v.powf(1.0 / 2.4) - 0.055)).round() as u8;
+    color_file(&at("p3.png"), [0.5, 0.4, 0.3].map(code), |info| info.icc_profile = Some(profile.clone().into()));
+    color_file(&at("srgb.png"), [0.5225, 0.3942, 0.2894].map(code), |_| ());
+    color_file(&at("red.png"), [255, 0, 0], |info| info.icc_profile = Some(profile.clone().into()));
+    let convert = |file: &str| {
+        let words = ["scene", "convert", file, "out.exr", "--depth-m", "2", "--fov-deg", "20"];
+        let said = output(folder.path(), &words);
+        let measured = json(folder.path(), &["measure", "region", "out.exr", "--json"]);
+        (said, [0, 1, 2].map(|i| number(&measured["color"]["xyz"][i])))
+    };
+    let ((_, p3), (_, srgb)) = (convert("p3.png"), convert("srgb.png"));
+    for (a, b) in p3.iter().zip(srgb) {
+        // A step of a code is 0.9 % of the light.
+        assert!((a / b - 1.0).abs() < 0.012, "{p3:?} {srgb:?}");
+    }
+    assert!(convert("red.png").1[0] > 0.0);
+}

@@ -179,5 +179,5 @@ fn large_pictures_are_read_as_fine_as_the_film_needs() {
     assert!(!is_refused, "{said}");
     assert!(mib < 700, "{mib} MiB");
     let report = fs::read_to_string(folder.path().join("out/report.json")).unwrap();
-    assert!(report.contains("6000 × 6000 pixels are read as"), "{report}");
+    assert!(report.contains("6000 × 6000 samples are read as"), "{report}");
 }

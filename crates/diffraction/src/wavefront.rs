@@ -1,12 +1,14 @@
 //! Wavefronts: by how much the paths of a pupil's rays differ from a perfect lens's.
 
-use dioptric_optics::{MonoLens, ObjectPoint, RayBatch, Vignetting, analysis::StopAim};
+use dioptric_optics::{
+    MonoLens, ObjectPoint, PupilPlane, RayBatch, Vignetting, analysis::StopAim, zernike::FRINGE_TERMS,
+};
 use glam::{DVec2, DVec3};
 
 use crate::{
     DiffractionError, PupilGrid,
     wave::{FilmRays, PupilCells, cis::cis},
-    zernike::{FRINGE_TERMS, fit, fringe, noll},
+    zernike::{fit, fringe, noll},
 };
 
 /// A sphere about a film point, up to which paths are counted.
@@ -193,21 +195,21 @@ impl Traced {
         film_distance_mm: f64,
         grid: PupilGrid,
     ) -> Result<Self, DiffractionError> {
-        let PupilCells { mut targets_mm, energy, z_mm, center_mm, .. } = PupilCells::find(lens, point, grid)
+        let PupilCells { mut targets_mm, energy, plane, center_mm, .. } = PupilCells::find(lens, point, grid)
             .ok_or(DiffractionError::NoLight { wavelength_nm: lens.wavelength_nm() })?;
 
         let is_clear = match lens.n_obscurations() {
             0 => vec![true; energy.len()],
             _ => {
-                let mut rays = lens.rays_towards(point, &targets_mm, z_mm, 0.0);
+                let mut rays = plane.rays(lens, point, &targets_mm);
                 lens.trace(&mut rays, Vignetting::On);
                 rays.fate.iter().map(|fate| fate.is_in_flight()).collect()
             }
         };
 
         // Of a strongly vignetted pupil the chief ray need not get through the rims.
-        targets_mm.push(chief_target_mm(lens, point, z_mm).unwrap_or(center_mm));
-        let mut rays = lens.rays_towards(point, &targets_mm, z_mm, 0.0);
+        targets_mm.push(chief_target_mm(lens, point, &plane).unwrap_or(center_mm));
+        let mut rays = plane.rays(lens, point, &targets_mm);
         let behind = lens.stop() + 1;
         lens.trace_surfaces(0..behind, &mut rays, Vignetting::Off);
         let stop_mm = lens.stop_semi_aperture_mm();
@@ -222,13 +224,12 @@ impl Traced {
     }
 }
 
-/// Returns where the ray to the middle of the stop crosses the plane `z_mm`, if it comes through.
-fn chief_target_mm(lens: &MonoLens, point: &ObjectPoint, z_mm: f64) -> Option<DVec2> {
+/// Returns where the ray to the middle of the stop crosses a plane, if it comes through.
+fn chief_target_mm(lens: &MonoLens, point: &ObjectPoint, plane: &PupilPlane) -> Option<DVec2> {
     let aim = StopAim::find(lens, point, &[DVec2::ZERO]);
-    let target_mm = aim.targets_mm()[0]?.extend(aim.z_mm());
-    let direction = point.direction_to(target_mm);
-    let target_mm = (target_mm + direction * ((z_mm - aim.z_mm()) / direction.z)).truncate();
-    let mut ray = lens.rays_towards(point, &[target_mm], z_mm, 0.0);
+    let aimed = aim.plane().rays(lens, point, &[aim.targets_mm()[0]?]);
+    let target_mm = plane.meets_mm(aimed.point_mm(0), aimed.direction(0));
+    let mut ray = plane.rays(lens, point, &[target_mm]);
     lens.trace(&mut ray, Vignetting::Off);
     ray.fate[0].is_in_flight().then_some(target_mm)
 }

@@ -4,22 +4,8 @@
 //! (from 1): piston, tilt x, tilt y, defocus, astigmatism at 45°, astigmatism along the axes, coma y, coma x,
 //! trefoil y, trefoil x, spherical aberration, …
 
+use dioptric_optics::zernike::{fringe_degrees, noll_degrees};
 use glam::DVec2;
-
-/// Returns the radial degree n and the azimuthal order m of Noll's `j`-th polynomial (from 1): m > 0 goes with
-/// cos mθ, m < 0 with sin |m|θ.
-pub fn noll_degrees(j: usize) -> (u32, i32) {
-    let j = j.max(1);
-    let mut n = 0;
-    while (n + 1) * (n + 2) / 2 < j {
-        n += 1;
-    }
-    // Within a degree the orders ascend, each above 0 in a pair; even j take the cosine.
-    let place = j - n * (n + 1) / 2 - 1;
-    let m = if n.is_multiple_of(2) { 2 * place.div_ceil(2) } else { 2 * (place / 2) + 1 };
-    let m = m as i32;
-    (n as u32, if j.is_multiple_of(2) { m } else { -m })
-}
 
 /// Returns Noll's `j`-th polynomial (from 1) at a point, in units of the disc's radius.
 pub fn noll(j: usize, at: DVec2) -> f64 {
@@ -33,25 +19,6 @@ pub fn noll(j: usize, at: DVec2) -> f64 {
         1.. => norm * std::f64::consts::SQRT_2 * radial(n, order, rho) * angular.cos(),
         _ => norm * std::f64::consts::SQRT_2 * radial(n, order, rho) * angular.sin(),
     }
-}
-
-/// How many polynomials the Fringe set has.
-pub const FRINGE_TERMS: usize = 37;
-
-/// Returns the radial degree n and the azimuthal order m of the `j`-th polynomial of the Fringe set (from 1, at most 37): m > 0 goes
-/// with cos mθ, m < 0 with sin |m|θ.
-///
-/// The set goes by n + |m|, those of each from the largest |m| down (Wyant and Creath 1992, Basic wavefront aberration theory,
-/// table III; the 37th is the spherical aberration of degree 12).
-pub fn fringe_degrees(j: usize) -> (u32, i32) {
-    let j = j.clamp(1, FRINGE_TERMS);
-    if j == FRINGE_TERMS {
-        return (12, 0);
-    }
-    let group = (j - 1).isqrt();
-    let place = j - 1 - group * group;
-    let m = (group - place / 2) as i32;
-    (2 * group as u32 - m as u32, if place % 2 == 1 { -m } else { m })
 }
 
 /// Returns the `j`-th polynomial of the Fringe set (from 1, at most 37) at a point, in units of the disc's radius: at most 1 at the edge.
@@ -139,7 +106,7 @@ mod tests {
     use std::f64::consts::{PI, TAU};
 
     use super::*;
-    use dioptric_optics::quadrature::gauss_legendre_on;
+    use dioptric_optics::{quadrature::gauss_legendre_on, zernike::FRINGE_TERMS};
 
     fn disc() -> (Vec<DVec2>, Vec<f64>) {
         let radii = gauss_legendre_on(16, 0.0, 1.0);

@@ -251,7 +251,9 @@ fn unknown_places_of_a_layer_are_guessed() {
         rms((part(&half) - part(other)).iter().map(|v| f64::from(*v)))
     };
     assert!(rms_between(0..far, &known) < 1e-3 * rms_between(0..far, &guessed));
-    assert!(rms_between(3 * far..4 * far, &guessed) < 1e-3 * rms_between(3 * far..4 * far, &known));
+    // Which samples stand out is judged by the mean of a tile, so what is known shows as far as one that it reaches into.
+    let below = 7 * far / 2..4 * far;
+    assert!(rms_between(below.clone(), &guessed) < 1e-3 * rms_between(below, &known));
 }
 
 /// Convolution with the lens's own disc, by the sum, the plane going on as 0.

@@ -8,24 +8,16 @@ use rayon::prelude::*;
 use crate::{
     Film,
     convolve::{LANES, fast_size, multiply_by_real, with_fft},
-    coverage::Gathered,
+    coverage::{Composite, Gathered},
     node_kernels::{LayerKernels, NodeKernel, edge_spread_peak},
     raster::{Level, Raster},
     rectangle::Rectangle,
     sampler::{IdealLayer, Sampler},
     stopwatch::{Part, Stopwatch},
     symmetry::Mirror,
-    tile::Tile,
+    tile::{Tile, TileGroup, film_pixels},
+    visible::{Looked, Visible},
 };
-
-/// Tiles that mirror each other: one set of kernels serves them all.
-#[derive(Debug)]
-pub(crate) struct TileGroup {
-    pub(crate) level: Level,
-    pub(crate) canonical: Tile,
-    /// Those with anything to gather, and what takes each to the canonical one.
-    pub(crate) members: Vec<(Tile, Mirror)>,
-}
 
 /// A layer in one band.
 pub(crate) struct GatherTask<'a> {
@@ -127,7 +119,10 @@ impl Source {
 
 /// A tile to be gathered.
 struct Member {
+    tile: Tile,
     mirror: Mirror,
+    /// The samples that it gathers from.
+    from: Rectangle,
     /// Its pixels, and the samples on the raster that stand for them: from pixel to pixel `stride` of them.
     pixels: Rectangle,
     out: Rectangle,
@@ -150,18 +145,28 @@ enum Alpha {
     Partly(Source),
 }
 
+/// What lies before a layer.
+pub(crate) struct Past<'a> {
+    pub(crate) visible: &'a Visible,
+    pub(crate) picture: &'a Composite,
+}
+
 /// Gathers a layer on the pixels of all groups of tiles of one level. Tiles without anything are left out.
 pub(crate) fn gather(
     task: &GatherTask<'_>,
     groups: &[&TileGroup],
-    ideal: Option<&IdealLayer>,
+    (ideal, past): (Option<&IdealLayer>, Option<&Past<'_>>),
 ) -> Result<Vec<Gathered>, Cancelled> {
-    let gathered = groups.par_iter().map(|group| task.group(group, ideal));
+    let gathered = groups.par_iter().map(|group| task.group(group, (ideal, past)));
     Ok(gathered.collect::<Result<Vec<_>, Cancelled>>()?.into_iter().flatten().collect())
 }
 
 impl GatherTask<'_> {
-    fn group(&self, group: &TileGroup, ideal: Option<&IdealLayer>) -> Result<Vec<Gathered>, Cancelled> {
+    fn group(
+        &self,
+        group: &TileGroup,
+        (ideal, past): (Option<&IdealLayer>, Option<&Past<'_>>),
+    ) -> Result<Vec<Gathered>, Cancelled> {
         self.cancel.check()?;
         let TileGroup { level, canonical, members } = group;
         let corners = canonical.corners().map(|node| self.kernels.at((node, *level)));
@@ -189,9 +194,46 @@ impl GatherTask<'_> {
                 Alpha::Whole => vec![1.0; light.len()],
                 Alpha::Partly(_) => next(member),
             };
-            Gathered { at: member.pixels, light, alpha }
+            let mut gathered = Gathered { at: member.pixels, light, alpha };
+            if let Some(past) = past {
+                self.stopwatch.time(Part::Compositing, || {
+                    self.weigh((member, &kernels), &raster, past, &mut gathered);
+                });
+            }
+            gathered
         });
         Ok(gathered.collect())
+    }
+
+    /// Takes away what nearer surfaces hide of what a tile gathers, by the kernels of its canonical one.
+    fn weigh(
+        &self,
+        (member, canonical): (&Member, &TileKernels),
+        raster: &Raster,
+        past: &Past<'_>,
+        gathered: &mut Gathered,
+    ) {
+        let film = film_pixels(self.film);
+        let (at, layer) = (gathered.at, self.layer);
+        let (down, across) = ((at.first_row - film.first_row) as usize, (at.first_column - film.first_column) as usize);
+        let open = |row: usize, column: usize| past.picture.open_well_before(layer, (row + down, column + across));
+        let partly = past.visible.partly_seen(layer, &open, gathered);
+        let kernel_most = canonical.terms[0].samples.iter().copied().fold(0.0, f32::max);
+        let least = past.visible.weigh(&partly, kernel_most, gathered);
+        if !member.light.samples.iter().any(|light| *light > least) {
+            return;
+        }
+        // The kernel in the tile's middle, as it is on the film.
+        let corners = member.tile.corners().map(|node| self.kernels.at((node, raster.level)));
+        let kernels = TileKernels::between(&corners);
+        let stride = raster.level.per_pixel();
+        let TileKernels { at: window, terms } = if stride > 1 { kernels.over_pixels(stride) } else { kernels };
+        let from = member.from;
+        let restored = |source: &Source| member.mirror.restored(&source.samples, (from.rows, from.columns));
+        let light = restored(&member.light);
+        let alpha = if let Alpha::Partly(source) = &member.alpha { restored(source) } else { vec![] };
+        let looked = Looked { layer, raster, from, light: &light, alpha: &alpha, window, kernel: &terms[0].samples };
+        past.visible.add_bright(&looked, least, &partly, gathered);
     }
 
     /// Returns a tile with what it gathers from; `None` if there is nothing.
@@ -269,7 +311,9 @@ impl GatherTask<'_> {
             positions.iter().map(|px| ((px - f64::from(start)) / side - 0.5) as f32).collect()
         };
         Ok(Some(Member {
+            tile: *tile,
             mirror,
+            from,
             pixels,
             out,
             out_size: mirror.size((out.rows, out.columns)),

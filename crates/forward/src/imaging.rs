@@ -14,19 +14,21 @@ use rayon::prelude::*;
 use crate::{
     BandKernels, BandRadiance, Border, Film, ForwardError, ImagingSpec, SceneGeometry, SceneRadiance,
     blocks::Blocks,
-    coverage::{ChiefLayers, Composite},
-    gather::{GatherTask, TileGroup, gather, out_samples},
+    coverage::Composite,
+    gather::{GatherTask, Past, gather, out_samples},
     halo::Halos,
     kept::Kept,
-    places::{Places, SceneRaster, UNSEEN},
+    places::SceneRaster,
     raster::{Level, Raster},
     rectangle::Rectangle,
     sampler::Sampler,
     scene_layers::SceneLayers,
+    sight::Sight,
     stopwatch::{Part, Stopwatch},
     surface::{LayerCoordinates, Surface},
-    tile::film_pixels,
+    tile::{TileGroup, film_pixels},
     tiling::{LayeredLens, Rule, Tiling, reach_px},
+    visible::Visible,
     work::Work,
 };
 
@@ -52,7 +54,7 @@ pub(crate) struct Imaging {
     blocks: Blocks,
     /// How far from the middle of the film light is taken from, mm.
     reach_mm: f64,
-    chief: Arc<ChiefLayers>,
+    visible: Option<Visible>,
     kept: Mutex<Kept>,
     halos: Halos,
     /// The largest that the kernels of a band have been, bytes.
@@ -89,7 +91,7 @@ impl Imaging {
             std::iter::once(&scene.coordinates).chain(scene.occluded.layer_coordinates()).collect();
         let blocks = Blocks::find((film, margin_px), &raster, &maps, &surfaces, work.cancel())?;
 
-        let chief = chief_layers((lens, film, middle_nm), maps[1], &raster, &scene);
+        let sight = Sight::of((lens, film, middle_nm), maps[1], &raster, &scene, work.cancel())?;
 
         // Cut the film into tiles for each of them.
         let stopwatch = Stopwatch::default();
@@ -98,6 +100,8 @@ impl Imaging {
         let mut tiling = Tiling::new(&rule, work)?;
         let unobserved = Work::unobserved(work.cancel());
         let kernels = BandKernels { by_layer: Arc::new(tiling.middle_kernels(&layered, middle_nm, &unobserved)?) };
+        let through = |sight| Visible::through(sight, (&tiling.layers, &kernels.by_layer), film, work.cancel());
+        let visible = sight.map(through).transpose()?;
         let looked_up = few_of(&scene.kernel_bands).map(|band| (band, grid.centers_nm()[band]));
         let halos =
             Halos::of((lens, layers), (film, settings.widest_blur_px), &looked_up.collect::<Vec<_>>(), grid.len());
@@ -109,7 +113,7 @@ impl Imaging {
             tiling,
             blocks,
             reach_mm,
-            chief: Arc::new(chief),
+            visible,
             kept: Mutex::new(kept),
             halos,
             // Those of the middle band tell how much memory kernels take.
@@ -122,7 +126,10 @@ impl Imaging {
 
     /// The bytes of memory that it takes, what it shares with other parts of a pupil left out.
     pub(crate) fn size_bytes(&self) -> usize {
-        self.blocks.size_bytes() + self.tiling.size_bytes() + self.kept().size_bytes
+        self.blocks.size_bytes()
+            + self.visible.as_ref().map_or(0, Visible::size_bytes)
+            + self.tiling.size_bytes()
+            + self.kept().size_bytes
     }
 
     /// Keeps at most so many bytes of kernels from now on.
@@ -235,7 +242,7 @@ impl Imaging {
         let with_alpha = self.scene.hides;
         let sampler = Sampler { scene: self.raster, map: &map, blocks: &self.blocks, surfaces: &surfaces, with_alpha };
         let Film { rows, columns, .. } = self.spec.film;
-        let mut picture = Composite::new((rows, columns), self.chief.clone());
+        let mut picture = Composite::new((rows, columns), self.scene.hides);
         for (layer, tiles) in self.tiling.layers.iter().enumerate() {
             let task = GatherTask {
                 film: &self.spec.film,
@@ -257,17 +264,20 @@ impl Imaging {
         let film = film_pixels(&self.spec.film);
         let mut by_level: BTreeMap<Level, Vec<&TileGroup>> = BTreeMap::new();
         groups.iter().for_each(|group| by_level.entry(group.level).or_default().push(group));
+        let visible = self.visible.as_ref().filter(|_| task.layer >= 2);
+        let past = visible.map(|visible| Past { visible, picture: &*picture });
+        let past = past.as_ref();
         let mut gathered = vec![];
         for (level, groups) in by_level {
             if level < Level::PIXEL {
-                gathered.extend(gather(task, &groups, None)?);
+                gathered.extend(gather(task, &groups, (None, past))?);
                 continue;
             }
             let raster = Raster::new(&self.spec.film, level);
             let Some(at) = self.seen_by(task, &groups, &raster) else { continue };
             let ideal =
                 self.stopwatch.time(Part::Sampling, || task.sampler.sample(&raster, at, task.layer, task.cancel))?;
-            gathered.extend(gather(task, &groups, Some(&ideal))?);
+            gathered.extend(gather(task, &groups, (Some(&ideal), past))?);
         }
         self.stopwatch.time(Part::Compositing, || {
             gathered.iter().for_each(|gathered| picture.under(&film, task.layer, gathered));
@@ -311,38 +321,6 @@ impl Imaging {
             }
         });
         picture
-    }
-}
-
-/// Returns the layers that chief rays meet first, by the map of the middle band.
-fn chief_layers(
-    (lens, film, wavelength_nm): (&dyn LensImage, &Film, f64),
-    map: &FilmMap,
-    raster: &SceneRaster,
-    scene: &SceneLayers,
-) -> ChiefLayers {
-    if !scene.hides {
-        return ChiefLayers::default();
-    }
-    let pixels = Raster::new(film, Level::PIXEL);
-    let Rectangle { first_row, first_column, rows, columns } = film_pixels(film);
-    let (first_mm, step_mm) = (pixels.x_mm(first_column as f64), 1e-3 * film.pitch_um);
-    let of_row = |places: &mut Places, row: usize| -> Vec<u16> {
-        places.find(raster, map, columns, (first_mm, step_mm, pixels.y_mm((first_row + row as i64) as f64)));
-        let (beside, below) = raster.steps();
-        let nearest = |k: usize| {
-            let corner =
-                if places.across[k] >= 0.5 { beside } else { 0 } + if places.down[k] >= 0.5 { below } else { 0 };
-            let coordinate = scene.coordinates.samples()[places.first[k] as usize + corner];
-            coordinate.round() as u16
-        };
-        (0..columns).map(|k| if places.first[k] == UNSEEN { 0 } else { nearest(k) }).collect()
-    };
-    let first: Vec<Vec<u16>> = (0..rows).into_par_iter().map_init(Places::default, of_row).collect();
-    let is_beyond_focus = |&dioptres: &f64| lens.blur_radius_mm(DVec2::ZERO, dioptres, wavelength_nm) < 0.0;
-    ChiefLayers {
-        first: first.concat(),
-        is_beyond_focus: scene.layers.dioptres().iter().map(is_beyond_focus).collect(),
     }
 }
 

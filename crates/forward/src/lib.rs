@@ -37,6 +37,7 @@ mod rectangle;
 mod render;
 mod sampler;
 mod scene_layers;
+mod sight;
 mod source;
 mod spec;
 mod stopwatch;
@@ -45,6 +46,7 @@ mod symmetry;
 mod tile;
 mod tiling;
 mod views;
+mod visible;
 mod work;
 
 #[cfg(test)]

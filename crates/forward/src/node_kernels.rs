@@ -60,10 +60,13 @@ impl NodeKernel {
     /// Returns the kernel for a picture whose samples are means over themselves, of `n` points each way: that takes from its width what the means add.
     ///
     /// Means over squares of side 1 have the variance v = (1 − 1/n²)/12; with δ² the second difference, 1 − v/2 δ² + 9v/160 δ⁴ undoes them up to fourth
-    /// order (the cell averages of finite volumes), as far as no sample falls below 0.
+    /// order (the cell averages of finite volumes), as far as no sample falls below 0. Of a kernel that is hardly wider than that, no more than half its width is taken: a point
+    /// stays one.
     pub(crate) fn for_means_of(self, n: usize) -> Self {
-        let variance = (1.0 - 1.0 / (n * n) as f32) / 12.0;
-        if variance == 0.0 {
+        let means = (1.0 - 1.0 / (n * n) as f32) / 12.0;
+        let [down, across] = self.variances();
+        let variance = means.min(0.5 * down.min(across) as f32);
+        if variance <= 0.0 {
             return self;
         }
         let [near, far] = [-0.5 * variance, 9.0 / 160.0 * variance];

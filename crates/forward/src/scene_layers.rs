@@ -33,6 +33,8 @@ pub(crate) struct SceneLayers {
     pub(crate) narrow_fraction: f64,
     /// Whether layers hide those behind them.
     pub(crate) hides: bool,
+    /// Samples along a pixel in the middle of the film.
+    pub(crate) samples_per_pixel: f64,
 }
 
 impl SceneLayers {
@@ -60,18 +62,37 @@ impl SceneLayers {
         let hides = settings.mode != BlurMode::Pointwise && layers.len() > 1;
         if !hides {
             let (occluded, mixed) = (OccludedSamples::Nothing, MixedSamples::default());
-            let layers = Self { layers, kernel_bands, coordinates, occluded, mixed, narrow_fraction: 0.0, hides };
-            return Ok(Arc::new(layers));
+            let samples_per_pixel = 1.0;
+            let this = Self {
+                layers,
+                kernel_bands,
+                coordinates,
+                occluded,
+                mixed,
+                narrow_fraction: 0.0,
+                hides,
+                samples_per_pixel,
+            };
+            return Ok(Arc::new(this));
         }
         // How fine the scene is in the film's middle.
         let tan = |x_mm: f64| map.field_tan(DVec2::X * x_mm).unwrap_or_default();
-        let scene_per_film = scene.view.focal_px * (tan(0.5 * pitch_mm) - tan(-0.5 * pitch_mm)).length();
+        let samples_per_pixel = scene.view.focal_px * (tan(0.5 * pitch_mm) - tan(-0.5 * pitch_mm)).length();
         let distances = Distances::of(scene, &layers, cancel)?;
-        let narrow = NarrowRule { jump: DEPTH_EDGE_PX, scene_per_film: scene_per_film as f32 };
-        let occluded = OccludedSamples::find(&distances, &layers, scene_per_film, cancel)?;
+        let narrow = NarrowRule { jump: DEPTH_EDGE_PX, scene_per_film: samples_per_pixel as f32 };
+        let occluded = OccludedSamples::find(&distances, &layers, samples_per_pixel, cancel)?;
         let mixed = MixedSamples::find(&distances, &layers, cancel)?;
         let narrow_fraction = narrow.fraction(&distances.front, cancel)?;
-        Ok(Arc::new(Self { layers, kernel_bands, coordinates, occluded, mixed, narrow_fraction, hides }))
+        Ok(Arc::new(Self {
+            layers,
+            kernel_bands,
+            coordinates,
+            occluded,
+            mixed,
+            narrow_fraction,
+            hides,
+            samples_per_pixel,
+        }))
     }
 
     /// Rows and columns of the scene.

@@ -69,6 +69,15 @@ impl Tile {
     }
 }
 
+/// Tiles that mirror each other: one set of kernels serves them all.
+#[derive(Debug)]
+pub(crate) struct TileGroup {
+    pub(crate) level: Level,
+    pub(crate) canonical: Tile,
+    /// Those with anything to gather, and what takes each to the canonical one.
+    pub(crate) members: Vec<(Tile, Mirror)>,
+}
+
 /// Returns the pixels of a film, counted from its middle.
 pub(crate) fn film_pixels(film: &Film) -> Rectangle {
     let first = |n: usize| -((n / 2) as i64);

@@ -13,13 +13,12 @@ use rayon::prelude::*;
 use crate::{
     Film, Settings,
     blocks::{Blocks, points_of},
-    gather::TileGroup,
     layers::Layers,
     node_kernels::{LayerKernels, NodeAt, NodeKernel, edge_spread_peak},
     raster::{Level, Raster},
     stopwatch::{Part, Stopwatch},
     symmetry::{Mirror, Node, Symmetry},
-    tile::Tile,
+    tile::{Tile, TileGroup},
     work::Work,
 };
 
@@ -79,6 +78,20 @@ pub(crate) struct LayerTiles {
     nodes: BTreeSet<NodeAt>,
     /// Kernels of the middle band by which they were cut.
     known: BTreeMap<NodeAt, NodeKernel>,
+}
+
+impl LayerTiles {
+    /// Returns the tile that a pixel lies in, if anything is gathered there, and the width of its samples.
+    pub(crate) fn at(&self, (row, column): (i64, i64)) -> Option<(Tile, Level)> {
+        let has = |tile: &Tile| {
+            let within = |first: i32, at: i64| (i64::from(first)..i64::from(first + tile.size)).contains(&at);
+            within(tile.down, row) && within(tile.right, column)
+        };
+        self.groups.iter().find_map(|group| {
+            let member = group.members.iter().find(|(tile, _)| has(tile));
+            member.map(|(tile, _)| (*tile, group.level))
+        })
+    }
 }
 
 /// The tiles of every layer.

@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
-use crate::OpticsError;
+use crate::{OpticsError, WavefrontError, trace::Phase};
 
 /// What a surface adds to the light that it refracts or reflects: the phase of one diffraction order.
 ///
@@ -98,6 +98,8 @@ pub enum PhaseProfile {
         /// Coefficients of ρ², ρ⁴ and on, radians.
         coefficients_rad: Vec<f64>,
     },
+    /// A wavefront error: a path, not a phase of an order, which is 1.
+    Wavefront(WavefrontError),
 }
 
 impl PhaseProfile {
@@ -106,51 +108,22 @@ impl PhaseProfile {
         match self {
             Self::Grating { lines_per_mm } => lines_per_mm[axis] == 0.0,
             Self::Rings { .. } => true,
+            Self::Wavefront(error) => error.is_mirrored_along(axis),
         }
     }
 
-    /// Returns the phase at a place, in cycles.
-    pub(crate) fn cycles_at(&self, place_mm: DVec2) -> f64 {
+    /// Returns what it adds to light of a wavelength in an order.
+    pub(crate) fn at(&self, order: i32, wavelength_nm: f64) -> Phase {
+        let path_per_cycle_mm = f64::from(order) * 1e-6 * wavelength_nm;
         match self {
-            Self::Grating { lines_per_mm } => DVec2::from_array(*lines_per_mm).dot(place_mm),
-            Self::Rings { radius_mm, coefficients_rad } => {
-                let square = place_mm.length_squared() / (radius_mm * radius_mm);
-                coefficients_rad.iter().rev().fold(0.0, |sum, a| (sum + a) * square) / TAU
+            Self::Grating { lines_per_mm } => {
+                Phase::Grating { slope: DVec2::from_array(*lines_per_mm) * path_per_cycle_mm }
             }
-        }
-    }
-
-    /// Returns the gradient of the phase at a place, cycles/mm.
-    pub(crate) fn gradient_per_mm(&self, place_mm: DVec2) -> DVec2 {
-        match self {
-            Self::Grating { lines_per_mm } => DVec2::from_array(*lines_per_mm),
-            Self::Rings { radius_mm, coefficients_rad } => {
-                let square = place_mm.length_squared() / (radius_mm * radius_mm);
-                let terms = coefficients_rad.iter().enumerate().rev();
-                let derivative = terms.fold(0.0, |sum, (i, a)| sum * square + (i + 1) as f64 * a);
-                place_mm * (2.0 * derivative / (radius_mm * radius_mm) / TAU)
-            }
-        }
-    }
-
-    /// Returns the paraxial power for each mm of path that a cycle adds, 1/mm²: what it takes from n u over the height.
-    pub(crate) fn power_of_path(&self) -> f64 {
-        match self {
-            Self::Grating { .. } => 0.0,
-            Self::Rings { radius_mm, coefficients_rad } => {
-                let square = coefficients_rad.first().copied().unwrap_or(0.0);
-                -square / (PI * radius_mm * radius_mm)
-            }
-        }
-    }
-
-    /// Returns the coefficient of r⁴, cycles/mm⁴.
-    pub(crate) fn fourth_order_per_mm4(&self) -> f64 {
-        match self {
-            Self::Grating { .. } => 0.0,
-            Self::Rings { radius_mm, coefficients_rad } => {
-                coefficients_rad.get(1).copied().unwrap_or(0.0) / (TAU * radius_mm.powi(4))
-            }
+            Self::Rings { radius_mm, coefficients_rad } => Phase::Rings {
+                per_mm2: 1.0 / (radius_mm * radius_mm),
+                coefficients_mm: coefficients_rad.iter().map(|a| a / TAU * path_per_cycle_mm).collect(),
+            },
+            Self::Wavefront(error) => Phase::Wavefront(error.at(wavelength_nm)),
         }
     }
 
@@ -159,6 +132,7 @@ impl PhaseProfile {
         match self {
             Self::Grating { lines_per_mm } => *lines_per_mm == [0.0; 2],
             Self::Rings { .. } => true,
+            Self::Wavefront(error) => error.is_rotational(),
         }
     }
 }
@@ -177,6 +151,12 @@ impl DiffractiveSurface {
                 return wrong("radius_mm of a phase", *radius_mm, "a finite number above 0");
             }
             PhaseProfile::Rings { coefficients_rad, .. } => coefficients_rad,
+            PhaseProfile::Wavefront(error) => {
+                if self.order != 1 || self.blaze.is_some() {
+                    return wrong("order of a wavefront error", f64::from(self.order), "1, and no blaze");
+                }
+                return error.check(surface);
+            }
         };
         match numbers.iter().find(|number| !number.is_finite()) {
             Some(found) => wrong("number of a phase", *found, "a finite number"),

@@ -30,6 +30,16 @@ pub enum OpticsError {
         /// Why not.
         reason: String,
     },
+    /// A lens whose stop stands for no f-number.
+    #[error(
+        "{lens} has no f-number that its stop could be set to: {reason}; state the diameter of the stop (--stop-mm)"
+    )]
+    NoFNumber {
+        /// The lens.
+        lens: String,
+        /// Why not.
+        reason: &'static str,
+    },
     /// A wavelength that is not a positive number.
     #[error("a wavelength must be a positive number, found {wavelength_nm} nm")]
     Wavelength {

@@ -35,10 +35,18 @@ impl Lens {
     /// 5 % above it, since lenses are marked with round numbers ([`note_on_f_number`](Self::note_on_f_number)).
     ///
     /// # Errors
-    /// When the f-number is not positive or further below that of the full stop, or of what the rims let through.
+    /// When the f-number is not positive, the lens has none by its stop (telecentric or afocal), or it is further below that of the full stop, or of what the rims let through.
     pub fn with_f_number(&self, f_number: f64, wavelength_nm: f64) -> Result<Self, OpticsError> {
         positive("an f-number", f_number)?;
-        let now = self.at(wavelength_nm)?.first_order_of_stop().f_number;
+        let first = self.at(wavelength_nm)?.first_order_of_stop();
+        let now = first.f_number;
+        if now == 0.0 || !now.is_finite() {
+            let is_telecentric = first.power_per_mm != 0.0;
+            return Err(OpticsError::NoFNumber {
+                lens: self.name().to_owned(),
+                reason: if is_telecentric { "its entrance pupil is infinitely far" } else { "it has no focal length" },
+            });
+        }
         let (full, smallest) = self.fully_open(wavelength_nm)?;
         if f_number < smallest * (1.0 - MARKED) {
             return Err(OpticsError::FNumberTooSmall {

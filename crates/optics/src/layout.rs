@@ -166,7 +166,9 @@ fn follow(lens: &MonoLens, mut rays: RayBatch, lead_mm: f64, film_distance_mm: f
     let nearest_start = |i: usize| {
         let (point, direction) = (rays.point_mm(i), rays.direction(i));
         let by_height = (extent_mm - point.y.abs()).max(0.0) / direction.y.abs();
-        heading.dot(point - direction * by_height.min(lead_mm / direction.z))
+        // Light from behind starts beside the rims.
+        let by_lead = if direction.z > 0.0 { lead_mm / direction.z } else { f64::INFINITY };
+        heading.dot(point - direction * by_height.min(by_lead))
     };
     let front_mm = (0..rays.len()).map(nearest_start).fold(f64::NEG_INFINITY, f64::max);
     let start = |i: usize| {

@@ -6,8 +6,8 @@ mod media;
 use glam::DVec2;
 
 use crate::{
-    Aperture, CoordinateBreak, DiffractiveSurface, Glass, GlassRange, Interface, OpticsError, Placement, Shape,
-    Surface, placement,
+    Aperture, CoordinateBreak, DiffractiveSurface, Glass, GlassRange, Interface, OpticsError, PhaseProfile, Placement,
+    Shape, Surface, placement,
 };
 
 pub use self::changes::SurfaceChange;
@@ -204,6 +204,15 @@ impl Lens {
         }
         self.diffractive = diffractive;
         Ok(self)
+    }
+
+    /// Checks that the wavefront errors of all surfaces are known at a wavelength.
+    pub(crate) fn check_wavefronts_at(&self, wavelength_nm: f64) -> Result<(), OpticsError> {
+        let mut errors = self.diffractive.iter().filter_map(|phase| match &phase.profile {
+            PhaseProfile::Wavefront(error) => Some(error),
+            PhaseProfile::Grating { .. } | PhaseProfile::Rings { .. } => None,
+        });
+        errors.try_for_each(|error| error.check_at(wavelength_nm))
     }
 
     /// Returns the lens with a film of this shape.

@@ -39,6 +39,8 @@ mod seidel;
 mod surface;
 mod toric;
 mod trace;
+mod wavefront_error;
+pub mod zernike;
 
 pub use air::Air;
 pub use aperture::{Aperture, Outline};
@@ -68,3 +70,4 @@ pub use reversed::ReversedLens;
 pub use seidel::{Seidel, SeidelSettings, SeidelSums};
 pub use surface::{Interface, Shape, Surface};
 pub use trace::Vignetting;
+pub use wavefront_error::{WavefrontBand, WavefrontError, ZernikeTerms};

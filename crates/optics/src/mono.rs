@@ -91,6 +91,7 @@ impl MonoLens {
         let (mut steps, mut index_before) = (Vec::new(), lens.index_in(lens.object_medium(), wavelength_nm)?);
         let (vertices_z_mm, n_surfaces) = (lens.vertices_z_mm(), lens.interfaces().len());
         let (mut vertex_z, mut before_z_mm) = (0.0, 0.0);
+        lens.check_wavefronts_at(wavelength_nm)?;
         for (i, interface) in lens.interfaces().iter().enumerate() {
             let index_after =
                 lens.index_in(&interface.medium_after, wavelength_nm).map_err(|error| error.behind_surface(i))?;
@@ -376,8 +377,7 @@ impl MonoLens {
 /// Returns the phase that a surface adds at a wavelength.
 fn phase_of(lens: &Lens, surface: usize, wavelength_nm: f64) -> Option<Phase> {
     let stated = lens.diffractive().iter().find(|phase| phase.surface == surface)?;
-    let path_per_cycle_mm = f64::from(stated.order) * 1e-6 * wavelength_nm;
-    Some(Phase { profile: stated.profile.clone(), path_per_cycle_mm })
+    Some(stated.profile.at(stated.order, wavelength_nm))
 }
 
 /// Returns the kernel's form of a surface's shape.

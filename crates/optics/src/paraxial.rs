@@ -282,9 +282,7 @@ pub(crate) fn first_order(steps: &[Step], stop: usize, wavelength_nm: f64) -> Fi
 mod tests {
     use glam::{DVec2, DVec3};
 
-    use crate::{
-        Glass, Interface, Lens, ObjectPoint, PupilBoundary, Shape, Surface, Vignetting, analysis::StopAim, rays_towards,
-    };
+    use crate::{Glass, Interface, Lens, ObjectPoint, PupilBoundary, Shape, Surface, Vignetting, analysis::StopAim};
 
     /// The published lengths have four decimals, the last off by one at times.
     const ANCHOR_MM: f64 = 1e-4;
@@ -397,7 +395,7 @@ mod tests {
             assert!(pupil.center_mm().length() < 1e-9, "{object_mm}: {}", pupil.center_mm());
             let aim = StopAim::find(&mono, &point, &[DVec2::ZERO, DVec2::new(0.6, -0.8)]);
             let targets_mm: Vec<DVec2> = aim.targets_mm().iter().map(|target| target.unwrap()).collect();
-            let mut rays = rays_towards(&point, &targets_mm, aim.z_mm(), 0.0);
+            let mut rays = aim.plane().rays(&mono, &point, &targets_mm);
             mono.trace_surfaces(0..2, &mut rays, Vignetting::Off);
             assert!(rays.point_mm(0).truncate().length() < 1e-9);
             assert!((rays.point_mm(1).truncate() - DVec2::new(1.2, -1.6)).length() < 1e-9);

@@ -1,6 +1,7 @@
 //! Files of pictures, read and written.
 #![doc = include_str!("../README.md")]
 
+mod colors;
 mod reduced;
 mod tagged;
 
@@ -13,6 +14,7 @@ use std::{
 use dioptric_files::memory;
 use image::{ExtendedColorType, ImageDecoder, ImageReader};
 
+pub use colors::StatedColors;
 pub use image::{DynamicImage, ImageError, ImageFormat, Limits};
 pub use reduced::{Curve, read_reduced};
 pub use tagged::{CodeSpace, encode_in};
@@ -30,7 +32,10 @@ pub fn format_of(path: &Path) -> io::Result<Option<ImageFormat>> {
 /// # Errors
 /// When the file cannot be read or is no such picture.
 pub fn size_of(path: &Path) -> Result<(usize, usize), ImageError> {
-    let (columns, rows) = ImageReader::open(path)?.with_guessed_format()?.into_decoder()?.dimensions();
+    let mut reader = ImageReader::open(path)?.with_guessed_format()?;
+    // Whoever reads its samples checks what they take.
+    reader.limits(Limits::no_limits());
+    let (columns, rows) = reader.into_decoder()?.dimensions();
     Ok((columns as usize, rows as usize))
 }
 

@@ -2,6 +2,7 @@
 
 use std::{fs::File, io::BufReader, path::Path};
 
+use dioptric_files::memory;
 use image::{DynamicImage, ImageBuffer, ImageError, ImageFormat};
 use png::{BitDepth, ColorType, Decoder, Transformations};
 
@@ -30,6 +31,11 @@ pub fn read_reduced(
         let reason = format!("{} × {} pixels, expected {columns} × {rows} at least", from.0, from.1);
         return Err(ImageError::IoError(std::io::Error::other(reason)));
     }
+    // Sums and codes of the means, and a row of the file as bytes and as codes.
+    let taken = 30_u64.saturating_mul(columns as u64).saturating_mul(rows as u64);
+    let taken = taken.saturating_add(16_u64.saturating_mul(from.0 as u64));
+    memory::check(taken, std::fs::metadata(path)?.len())
+        .map_err(|error| ImageError::IoError(std::io::Error::other(error)))?;
     let mut means = Means::new(from, (columns, rows), curve);
     let is_png = format_of(path)? == Some(ImageFormat::Png);
     if !is_png || !add_png(path, &mut means)? {

@@ -41,7 +41,8 @@ pub use dioptric_backward::{BandSampling, LightPaths, MicroArray, MicroElements,
 pub use dioptric_optics::{GlassRange, MissingGlass, SeqNumbers, SurfaceChange};
 pub use dioptric_psf::Diffraction;
 pub use dioptric_scene::{
-    DepthKind, ExrSamples, FileQuantity, FileReading, FillDepth, NoData, may_be_read_with as may_be_read_with_scene,
+    DepthKind, ExrSamples, FileQuantity, FileReading, FillDepth, NoData, Panorama,
+    may_be_read_with as may_be_read_with_scene,
 };
 
 pub use camera::{

@@ -128,6 +128,8 @@ const RANGES: &[(Range, &[&str])] = &[
     (of(1.0, 1e9, ""), &["items_per_tar", "layers"]),
     (of(2.0, 10_000.0, "levels"), &["levels"]),
     (of(2.0, 10_000.0, "frames"), &["stack"]),
+    (of(8.0, 360.0, "cycles"), &["cycles"]),
+    (of(0.001, 1.0, "of full modulation"), &["modulation"]),
     (of(0.0, 1000.0, "samples"), &["radius_px"]),
 ];
 

@@ -1,8 +1,8 @@
-//! Files of scenes described, and made spectral EXR.
+//! Files of scenes described, and made spectral EXR or files of ISETCam.
 
 use std::path::Path;
 
-use dioptric_scene::{ExrSamples, Scene, SceneLight, View, write_preview_png, write_scene_exr};
+use dioptric_scene::{ExrSamples, Scene, SceneLight, View, write_iset_scene, write_preview_png, write_scene_exr};
 use dioptric_spectrum::{Observer, WavelengthGrid, Xyz};
 use serde::Serialize;
 
@@ -88,13 +88,23 @@ impl SceneRequest {
         Ok(SceneInfo::of(&scene))
     }
 
-    /// Writes the scene as spectral EXR with all that it has, and returns what it holds.
+    /// Writes the scene with all that it has, as a scene of `ISETCam` where the name ends in `.mat` and else as spectral EXR, and returns what
+    /// it holds.
     ///
     /// # Errors
-    /// As [`open`](Self::open), and when the file cannot be written; then there is none.
-    pub fn convert(&self, output: &Path, samples: ExrSamples) -> Result<SceneInfo, PipelineError> {
+    /// As [`open`](Self::open), when samples of EXR are asked of another file, and when the file cannot be written; then there is none.
+    pub fn convert(&self, output: &Path, samples: Option<ExrSamples>) -> Result<SceneInfo, PipelineError> {
+        let is_mat = output.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("mat"));
+        if is_mat && samples.is_some() {
+            let reason = format!("{} is no EXR file, expected it without --exr-samples", output.display());
+            return Err(PipelineError::Unsuitable { what: "samples of an EXR file", reason });
+        }
         let scene = self.open()?;
-        write_scene_exr(output, &scene, samples)?;
+        if is_mat {
+            write_iset_scene(output, &scene)?;
+        } else {
+            write_scene_exr(output, &scene, samples.unwrap_or_default())?;
+        }
         Ok(SceneInfo::of(&scene))
     }
 }

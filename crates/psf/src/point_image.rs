@@ -1,7 +1,7 @@
 //! Points of a scene, traced forward through a lens.
 
 use dioptric_diffraction::{StopRay, trace_stop_rays};
-use dioptric_optics::{FilmPoint, Lens, MonoLens, ObjectPoint, PupilBoundary, Vignetting, rays_towards};
+use dioptric_optics::{FilmPoint, Lens, MonoLens, ObjectPoint, PupilBoundary, PupilPlane, Vignetting};
 use glam::{DVec2, IVec2};
 use ndarray::Array2;
 
@@ -26,7 +26,6 @@ pub struct PointImage {
     /// About the centroid.
     spots: Spots,
     centroid_mm: DVec2,
-    pupil_mm2: f64,
     blur_radius_mm: f64,
     rms_radius_mm: f64,
 }
@@ -44,20 +43,32 @@ impl PointImage {
         dioptres: f64,
         wavelength_nm: f64,
     ) -> Result<Option<Self>, PsfError> {
-        settings.check()?;
         let reference = lens.at(settings.reference_wavelength_nm)?;
-        let lens = lens.at(wavelength_nm)?;
         let point = ObjectPoint::from_field(&reference, field_tan, dioptres);
-        let axial_mm = if dioptres == 0.0 { f64::INFINITY } else { 1e3 / dioptres };
-        Ok(Self::of(lens, point, axial_mm, *settings))
+        Self::of_point(lens, settings, point, wavelength_nm)
     }
 
-    fn of(lens: MonoLens, point: ObjectPoint, axial_mm: f64, settings: ImageSettings) -> Option<Self> {
+    /// Traces a point wherever it is, beside a lens or behind it too; `None` if none of its light reaches the film.
+    ///
+    /// # Errors
+    /// As [`trace`](Self::trace).
+    pub fn of_point(
+        lens: &Lens,
+        settings: &ImageSettings,
+        point: ObjectPoint,
+        wavelength_nm: f64,
+    ) -> Result<Option<Self>, PsfError> {
+        settings.check()?;
+        Ok(Self::of(lens.at(wavelength_nm)?, point, *settings))
+    }
+
+    fn of(lens: MonoLens, point: ObjectPoint, settings: ImageSettings) -> Option<Self> {
         // Find the pupil that the point sees, about its centroid.
-        let (mesh, z_mm) = (settings.mesh(), lens.projection_center_z_mm());
+        let mesh = settings.mesh();
         let n_azimuths = 2 * mesh.n_azimuths;
-        let boundary = PupilBoundary::find(&lens, &point, n_azimuths).filter(|found| found.plane().is_across_axis())?;
-        let clearances = |targets: &[DVec2]| lens.clearances_mm(rays_towards(&point, targets, z_mm, 0.0));
+        let boundary = PupilBoundary::find(&lens, &point, n_azimuths)?;
+        let plane = boundary.plane();
+        let clearances = |targets: &[DVec2]| lens.clearances_mm(plane.rays(&lens, &point, targets));
         let found = Outline { center: boundary.center_mm(), rho: boundary.rho_at_azimuths_mm().to_vec() };
         let outline = found.settled(&clearances).unwrap_or(found);
 
@@ -67,10 +78,10 @@ impl PointImage {
             polar(outline.center, share * outline.rho[2 * j], azimuth)
         };
         let targets: Vec<DVec2> = mesh.nodes().enumerate().map(node).collect();
-        let nodes = landed(&lens, &point, &settings, &targets)?;
+        let nodes = landed(&lens, (&point, plane), &settings, &targets)?;
 
         // Weigh cells by the solid angle that they take up, seen from the point, and by what obscurations leave of it.
-        let weights: Vec<f64> = targets.iter().map(|target| weight(&point, *target, z_mm, axial_mm)).collect();
+        let weights: Vec<f64> = targets.iter().map(|target| weight(&point, plane, *target)).collect();
         let cell = |((ring, j), area): ((usize, usize), f64)| {
             area * mesh.corners(ring, j).map(|node| weights[node]).iter().sum::<f64>() / 4.0
         };
@@ -78,35 +89,30 @@ impl PointImage {
         if lens.n_obscurations() > 0 {
             let whole = lens.with_obscurations_inverted(&[]);
             let passed = |targets: &[DVec2], with_obscurations: bool| {
-                let mut rays = rays_towards(&point, targets, z_mm, 0.0);
+                let mut rays = plane.rays(&lens, &point, targets);
                 if with_obscurations { &lens } else { &whole }.trace(&mut rays, Vignetting::On);
                 rays.fate.iter().map(|fate| fate.is_in_flight()).collect()
             };
             let shares = clear_shares(mesh, &outline, &passed);
             energies.iter_mut().zip(shares).for_each(|(energy, share)| *energy *= share);
         }
-        let pupil_mm2: f64 = energies.iter().sum();
-        if pupil_mm2.is_nan() || pupil_mm2 <= 0.0 {
+        let total: f64 = energies.iter().sum();
+        if total.is_nan() || total <= 0.0 {
             return None;
         }
-        energies.iter_mut().for_each(|energy| *energy /= pupil_mm2);
+        energies.iter_mut().for_each(|energy| *energy /= total);
 
         let spots = Spots { mesh, nodes, energies };
         let centroid_mm = spots.centroid_mm();
         let spots = spots.about(centroid_mm);
         let blur_radius_mm = RIM_OVER_RMS * signed_rms_mm(&spots, &targets);
         let rms_radius_mm = spots.rms_mm();
-        Some(Self { lens, point, settings, spots, centroid_mm, pupil_mm2, blur_radius_mm, rms_radius_mm })
+        Some(Self { lens, point, settings, spots, centroid_mm, blur_radius_mm, rms_radius_mm })
     }
 
     /// The centroid of the light, mm from the middle of the film, picture frame.
     pub fn centroid_mm(&self) -> DVec2 {
         self.centroid_mm
-    }
-
-    /// The area of the pupil, mm², weighted with cos⁴ of the angle, or for near points with what stands for it.
-    pub fn pupil_mm2(&self) -> f64 {
-        self.pupil_mm2
     }
 
     /// The signed radius of the circle of confusion, mm: above 0 for objects nearer than the focus.
@@ -156,9 +162,14 @@ impl PointImage {
 
 /// Returns where rays aimed at the pupil land, in the picture frame; `None` if that through its middle does not. A ray that fails at the
 /// pupil's very edge lands with its neighbor inside.
-fn landed(lens: &MonoLens, point: &ObjectPoint, settings: &ImageSettings, targets: &[DVec2]) -> Option<Vec<Node>> {
+fn landed(
+    lens: &MonoLens,
+    (point, plane): (&ObjectPoint, &PupilPlane),
+    settings: &ImageSettings,
+    targets: &[DVec2],
+) -> Option<Vec<Node>> {
     let film_distance_mm = settings.film_distance_mm;
-    let mut rays = rays_towards(point, targets, lens.projection_center_z_mm(), 0.0);
+    let mut rays = plane.rays(lens, point, targets);
     let found: Vec<Option<Node>> = if settings.diffraction.hurb().is_some() {
         let radius_mm = lens.stop_semi_aperture_mm();
         let node = |ray: StopRay| Node {
@@ -183,15 +194,14 @@ fn landed(lens: &MonoLens, point: &ObjectPoint, settings: &ImageSettings, target
     Some(nodes)
 }
 
-/// Returns the weight of pupil area at a place: cos⁴ of the angle, or for near points (Z/d)² cos²: projected solid angle times the square
-/// of the axial distance.
-fn weight(point: &ObjectPoint, target: DVec2, z_mm: f64, axial_mm: f64) -> f64 {
+/// Returns the weight of pupil area at a place of its plane, up to a factor of the point: the solid angle projected on a plane across
+/// the axis, which is even for a far point.
+fn weight(point: &ObjectPoint, plane: &PupilPlane, target: DVec2) -> f64 {
     match *point {
-        ObjectPoint::Infinite(direction) => direction.z.powi(4),
+        ObjectPoint::Infinite(_) => 1.0,
         ObjectPoint::Finite(point) => {
-            let way = target.extend(z_mm) - point;
-            let square = way.length_squared();
-            axial_mm * axial_mm / square * (way.z * way.z / square)
+            let way = plane.in_lens_mm(target) - point;
+            (way.dot(plane.normal()) * way.z).abs() / way.length_squared().powi(2)
         }
     }
 }

@@ -127,7 +127,7 @@ impl Camera {
     ///     What the lens sees beyond the ends of the scene: the samples at its border, the scene mirrored, or nothing.
     /// scene : Scene or path
     /// fov_deg, depth_m, width_mm, distance_mm, fill_depth, hidden, white_level, quantity, unit, scale, scene_wavelengths_nm, variable,
-    /// axes, no_data, depth, depth_unit, depth_kind, view
+    /// axes, no_data, depth, depth_unit, depth_kind, view, panorama
     /// illuminant, illuminance_lux, scene_light, mean_luminance_cd_m2
     ///     Of the scene, as of `Scene.read`.
     /// wavelengths_nm : list of float, or "scene"

@@ -75,6 +75,7 @@ const ALL: &[&str] = &[
     "depth_unit",
     "depth_kind",
     "view",
+    "panorama",
     "illuminant",
     "illuminance_lux",
     "scene_light",

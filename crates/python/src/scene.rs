@@ -196,6 +196,8 @@ impl Scene {
     ///     Files of the depth and of the camera data, in place of those in the file or beside it.
     /// depth_unit, depth_kind : str, optional
     ///     What the depth's numbers are, as ``"5000/m"``, ``"radial"``, ``"inverse:0.5,20"``, ``"disparity:0.193"``.
+    /// panorama : str, optional
+    ///     A picture of all directions, ``"equirectangular"`` or ``"cube"``, and where a camera in it looks: ``"cube:90,0"``.
     /// illuminant : str, optional
     ///     The light that it is put under, as ``"D65"``, ``"3200K"``, or a CSV file.
     /// illuminance_lux : float, optional
@@ -385,6 +387,7 @@ pub(crate) const SCENE_OPTIONS: &[&str] = &[
     "depth_unit",
     "depth_kind",
     "view",
+    "panorama",
     "illuminant",
     "illuminance_lux",
     "light",
@@ -421,6 +424,7 @@ pub(crate) fn set_scene_option(spec: &mut SceneSpec, key: &str, value: &Bound<'_
         "no_data" => spec.reading.no_data = Some(parsed(key, value)?),
         "depth_unit" => spec.reading.depth_unit = Some(word(key, value)?),
         "depth_kind" => spec.reading.depth_kind = Some(parsed(key, value)?),
+        "panorama" => spec.reading.panorama = Some(parsed(key, value)?),
         "depth" | "view" => {
             let path: PathBuf = value.extract().map_err(|_| wrong_type(key, type_name(value), "a path"))?;
             if key == "depth" { spec.reading.depth = Some(path) } else { spec.reading.view = Some(path) }

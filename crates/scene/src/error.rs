@@ -44,7 +44,7 @@ pub enum SceneError {
     },
     /// A file whose name does not determine its kind.
     #[error(
-        "{}: expected a .exr, .hdr (ENVI or Radiance), .mat, .npy, .tif, .png, .jpg, .webp, .bmp, .ppm or .pfm file, or a folder with \
+        "{}: expected a .exr, .hdr (ENVI or Radiance), .mat, .h5, .npy, .npz, .csv, .tif, .png, .jpg, .webp, .bmp, .ppm or .pfm file, or a folder with \
          one picture a band",
         file.display()
     )]

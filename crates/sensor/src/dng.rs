@@ -9,6 +9,7 @@ mod file_profile;
 mod levels;
 mod lossless_jpeg;
 mod opcodes;
+mod predictor;
 mod read;
 #[cfg(test)]
 mod read_tests;
@@ -30,7 +31,7 @@ use self::{
 pub use self::{
     file_color::{DngColor, DngLight},
     file_profile::{DngNoise, DngProfile},
-    read::{DngFile, DngOpcodes, DngShot},
+    read::{DngFile, DngOpcodes, DngShot, raw_format_by_name, raw_format_of},
 };
 use crate::{
     LensCorrections, LensTables, Picture, Raw, RawPlane, Sensor, SensorError, files::write_error,

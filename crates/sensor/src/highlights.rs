@@ -3,14 +3,17 @@
 //! A light of more than a pixel holds saturates its channels one after the other, and clipping each by itself turns its hue: an
 //! orange lamp becomes yellow, then white. Here the missing channels are found from the channels that are left and
 //! the color of the bright surroundings, and where nothing is left the color alone is kept. The color is carried into what is
-//! saturated by a pyramid of means that is filled from its coarse levels (Gortler et al., "The lumigraph", SIGGRAPH 1996,
+//! saturated, as far as its rim tells it (`rim`), by a pyramid of means that is filled from its coarse levels (Gortler et al., "The lumigraph", SIGGRAPH 1996,
 //! "pull-push"); that color changes less than brightness where light is blown is what Zhang & Brainard ("Estimation of saturated
 //! pixel values in digital color imaging", J. Opt. Soc. Am. A 21, 2004) rest on.
+
+mod rim;
 
 use ndarray::Array2;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use self::rim::{Blocks, part};
 use crate::{SensorError, Tile, plane_rows::plane_rows};
 
 /// What becomes of light beyond saturation.
@@ -52,6 +55,9 @@ const SURE: f32 = 0.9;
 /// Surroundings tell the color of what is blown where they are part of its glow: not at all up to the first of these shares of
 /// saturation, by their largest channel, and fully from the second on. What is blown before a dim wall is white.
 const GLOW: [f32; 2] = [0.3, 0.5];
+/// Where two channels or more are left, the color about a pixel is its own up to the first of these distances (of the logarithms of its channels
+/// from that color), and another's from the second on: white is assumed then.
+const OTHER_HUE: [f32; 2] = [0.08, 0.3];
 /// A glint is as small as pixels are apart: its filters see different parts of it, whatever is demosaiced. Its color is the mean over so many
 /// pixels each way, all channels held to one level. What is blown within a wider window tells how small it is: all of a glint up to the first
 /// of these numbers of pixels, none from the second on.
@@ -101,32 +107,80 @@ fn spread(bits: &Array2<u32>) -> Array2<u32> {
 }
 
 /// Rebuilds the saturated channels of balanced light; `levels` is the balanced saturation of each channel.
+///
+/// First come pixels of which two channels or more are left, by the color of the unsaturated light about them; then those of which one or none
+/// is, by the color of what was rebuilt next to them.
 pub(crate) fn reconstruct(channels: &mut [Array2<f32>], saturated: &Saturated, levels: &[f64]) {
     let levels: Vec<f32> = levels.iter().map(|&level| level as f32).collect();
-    let colors = surrounding_colors(channels, saturated, &levels);
-    let columns = saturated.bits.ncols();
-    let lines = plane_rows(channels);
-    lines.into_par_iter().enumerate().for_each(|(row, mut line)| {
-        for column in 0..columns {
-            let bits = saturated.bits[(row, column)];
-            if bits != 0 {
-                let blown = line
-                    .iter()
-                    .zip(&levels)
-                    .enumerate()
-                    .fold(0_u32, |blown, (k, (line, level))| blown | u32::from(line[column] >= SURE * level) << k);
-                let is_saturated = |k: usize| (bits & blown) >> k & 1 == 1;
-                let color = colors.at(row, column);
-                let scale = scale(&line, column, color, &levels, &is_saturated);
-                for (k, line) in line.iter_mut().enumerate().filter(|(k, _)| is_saturated(*k)) {
-                    line[column] = (scale * color[k]).min(MOST * levels[k]).max(line[column]);
-                }
-            }
-        }
-    });
+    let over = over(channels, &levels);
+    let n = levels.len() as u32;
+    let n_left = |over: u32| n - over.count_ones();
+    let colors = surrounding_colors(channels, &levels, &over.mapv(|over| over == 0));
+    rebuild(
+        channels,
+        (saturated, &over),
+        &levels,
+        |over| n_left(over) >= 2,
+        |row, column| (colors.at(row, column), 1.0),
+    );
+    if over.iter().any(|&over| n_left(over) < 2) {
+        let told = Blocks::new(channels, &levels, SURE).told(GLOW[1]);
+        let colors = surrounding_colors(channels, &levels, &over.mapv(|over| n_left(over) >= 2));
+        let known = |row: usize, column: usize| (colors.at(row, column), told[(row / 2) * colors.columns + column / 2]);
+        rebuild(channels, (saturated, &over), &levels, |over| n_left(over) < 2, known);
+    }
     if saturated.is_mosaic {
         even_glints(channels, saturated, &levels);
     }
+}
+
+/// Returns which channels of each pixel are surely saturated where they are next to a saturated sample, a bit a channel.
+fn over(channels: &[Array2<f32>], levels: &[f32]) -> Array2<u32> {
+    let mut over = Array2::zeros(channels[0].dim());
+    for (k, (plane, level)) in channels.iter().zip(levels).enumerate() {
+        ndarray::Zip::from(&mut over).and(plane).par_for_each(|over, &v| *over |= u32::from(v >= SURE * level) << k);
+    }
+    over
+}
+
+/// Rebuilds the pixels that are wanted by their channels that are over, with a color for each and how far it is known, 0 to 1.
+fn rebuild<'a>(
+    channels: &mut [Array2<f32>],
+    (saturated, over): (&Saturated, &Array2<u32>),
+    levels: &[f32],
+    is_wanted: impl Fn(u32) -> bool + Sync,
+    color_at: impl Fn(usize, usize) -> (&'a [f32], f32) + Sync,
+) {
+    let columns = over.ncols();
+    plane_rows(channels).into_par_iter().enumerate().for_each(|(row, mut line)| {
+        let mut mixed = vec![0.0; levels.len()];
+        for column in 0..columns {
+            let blown = saturated.bits[(row, column)] & over[(row, column)];
+            if blown == 0 || !is_wanted(over[(row, column)]) {
+                continue;
+            }
+            let is_saturated = |k: usize| blown >> k & 1 == 1;
+            let (color, known) = color_at(row, column);
+            let own_scale = scale(&line, column, color, levels, &is_saturated);
+            let left = || (0..levels.len()).filter(|k| !is_saturated(*k));
+            let off = left()
+                .filter(|k| color[*k] > 0.0)
+                .map(|k| (line[k][column].max(1e-6) / (own_scale * color[k])).ln().abs())
+                .fold(0.0, f32::max);
+            // The color about it, as far as it is this pixel's, and white.
+            let is_own = known * (1.0 - part(off, OTHER_HUE));
+            let white = (1.0 - is_own) / color.len() as f32;
+            mixed.iter_mut().zip(color).for_each(|(mixed, own)| *mixed = is_own * own + white);
+            let scale = scale(&line, column, &mixed, levels, &is_saturated);
+            // Of two channels that are left the lesser: light that saturates the most sensitive filter, green, and has less of it than of both others is
+            // next to never seen, and what is wrong with a color shows as such purple.
+            let least =
+                if left().count() >= 2 { left().map(|k| line[k][column]).fold(f32::INFINITY, f32::min) } else { 0.0 };
+            for (k, line) in line.iter_mut().enumerate().filter(|(k, _)| is_saturated(*k)) {
+                line[column] = (scale * mixed[k]).max(least).min(MOST * levels[k]).max(line[column]);
+            }
+        }
+    });
 }
 
 /// Gives glints the mean color about them, as bright as each pixel is.
@@ -215,21 +269,20 @@ struct Level {
     sums: Vec<f32>,
 }
 
-fn surrounding_colors(channels: &[Array2<f32>], saturated: &Saturated, levels: &[f32]) -> Colors {
+/// Returns the colors of places that are sources, carried into all others.
+fn surrounding_colors(channels: &[Array2<f32>], levels: &[f32], is_source: &Array2<bool>) -> Colors {
     let n = channels.len();
     let n_sums = n + 1;
     // The color at a place is the mean of light weighted by the square of its brightness: bright surroundings, up to the rim of what
     // is blown, are part of it.
-    let (rows, columns) = saturated.bits.dim();
+    let (rows, columns) = is_source.dim();
     let (half_rows, half_columns) = (rows.div_ceil(2), columns.div_ceil(2));
     let mut sums = vec![0.0_f32; half_rows * half_columns * n_sums];
     sums.par_chunks_mut(half_columns * n_sums).enumerate().for_each(|(half_row, line)| {
         for (half_column, place) in line.chunks_exact_mut(n_sums).enumerate() {
             for row in 2 * half_row..(2 * half_row + 2).min(rows) {
                 for column in 2 * half_column..(2 * half_column + 2).min(columns) {
-                    let is_blown =
-                        channels.iter().zip(levels).any(|(plane, level)| plane[(row, column)] >= SURE * level);
-                    if !is_blown {
+                    if is_source[(row, column)] {
                         let brightness: f32 = channels.iter().map(|plane| plane[(row, column)].max(0.0)).sum();
                         for (sum, plane) in place.iter_mut().zip(channels) {
                             *sum += brightness * brightness * plane[(row, column)].max(0.0);
@@ -256,8 +309,7 @@ fn surrounding_colors(channels: &[Array2<f32>], saturated: &Saturated, levels: &
         let (sums, weight) = (&place[..n], place[n]);
         let sum: f32 = sums.iter().sum();
         let share = sums.iter().zip(levels).map(|(sum, level)| sum / (weight * level)).fold(0.0, f32::max);
-        let part = ((share - GLOW[0]) / (GLOW[1] - GLOW[0])).clamp(0.0, 1.0);
-        let known = if weight > 0.0 && sum > 0.0 { part * part * (3.0 - 2.0 * part) } else { 0.0 };
+        let known = if weight > 0.0 && sum > 0.0 { part(share, GLOW) } else { 0.0 };
         let white = (1.0 - known) / n as f32;
         color
             .iter_mut()
@@ -374,6 +426,26 @@ mod tests {
         reconstruct(&mut channels, &saturated, &[1.0; 3]);
         assert_eq!(dimmed([0, 1, 2].map(|k| channels[k][(30, 40)])), [1.0; 3]);
         assert_eq!([0, 1, 2].map(|k| channels[k][(5, 5)]), wall);
+    }
+
+    /// A wide white wall under light that fades to one side, a red book before it: what is blown of the wall has no part of the book's color, nor has
+    /// the strip in which the wall's green alone is blown.
+    #[test]
+    fn a_wide_blown_wall_is_white_beside_a_book() {
+        // White gives red and blue less than green by these.
+        let levels = [2.6_f32, 1.0, 1.5];
+        let light = |r: usize, c: usize| {
+            let (wall, is_book) = (6.0 - 0.05 * c as f32, (30..60).contains(&r) && (20..50).contains(&c));
+            if is_book { [0.45 * wall, 0.16 * wall, 0.12 * wall] } else { [wall; 3] }
+        };
+        let mut channels = [0, 1, 2].map(|k| Array2::from_shape_fn((90, 120), |(r, c)| light(r, c)[k].min(levels[k])));
+        let shares: Vec<Array2<f32>> = channels.iter().zip(levels).map(|(plane, level)| plane / level).collect();
+        let saturated = Saturated::find(&shares, None, 3, 0.999).unwrap();
+        reconstruct(&mut channels, &saturated, &levels.map(f64::from));
+        for (row, column) in [(10, 10), (45, 12), (45, 60), (70, 80), (45, 99), (20, 105), (80, 118)] {
+            let [r, g, b] = dimmed([0, 1, 2].map(|k| channels[k][(row, column)]));
+            assert!(r.min(g).min(b) > 0.95 * r.max(g).max(b), "{row} {column}: {r} {g} {b}");
+        }
     }
 
     /// Glints of white light on gray, smaller than the mosaic's tile, at every phase of it.

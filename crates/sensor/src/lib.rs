@@ -89,7 +89,10 @@ pub use collect::Illumination;
 pub use color::{ColorCorrection, ColorMatrix};
 pub use demosaic::{Demosaic, demosaic};
 pub use disparity::{DisparityAxis, DisparityMap, DisparitySearch};
-pub use dng::{DngColor, DngDetails, DngFile, DngLight, DngNoise, DngOpcodes, DngProfile, DngShot};
+pub use dng::{
+    DngColor, DngDetails, DngFile, DngLight, DngNoise, DngOpcodes, DngProfile, DngShot, raw_format_by_name,
+    raw_format_of,
+};
 pub use error::SensorError;
 pub use exit_pupil::ExitPupil;
 pub use exposure::{AutoExposure, Exposure, ExposureControl, GainMode, Metering};
@@ -116,7 +119,7 @@ pub use response::{Adc, Response};
 pub use rolling::{ImagePlace, RollingShutter};
 pub use scielab::{scielab_delta_e, visual_snr};
 pub use sensor::{DarkCurrent, Defects, Filter, HighGain, Layer, Sensor, SplitPixel};
-pub use sfr::{EdgeResponse, find_edge};
+pub use sfr::{EdgeResponse, find_edge, find_edges};
 pub use shading::{LensShading, ShadingMap};
 pub use similarity::{psnr_db, ssim};
 pub use space::ColorSpace;

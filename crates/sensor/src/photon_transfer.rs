@@ -11,10 +11,12 @@ use crate::SensorError;
 /// The variance of rounding to whole numbers.
 const QUANTISATION_VARIANCE: f64 = 1.0 / 12.0;
 /// A dark variance below this is that of rounding, DN²: the noise may be anything below its root without that of rounding, 0.4 DN.
-const HIDDEN_BELOW_DN2: f64 = 0.24;
+pub(crate) const HIDDEN_BELOW_DN2: f64 = 0.24;
 /// The signal between which linearity is judged, as shares of saturation (EMVA 1288, 6.7).
 const LINEAR_FROM: f64 = 0.05;
 const LINEAR_TO: f64 = 0.95;
+/// Beyond saturation the variance falls: to this share of its largest or below.
+const FALLEN_TO: f64 = 0.9;
 /// The share of saturation up to which the gain is fitted (EMVA 1288, 6.6).
 const FIT_UP_TO: f64 = 0.7;
 
@@ -109,8 +111,10 @@ pub struct PhotonTransfer {
     /// How far the signal is from the straight line that fits it best; `None` where fewer than three points lie between 5 and 95 % of
     /// saturation.
     pub linearity: Option<Linearity>,
-    /// The electrons at which the variance is largest: saturation.
+    /// The electrons at which the variance is largest: saturation, where [`is_saturated`](Self::is_saturated).
     pub saturation_e: f64,
+    /// Whether the series goes on to where the variance has fallen; where not, saturation lies beyond its brightest point.
+    pub is_saturated: bool,
     /// The photons at which signal and noise are equal.
     pub threshold_photons: f64,
     /// Saturation over the threshold, dB.
@@ -136,6 +140,9 @@ impl PhotonTransfer {
         };
         let saturated = points.iter().max_by(|a, b| a.variance_dn2.total_cmp(&b.variance_dn2)).ok_or_else(|| few(0))?;
         let limit = FIT_UP_TO * saturated.photons;
+        let is_saturated = points
+            .iter()
+            .any(|p| p.photons > saturated.photons && p.variance_dn2 <= FALLEN_TO * saturated.variance_dn2);
         let fitted: Vec<&FlatPoint> = points.iter().filter(|p| p.photons <= limit).collect();
         if fitted.len() < 3 {
             return Err(few(fitted.len()));
@@ -164,6 +171,7 @@ impl PhotonTransfer {
             dark_noise_is_limit,
             linearity: Linearity::fit(&dark, &points, saturated.mean_dn),
             saturation_e,
+            is_saturated,
             threshold_photons: threshold_e / quantum_efficiency,
             dynamic_range_db: 20.0 * (saturation_e / threshold_e).log10(),
             dark,

@@ -6,12 +6,16 @@
 //! quarters of a pixel, and the window is as wide as the noise at each frequency allows instead of as wide as the region. So the noise of the
 //! pixels, seen beside the edge, gives each response its standard error.
 
+mod beside;
 mod edge_line;
 mod edge_profile;
+mod find;
 
 use ndarray::{Array2, ArrayView2};
 
+pub use self::find::{find_edge, find_edges};
 use self::{
+    beside::Side,
     edge_line::{EdgeLine, direction_rad},
     edge_profile::EdgeProfile,
 };
@@ -68,6 +72,9 @@ pub struct EdgeResponse {
     pub contrast: f64,
     /// The contrast in standard deviations of a pixel beside the edge; infinite where there is no noise.
     pub contrast_to_noise: f64,
+    /// By how much light changes from the edge to the border of the region, of the contrast, on the side where it does so more: shading, which is
+    /// taken off; 0 where it is not told from noise.
+    pub shading: f64,
 }
 
 fn unsuitable(reason: String) -> SensorError {
@@ -79,7 +86,7 @@ impl EdgeResponse {
     ///
     /// # Errors
     /// When the region is under 16 × 16 pixels, has no edge, one that is not slanted by 1° to 44.5°, not straight, too near to the border, or
-    /// too short for all phases of a pixel; or when it is lost in noise: a contrast below two standard deviations of a pixel, or an MTF50 whose
+    /// too short for all phases of a pixel; when there is another edge, or light that changes by more than 30 % of the contrast, beside it; or when it is lost in noise: a contrast below two standard deviations of a pixel, or an MTF50 whose
     /// standard error is beyond 30 %.
     pub fn measure(region: &ArrayView2<'_, f32>) -> Result<Self, SensorError> {
         let (rows, columns) = region.dim();
@@ -91,12 +98,13 @@ impl EdgeResponse {
         let is_upright = rough_rad.cos().abs() >= rough_rad.sin().abs();
         let region = if is_upright { region.view() } else { region.t() };
         let rough_slope = if is_upright { -rough_rad.tan() } else { -1.0 / rough_rad.tan() };
-        let slanted = Slanted::new(&region, rough_slope)?;
+        let mut slanted = Slanted::new(&region, rough_slope)?;
         let slant_deg = slanted.line.slope.atan().to_degrees().abs();
         if !SLANTS_DEG.contains(&slant_deg) {
             return Err(unsuitable(format!("is slanted by {slant_deg:.2}°, expected 1° to 44.5°")));
         }
         slanted.check(&region)?;
+        slanted.rises_per_px = slanted.rises_beside()?;
         let response = slanted.response(slant_deg)?;
         match (response.mtf50(), response.mtf50_error()) {
             (Some(mtf50), Some(error)) if error > MOST_ERROR * mtf50 => Err(unsuitable(format!(
@@ -169,6 +177,8 @@ struct Slanted {
     blur_px: f64,
     /// The light of both sides, and the variance of a pixel there.
     sides: [(f64, f64); 2],
+    /// By how much the light of both sides changes for each pixel to the right.
+    rises_per_px: [f64; 2],
 }
 
 impl Slanted {
@@ -188,8 +198,17 @@ impl Slanted {
         let distances = line.distances(region.dim());
         let profile = EdgeProfile::fit(region, &distances, &used)?;
         let known = well_known(&distances)?;
-        let mut slanted =
-            Self { line, distances, used, profile, known, center: 0.0, blur_px: 0.0, sides: [(0.0, 0.0); 2] };
+        let mut slanted = Self {
+            line,
+            distances,
+            used,
+            profile,
+            known,
+            center: 0.0,
+            blur_px: 0.0,
+            sides: [(0.0, 0.0); 2],
+            rises_per_px: [0.0; 2],
+        };
         slanted.center = slanted.steepest()?;
         // The second round looks as far as the blur of the first one reaches, so that noise further away does not count.
         let reach = (slanted.center - known[0]).min(known[1] - slanted.center);
@@ -254,6 +273,39 @@ impl Slanted {
         let both = (left[2] + right[2]) / (left[0] + right[0]);
         let of = |[n, sum, squares]: [f64; 3]| (sum / n, freedom * if n < few { both } else { squares / n });
         Some([of(left), of(right)])
+    }
+
+    /// Returns the standard deviation of a Gaussian as steep as the edge over a pixel, which nothing beside the edge makes wider.
+    fn steep_px(&self) -> f64 {
+        let places = (-8..=8).map(|i| self.center + 0.25 * f64::from(i));
+        let steepest = places.map(|at| (self.mean(at, at + 1.0) - self.mean(at - 1.0, at)).abs()).fold(0.0, f64::max);
+        self.contrast() / (steepest.max(f64::MIN_POSITIVE) * std::f64::consts::TAU.sqrt())
+    }
+
+    /// Returns by how much the light of both sides changes for each pixel to the right.
+    fn rises_beside(&self) -> Result<[f64; 2], SensorError> {
+        let blur_px = self.blur_px.min(self.steep_px());
+        let n_per_px = self.distances.len() as f64 / (self.known[1] - self.known[0]);
+        let side = |sign: f64, end: f64| {
+            let mean = |from: f64, to: f64| {
+                let (a, b) = (self.center + sign * from, self.center + sign * to);
+                self.mean(a.min(b), a.max(b))
+            };
+            let side = Side {
+                mean: &mean,
+                reach_px: (end - self.center).abs(),
+                blur_px,
+                contrast: self.contrast(),
+                error: self.noise() / n_per_px.sqrt(),
+            };
+            side.rise_per_px().map(|rise| sign * rise)
+        };
+        Ok([side(-1.0, self.known[0])?, side(1.0, self.known[1])?])
+    }
+
+    /// Returns the slope of shading at a distance from the edge.
+    fn rise_at(&self, off: f64) -> f64 {
+        self.rises_per_px[usize::from(off > 0.0)]
     }
 
     fn contrast(&self) -> f64 {
@@ -376,7 +428,10 @@ impl Slanted {
         let spread = (0..n).map(|i| (inverse(i) - mean_inverse).powi(2)).sum::<f64>();
         // A line over 1 / distance on each side, of one slope.
         let side = |sign: f64| {
-            let value = |i: usize| self.profile.at(self.center + sign / inverse(i))[0];
+            let value = |i: usize| {
+                let off = sign / inverse(i);
+                self.profile.at(self.center + off)[0] - off * self.rise_at(off)
+            };
             let mean = (0..n).map(value).sum::<f64>() / n as f64;
             let slope = (0..n).map(|i| (inverse(i) - mean_inverse) * (value(i) - mean)).sum::<f64>() / spread;
             (mean, slope)
@@ -399,11 +454,14 @@ impl Slanted {
             let n = (2.0 * half / SLOPE_STEP_PX).ceil() as usize;
             let step = 2.0 * half / n as f64;
             let sum = |wave: fn(f64) -> f64| {
-                let places = (0..n).map(|i| (i as f64 + 0.5) * step - half).map(|off| {
-                    let phase = std::f64::consts::TAU * frequency * off;
-                    (self.center + off, step * tukey(off / half) * wave(phase))
-                });
-                self.profile.sum_of_slopes(places, &noise)
+                let weighted = |i: usize| {
+                    let off = (i as f64 + 0.5) * step - half;
+                    (off, step * tukey(off / half) * wave(std::f64::consts::TAU * frequency * off))
+                };
+                let shading: f64 = (0..n).map(weighted).map(|(off, weight)| weight * self.rise_at(off)).sum();
+                let places = (0..n).map(weighted).map(|(off, weight)| (self.center + off, weight));
+                let (sum, variance) = self.profile.sum_of_slopes(places, &noise);
+                (sum - shading, variance)
             };
             let ((re, re_variance), (im, im_variance)) = (sum(f64::cos), sum(f64::sin));
             (re.hypot(im), re_variance + im_variance)
@@ -436,6 +494,8 @@ impl Slanted {
             slant_deg,
             contrast: self.contrast(),
             contrast_to_noise,
+            shading: self.rises_per_px.iter().fold(0.0, |most: f64, rise| most.max(rise.abs())) * widest
+                / self.contrast(),
         })
     }
 }
@@ -464,93 +524,20 @@ pub(crate) fn interpolated(frequencies: &[f64], values: &[f64], frequency: f64) 
     values[below] + (values[below + 1] - values[below]) * (place - below as f64)
 }
 
-/// Returns the corner of the square that most looks like a single slanted edge.
-///
-/// # Errors
-/// When the picture is smaller than the square, or no square holds a single slanted edge.
-pub fn find_edge(picture: &Array2<f32>, side: usize) -> Result<(usize, usize), SensorError> {
-    let (rows, columns) = picture.dim();
-    if side < 16 || rows < side || columns < side {
-        let (expected, found) = (format!("{side} × {side}, and 16 × 16"), format!("{rows} × {columns}"));
-        return Err(SensorError::Shape {
-            what: "rows × columns of a picture with an edge (at least)",
-            expected,
-            found,
-        });
-    }
-    let step = (side / 4).max(1);
-    let corners = (0..=rows - side).step_by(step).flat_map(|r| (0..=columns - side).step_by(step).map(move |c| (r, c)));
-    let score =
-        |&(r, c): &(usize, usize)| Tensor::of(&picture.slice(ndarray::s![r..r + side, c..c + side])).edge_score();
-    let best = corners.map(|corner| (score(&corner), corner)).max_by(|a, b| a.0.total_cmp(&b.0));
-    match best {
-        Some((score, corner)) if score > 0.0 => Ok(corner),
-        _ => {
-            let reason = "is nowhere in the picture".to_owned();
-            Err(SensorError::Unsuitable { what: "the slanted edge", reason })
-        }
-    }
-}
-
-/// The structure tensor of a region: the mean products of its slopes, and where the slopes are.
-struct Tensor {
-    xx: f64,
-    xy: f64,
-    yy: f64,
-    /// How far that is from the region's middle, as a share of its height and width.
-    off_center: f64,
-}
-
-impl Tensor {
-    fn of(region: &ArrayView2<'_, f32>) -> Self {
-        let (rows, columns) = region.dim();
-        let (mut xx, mut xy, mut yy, mut x_mean, mut y_mean) = (0.0, 0.0, 0.0, 0.0, 0.0);
-        for row in 1..rows - 1 {
-            for column in 1..columns - 1 {
-                let at = |r: usize, c: usize| f64::from(region[(r, c)]);
-                // Sobel's slopes are the same in all directions to a few degrees.
-                let smooth = |a: f64, b: f64, c: f64| 0.25 * (a + 2.0 * b + c);
-                let (r, c) = (row, column);
-                let dx = smooth(at(r - 1, c + 1), at(r, c + 1), at(r + 1, c + 1))
-                    - smooth(at(r - 1, c - 1), at(r, c - 1), at(r + 1, c - 1));
-                let dy = smooth(at(r + 1, c - 1), at(r + 1, c), at(r + 1, c + 1))
-                    - smooth(at(r - 1, c - 1), at(r - 1, c), at(r - 1, c + 1));
-                let square = dx * dx + dy * dy;
-                (xx, xy, yy) = (xx + dx * dx, xy + dx * dy, yy + dy * dy);
-                x_mean += square * (c as f64 / (columns - 1) as f64 - 0.5);
-                y_mean += square * (r as f64 / (rows - 1) as f64 - 0.5);
-            }
-        }
-        let energy = (xx + yy).max(f64::MIN_POSITIVE);
-        let (down, right) = (y_mean / energy, x_mean / energy);
-        Self { xx, xy, yy, off_center: down.hypot(right) }
-    }
-
-    /// Returns the direction in which the light changes, radians from the rows.
-    fn direction_rad(&self) -> Option<f64> {
-        (self.xx + self.yy > 0.0).then(|| 0.5 * (2.0 * self.xy).atan2(self.xx - self.yy))
-    }
-
-    /// Returns how much a region looks like one slanted edge through its middle; 0 where the slant does not do.
-    fn edge_score(&self) -> f64 {
-        let Some(direction_rad) = self.direction_rad() else { return 0.0 };
-        let slant_deg = ((direction_rad.to_degrees().rem_euclid(90.0) + 45.0).rem_euclid(90.0) - 45.0).abs();
-        if !SLANTS_DEG.contains(&slant_deg) {
-            return 0.0;
-        }
-        let energy = self.xx + self.yy;
-        // 1 where all slopes point the same way; a corner or a texture has much less.
-        let coherence = (self.xx - self.yy).hypot(2.0 * self.xy) / energy;
-        energy.sqrt() * coherence.powi(8) * (-(self.off_center / 0.1).powi(2)).exp()
-    }
-}
-
 #[cfg(test)]
 impl EdgeResponse {
     /// Returns a response without noise.
     pub(crate) fn of_curve(frequencies: Vec<f64>, response: Vec<f64>) -> Self {
         let standard_error = vec![0.0; response.len()];
-        Self { frequencies, response, standard_error, slant_deg: 5.0, contrast: 1.0, contrast_to_noise: f64::INFINITY }
+        Self {
+            frequencies,
+            response,
+            standard_error,
+            slant_deg: 5.0,
+            contrast: 1.0,
+            contrast_to_noise: f64::INFINITY,
+            shading: 0.0,
+        }
     }
 }
 
@@ -558,7 +545,7 @@ impl EdgeResponse {
 mod tests {
     use super::*;
 
-    /// The profile of an edge, every hundredth of a pixel to 50 pixels on both sides.
+    /// The profile of an edge, shading: 0.0, every hundredth of a pixel to 50 pixels on both sides.
     struct Table(Vec<f64>);
 
     impl Table {
@@ -772,6 +759,66 @@ mod tests {
         // Sixteen rows at 1.5° show less than half of a pixel's phases, and none of them twice.
         let short = Table::of(&gaussian, 2.0).edge(1.5, (16, 64));
         assert!(reason(&short).contains("too few phases"), "{}", reason(&short));
+    }
+
+    #[test]
+    fn shading_beside_an_edge_is_taken_off() {
+        let table = Table::of(&gaussian, 2.0);
+        // Light that falls by a share of itself over the region, to the right and down, with and without noise.
+        for (fall, noise) in [(0.05, 0.0), (0.15, 0.0), (0.1, 0.01)] {
+            let mut region = table.edge(5.0, (100, 100));
+            for ((r, c), v) in region.indexed_iter_mut() {
+                *v *= (1.0 + fall * (0.5 - c as f64 / 100.0) + 0.2 * fall * (0.5 - r as f64 / 100.0)) as f32;
+            }
+            add_noise(&mut region, noise, 3);
+            let measured = EdgeResponse::measure(&region.view()).unwrap();
+            let mtf50 = measured.mtf50().unwrap();
+            let within = 0.01 + 2.0 * measured.mtf50_error().unwrap() / mtf50;
+            assert!(
+                (mtf50 / gaussian_mtf50() - 1.0).abs() < within,
+                "{fall}, {noise}: {mtf50}, not {}",
+                gaussian_mtf50()
+            );
+            assert!(measured.shading > 0.2 * fall, "{}", measured.shading);
+        }
+        assert_eq!(EdgeResponse::measure(&table.edge(5.0, (100, 100)).view()).unwrap().shading, 0.0);
+    }
+
+    #[test]
+    fn a_second_edge_is_refused() {
+        let table = Table::of(&gaussian, 2.0);
+        let (sin, cos) = 5.0_f64.to_radians().sin_cos();
+        for (share, noise) in [(0.3, 0.0), (-0.5, 0.0), (0.3, 0.01)] {
+            let mut region = table.edge(5.0, (100, 100));
+            for ((r, c), v) in region.indexed_iter_mut() {
+                let d = (c as f64 - 78.0) * cos + (r as f64 - 50.0) * sin;
+                *v += (0.7 * share / (1.0 + (-2.0 * d).exp())) as f32;
+            }
+            add_noise(&mut region, noise, 5);
+            let error = EdgeResponse::measure(&region.view()).unwrap_err().to_string();
+            assert!(error.contains("another edge"), "{share}: {error}");
+        }
+    }
+
+    #[test]
+    fn all_edges_of_a_picture_are_found() {
+        let table = Table::of(&gaussian, 2.0);
+        let mut picture = Array2::from_elem((300, 400), 0.8);
+        let places = [(10, 20), (20, 300), (200, 30), (180, 290), (110, 160)];
+        for (row, column) in places {
+            picture.slice_mut(ndarray::s![row..row + 80, column..column + 80]).assign(&table.edge(7.0, (80, 80)));
+        }
+        let found = find_edges(&picture, 48).unwrap();
+        let measured: Vec<(usize, usize)> = found
+            .into_iter()
+            .filter(|&(r, c)| EdgeResponse::measure(&picture.slice(ndarray::s![r..r + 48, c..c + 48])).is_ok())
+            .collect();
+        for (row, column) in places {
+            let is_there = |&(r, c): &(usize, usize)| {
+                (row..row + 80).contains(&(r + 24)) && (column..column + 80).contains(&(c + 24))
+            };
+            assert!(measured.iter().any(is_there), "{row} {column}: {measured:?}");
+        }
     }
 
     #[test]

@@ -4,7 +4,10 @@ use dioptric_fft::Planner;
 use ndarray::{Array2, Axis, Zip};
 use serde::Serialize;
 
-use crate::{PhotonTransfer, SensorError, photon_transfer::check_size};
+use crate::{
+    PhotonTransfer, SensorError,
+    photon_transfer::{HIDDEN_BELOW_DN2, check_size},
+};
 
 /// Frames under equal light, added up one by one, so that no more than two are ever held.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -20,8 +23,16 @@ pub struct FrameStack {
 pub struct NonUniformity {
     /// Dark-signal non-uniformity, rms electrons.
     pub dsnu_e: f64,
+    /// One standard error of it, electrons: what is below twice that is not told from noise.
+    pub dsnu_error_e: f64,
     /// Photo-response non-uniformity, rms share.
     pub prnu_fraction: f64,
+    /// One standard error of it.
+    pub prnu_error_fraction: f64,
+    /// Whether rounding hides the first: neither temporal noise nor the patterns themselves carry samples over its steps.
+    pub dsnu_is_hidden: bool,
+    /// Whether it hides the second.
+    pub prnu_is_hidden: bool,
     /// What of the first is of rows, of columns and of single pixels, rms electrons: their squares sum to that of the whole.
     pub dsnu_parts_e: Parts,
     /// The same of the second, rms shares.
@@ -135,6 +146,19 @@ impl FrameStack {
         Ok(Parts { row: of_rows - pixels / columns, column: of_columns - pixels / rows, pixel: pixels - temporal })
     }
 
+    /// Returns one standard error of the spatial variance: that of a variance of so many independent pixels, noise and patterns together.
+    fn spatial_variance_error(&self) -> f64 {
+        let n_pixels = self.mean.len() as f64;
+        let mean = self.mean();
+        let all = self.mean.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n_pixels - 1.0);
+        all * (2.0 / (n_pixels - 1.0)).sqrt()
+    }
+
+    /// Returns whether rounding hides patterns: temporal noise is below that of rounding (EMVA 1288, 6.5), and patterns are below a step.
+    fn is_hidden(&self, spatial_variance: f64) -> bool {
+        self.temporal_variance() < HIDDEN_BELOW_DN2 && spatial_variance < 1.0
+    }
+
     /// Returns the mean variance of a pixel from frame to frame.
     fn temporal_variance(&self) -> f64 {
         self.scatter.sum() / (self.n_frames as f64 - 1.0) / self.mean.len() as f64
@@ -188,6 +212,9 @@ impl NonUniformity {
         let (dark_parts, bright_parts) = (dark.variance_parts()?, bright.variance_parts()?);
         let signal = bright.mean() - dark.mean();
         let root = |variance: f64| variance.max(0.0).sqrt();
+        // The rise of the root by one standard error of what stands under it, which is finite at 0 too.
+        let rise = |variance: f64, error: f64| root(variance.max(0.0) + error) - root(variance);
+        let (dark_error, bright_error) = (dark.spatial_variance_error(), bright.spatial_variance_error());
         let beyond = Parts {
             row: bright_parts.row - dark_parts.row,
             column: bright_parts.column - dark_parts.column,
@@ -195,7 +222,11 @@ impl NonUniformity {
         };
         Ok(Self {
             dsnu_e: root(dark_variance) / gain_dn_per_e,
+            dsnu_error_e: rise(dark_variance, dark_error) / gain_dn_per_e,
             prnu_fraction: root(bright_variance - dark_variance) / signal,
+            prnu_error_fraction: rise(bright_variance - dark_variance, bright_error.hypot(dark_error)) / signal,
+            dsnu_is_hidden: dark.is_hidden(dark_variance),
+            prnu_is_hidden: bright.is_hidden(bright_variance),
             dsnu_parts_e: dark_parts.map(|variance| root(variance) / gain_dn_per_e),
             prnu_parts_fraction: beyond.map(|variance| root(variance) / signal),
         })

@@ -27,6 +27,7 @@ mod exr_header;
 mod grid;
 mod illuminant;
 mod image;
+mod smooth_reflectance;
 mod spectrum;
 
 /// Planes and cubes of this crate are arrays of it.
@@ -40,4 +41,5 @@ pub use exr_header::sort_exr_attributes;
 pub use grid::WavelengthGrid;
 pub use illuminant::{ColorTemperature, Illuminant, blackbody, blackbody_peak, color_checker_reflectances, daylight};
 pub use image::{Bands, DepthMap, Quantity, SpectralImage};
+pub use smooth_reflectance::SmoothReflectance;
 pub use spectrum::Spectrum;

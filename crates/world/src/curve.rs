@@ -2,9 +2,7 @@
 
 use std::sync::{Arc, OnceLock};
 
-use dioptric_spectrum::Spectrum;
-
-use crate::upsample::{SmoothReflectance, d65_of_unit_mean};
+use dioptric_spectrum::{Illuminant, Observer, SmoothReflectance, Spectrum, WavelengthGrid};
 
 /// A function of wavelength that is quick to look up and cheap to copy.
 ///
@@ -159,6 +157,15 @@ impl SpectralCurve {
     }
 }
 
+/// D65 whose mean, weighted by the photopic sensitivity, is 1.
+fn d65_of_unit_mean() -> Spectrum {
+    let d65 = Illuminant::D65.spectrum();
+    let fine = WavelengthGrid::uniform(360.0, 830.0, 1.0).expect("a valid range");
+    let luminance = |spectrum: &Spectrum| Observer::Cie1931.xyz(&fine, &spectrum.sample_held(&fine)).luminance_cd_m2();
+    let even = luminance(&Spectrum::constant(1.0));
+    d65.scaled(even / luminance(&d65))
+}
+
 fn d65() -> &'static SpectralCurve {
     static D65: OnceLock<SpectralCurve> = OnceLock::new();
     D65.get_or_init(|| SpectralCurve::new(&d65_of_unit_mean(), Beyond::Zero))
@@ -189,6 +196,16 @@ fn in_table(along_nm: f32, values: &[f32], beyond: Beyond) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn unit_light_is_as_bright_as_an_even_one() {
+        let light = SpectralCurve::from_rgb_light([1.0; 3]);
+        let grid = WavelengthGrid::uniform(380.0, 780.0, 1.0).unwrap();
+        let values: Vec<f64> = grid.centers_nm().iter().map(|&w| f64::from(light.at(&[w as f32])[0])).collect();
+        let luminance = Observer::Cie1931.xyz(&grid, &values).luminance_cd_m2();
+        // 683 lm/W times the area under the sensitivity, 106.857 nm.
+        assert!((luminance / (683.002 * 106.857) - 1.0).abs() < 1e-3, "{luminance}");
+    }
 
     #[test]
     fn curve_follows_its_spectrum() {

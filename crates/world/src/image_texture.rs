@@ -2,10 +2,10 @@
 
 use std::{io::Cursor, path::Path, sync::Arc};
 
-use dioptric_spectrum::srgb_decode;
+use dioptric_spectrum::{SmoothReflectance, srgb_decode};
 use glam::Vec2;
 
-use crate::{WorldError, upsample::SmoothReflectance};
+use crate::WorldError;
 
 /// What lies beyond the edges of a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -43,7 +43,6 @@ mod still_life;
 mod texture;
 mod tree;
 mod triangle;
-mod upsample;
 mod uv;
 mod world;
 

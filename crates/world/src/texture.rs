@@ -2,11 +2,12 @@
 
 use std::sync::Arc;
 
+use dioptric_spectrum::SmoothReflectance;
 use glam::{DVec3, Vec2};
 
 use crate::{
     ImageTexture, PatternRef, Procedural, SpectralCurve, TextureId, UvMapping, pattern::MOST_SHARES, procedural::Found,
-    upsample::SmoothReflectance, uv::TexturePoint,
+    uv::TexturePoint,
 };
 
 /// A value over a surface: a spectrum where a color is asked for, a number where a number is.

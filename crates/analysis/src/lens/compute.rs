@@ -3,21 +3,23 @@
 use std::borrow::Cow;
 
 use dioptric_diffraction::{
-    PupilGrid, PupilSamples, Wavefront, WavefrontReference, best_wavefront_film_mm, opd_waves_at, zernike::FRINGE_TERMS,
+    PupilGrid, PupilSamples, Wavefront, WavefrontReference, best_wavefront_film_mm, opd_waves_at,
 };
 use dioptric_optics::{
-    Lens, MonoLens, ObjectPoint, PupilBoundary, Shape, Surface, Vignetting,
+    Lens, MonoLens, ObjectPoint, PupilBoundary, Vignetting,
     analysis::{
         AstigmaticFoci, Autofocus, AxisFoci, NumericalApertures, PupilCoordinates, PupilLight, PupilRule,
         PupilSampling, RayFan, SpotDiagram, StraightMap, field_limit_deg, hexapolar, projected_solid_angle_onto,
         pupil_line,
     },
     glam::{DVec2, DVec3},
+    zernike::FRINGE_TERMS,
 };
 use rayon::prelude::*;
 
 use super::{
-    film::AnalysisFilm,
+    afocal::AfocalView,
+    film::{AnalysisFilm, DARK_AXIS, FilmUse, IDEAL_MM},
     request::{AnalysisRequest, Field},
     rows::{
         AxialColorRow, FanRow, FieldRow, FocusData, GridRow, LensAnalysis, OpdMap, PupilRow, SpotRow, WavefrontRow,
@@ -26,10 +28,6 @@ use super::{
 use crate::PlaneData;
 use dioptric_pipeline::{PipelineError, nearest_to_reference_nm};
 
-/// How far away an image counts as infinitely far, over the front rim's radius, and the focal length of the ideal lens that brings
-/// it near, mm.
-const PARALLEL: f64 = 1e5;
-const IDEAL_MM: f64 = 100.0;
 /// Steps of the curves over field.
 const CURVE_STEPS: usize = 40;
 /// Places along a fan.
@@ -55,40 +53,27 @@ impl AnalysisRequest {
         stated.unwrap_or_else(|| nearest_to_reference_nm(&self.wavelengths_nm))
     }
 
-    /// Analyzes a lens.
+    /// Analyzes a lens; where its light leaves in parallel and no film is given, through an ideal lens behind it.
     ///
     /// # Errors
     /// When a number makes no sense, a glass is not known at a wavelength, or the lens has no focus and no film is given.
     pub fn compute(&self, lens: &Lens) -> Result<LensAnalysis, PipelineError> {
         self.check()?;
-        let (lens, note) = self.lens_with_image(lens)?;
+        let (lens, view) = self.lens_with_image(lens)?;
         let mut analysis = self.compute_imaging(&lens)?;
-        analysis.notes.extend(note);
+        analysis.notes.extend(view.map(|view| view.note()));
+        analysis.afocal = view;
         Ok(analysis)
     }
 
     /// Returns the lens that is analyzed: the lens itself or, where it sends the light of the object off in parallel and no film
-    /// is given, the lens with an ideal one behind it, and a sentence on that.
+    /// is given, the lens with an ideal one behind it, and how that is looked at.
     ///
     /// # Errors
     /// When a glass is not known at the reference wavelength.
-    pub fn lens_with_image<'a>(&self, lens: &'a Lens) -> Result<(Cow<'a, Lens>, Option<String>), PipelineError> {
-        let mono = lens.at(self.reference_nm())?;
-        let image_z_mm = mono.conjugate(self.distance_mm).image_z_mm;
-        let is_parallel = image_z_mm.is_nan() || image_z_mm.abs() > PARALLEL * mono.semi_aperture_mm(0);
-        // What has no power anywhere, like a pinhole, is no telescope.
-        let is_plane = |surface: &Surface| surface.curvature_per_mm == 0.0 && surface.shape == Shape::Sphere;
-        let has_power = lens.interfaces().iter().any(|interface| !is_plane(&interface.surface));
-        if self.film != AnalysisFilm::BestFocus || !is_parallel || !has_power {
-            return Ok((Cow::Borrowed(lens), None));
-        }
-        let with_ideal = lens.with_ideal_lens_behind(IDEAL_MM)?;
-        let note = format!(
-            "the light leaves the lens in parallel: it is analyzed through an ideal lens of {IDEAL_MM} mm right behind it, on whose \
-             film 1 µm is {} mrad",
-            1.0 / IDEAL_MM
-        );
-        Ok((Cow::Owned(with_ideal), Some(note)))
+    pub fn lens_with_image<'a>(&self, lens: &'a Lens) -> Result<(Cow<'a, Lens>, Option<AfocalView>), PipelineError> {
+        let (wavelengths_nm, reference_nm, distance_mm) = (&self.wavelengths_nm, self.reference_nm(), self.distance_mm);
+        AfocalView::applied(lens, self.film, &FilmUse { wavelengths_nm, reference_nm, distance_mm })
     }
 
     fn compute_imaging(&self, lens: &Lens) -> Result<LensAnalysis, PipelineError> {
@@ -184,6 +169,7 @@ impl Bench {
         self.film_distance_mm = match (request.film, on_axis) {
             (AnalysisFilm::FilmMm(film_mm) | AnalysisFilm::OfFile(film_mm), _) => film_mm,
             (AnalysisFilm::FocusMm(distance_mm), _) => self.reference().film_distance_mm_for(distance_mm)?,
+            (AnalysisFilm::Afocal, _) => IDEAL_MM,
             (AnalysisFilm::BestFocus, Some((film_distance_mm, _))) => film_distance_mm,
             (AnalysisFilm::BestFocus, None) => paraxial.clone()?,
         };
@@ -212,6 +198,7 @@ impl Bench {
             reference_nm: self.reference().wavelength_nm(),
             wavelengths_nm: request.wavelengths_nm.clone(),
             notes,
+            afocal: None,
             object_index: first.object_index,
             image_index: first.image_index,
             object_na: apertures.map(|found| found.object).filter(|_| request.distance_mm.is_finite()),
@@ -222,7 +209,10 @@ impl Bench {
             f_number: first.f_number,
             working_f_number: self.reference().working_f_number(request.distance_mm),
             film_distance_mm: self.film_distance_mm,
-            film: request.film.origin(),
+            film: match request.film == AnalysisFilm::BestFocus && on_axis.is_none() {
+                true => DARK_AXIS.to_owned(),
+                false => request.film.origin(),
+            },
             half_illumination_deg: field_limit_deg(self.reference(), 0.5),
             focus: FocusData {
                 paraxial_film_mm: paraxial.ok(),

@@ -13,8 +13,10 @@ pub struct ConvertedLens {
     pub text: String,
     /// The text of a glass catalogue (`.agf`) that belongs beside it with the same name, if it needs one.
     pub glasses: Option<String>,
-    /// What the file read says and this program does otherwise or not at all, a sentence each.
+    /// What there is to say of what was asked for, a sentence each.
     pub notes: Vec<String>,
+    /// What the file read says and this program takes otherwise or not at all, a sentence each.
+    pub unread: Vec<String>,
     /// What the format written has no place for, a sentence each.
     pub losses: Vec<String>,
 }
@@ -31,7 +33,7 @@ pub fn convert_lens(input: &str, target: &Path, reading: &LensReadOptions) -> Re
     let named = target.extension().map(|e| e.to_string_lossy().to_lowercase());
     // Standard output and devices have no name that tells: our own format.
     let extension = named.unwrap_or_else(|| if is_stream(target) { "ron".to_owned() } else { String::new() });
-    let mut notes = std::mem::take(&mut file.notes);
+    let (unread, mut notes) = (std::mem::take(&mut file.notes), Vec::new());
     if reading.configuration.is_some() {
         let n_configurations = file.configurations.len();
         if n_configurations > 1 {
@@ -62,5 +64,5 @@ pub fn convert_lens(input: &str, target: &Path, reading: &LensReadOptions) -> Re
             return Err(PipelineError::Write { path: target.to_owned(), reason });
         }
     };
-    Ok(ConvertedLens { text, glasses, notes, losses })
+    Ok(ConvertedLens { text, glasses, notes, unread, losses })
 }

@@ -8,6 +8,10 @@ use dioptric_optics::{
 
 use dioptric_pipeline::PipelineError;
 
+/// The focal length of the ideal lens through which afocal light is looked at, mm: on its film 1 mm is 1/1000 of a tangent, and so
+/// 1 µm is 1 µrad near the axis, and 1 mm of focus is 1/1000 of a dioptre.
+pub(crate) const IDEAL_MM: f64 = 1000.0;
+
 /// Where the film is to be.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum AnalysisFilm {
@@ -19,6 +23,8 @@ pub enum AnalysisFilm {
     FocusMm(f64),
     /// This far behind the last vertex, mm.
     FilmMm(f64),
+    /// In the focal plane of an ideal lens behind the lens, which forms no image itself ([`AfocalView`](super::AfocalView)).
+    Afocal,
 }
 
 /// For what a film is looked for.
@@ -41,6 +47,9 @@ pub struct FilmPlace {
     pub origin: String,
 }
 
+/// What is at a film that is sought where no light comes in along the axis.
+pub(crate) const DARK_AXIS: &str = "the paraxial image, since the axis is dark";
+
 /// Rings of the rays by which a film is found.
 const RINGS: usize = 12;
 
@@ -52,18 +61,23 @@ impl AnalysisFilm {
     pub fn place(self, lens: &Lens, of: FilmUse<'_>) -> Result<FilmPlace, PipelineError> {
         let reference = lens.at(of.reference_nm)?;
         let paraxial = |distance_mm| Ok::<f64, PipelineError>(reference.film_distance_mm_for(distance_mm)?);
+        let mut origin = self.origin();
         let distance_mm = match self {
             Self::OfFile(film_mm) | Self::FilmMm(film_mm) => film_mm,
             Self::FocusMm(distance_mm) => paraxial(distance_mm)?,
+            Self::Afocal => IDEAL_MM,
             Self::BestFocus => {
                 let from = paraxial(of.distance_mm);
                 let lenses = of.wavelengths_nm.iter().map(|&nm| lens.at(nm)).collect::<Result<Vec<MonoLens>, _>>()?;
                 let found =
                     from.as_ref().ok().and_then(|&from_mm| best_on_axis(&reference, &lenses, of.distance_mm, from_mm));
+                if found.is_none() {
+                    DARK_AXIS.clone_into(&mut origin);
+                }
                 found.map_or(from, |(film_mm, _)| Ok(film_mm))?
             }
         };
-        Ok(FilmPlace { distance_mm, origin: self.origin() })
+        Ok(FilmPlace { distance_mm, origin })
     }
 
     /// Returns what is at the film, in a few words.
@@ -74,6 +88,7 @@ impl AnalysisFilm {
             Self::FocusMm(distance_mm) if distance_mm.is_infinite() => "the paraxial image of a far object".to_owned(),
             Self::FocusMm(distance_mm) => format!("the paraxial image of an object at {distance_mm} mm"),
             Self::FilmMm(_) => "where it was asked for".to_owned(),
+            Self::Afocal => "the focal plane of an ideal lens".to_owned(),
         }
     }
 }

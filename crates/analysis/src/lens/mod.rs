@@ -1,5 +1,6 @@
 //! Lenses as tables: first-order data, surfaces, glasses, explicit rays, and an analysis by real rays.
 
+mod afocal;
 mod compute;
 mod convert;
 mod curves;
@@ -15,6 +16,7 @@ mod surface_table;
 mod table;
 mod trace_table;
 
+pub use afocal::AfocalView;
 pub use compute::GRID_LINES;
 pub use convert::{ConvertedLens, convert_lens};
 pub use curves::{LensCurves, ends_of};

@@ -3,24 +3,28 @@
 use std::f64::consts::FRAC_PI_2;
 
 use dioptric_optics::{
-    MonoLens, ObjectPoint,
+    MonoLens, ObjectPoint, PupilRegion,
     analysis::{PupilLight, PupilRule, STEEPEST_FIELD_DEG, WIDEST_FIELD_DEG, field_limit_along_deg},
     glam::DVec2,
 };
 
 use super::{film::AnalysisFilm, rows::FieldPlace};
+use crate::field_angles::{FieldAngles, KNOWN_ANGLES};
 use dioptric_pipeline::PipelineError;
 
 /// The share of the axial illumination down to which fields are chosen where none are given.
 const DIMMEST: f64 = 0.25;
 /// How wide a spot may be, twice its root mean square, over the focal length, for fields to be chosen up to there.
 const WIDEST_SPOT: f64 = 0.05;
+/// Azimuths of the pupil of a field of which is asked whether it is lit.
+const LIT_AZIMUTHS: usize = 24;
 
 /// The points of the field that are looked at.
 #[derive(Clone, Debug, PartialEq)]
 pub enum AnalysisFields {
     /// 0, 0.5, 0.7 and 1 of the field above the axis at which the illumination falls to a quarter; of a lens that is not
-    /// rotationally symmetric the axis, that field above it, that beside it, and 0.7 of both.
+    /// rotationally symmetric the axis, that field above it, that beside it, and 0.7 of both. Where the axis is dark, the first, the
+    /// middle and the last lit field along y or x.
     ByLight,
     /// Angles at the entrance pupil in the x–z and the y–z plane, degrees; of a far object up to 120 along one of them.
     AnglesDeg(Vec<[f64; 2]>),
@@ -63,17 +67,10 @@ pub(super) struct Field {
 }
 
 impl Field {
-    fn of_angles([x_deg, y_deg]: [f64; 2]) -> Self {
-        let (field_deg, direction) = match (x_deg == 0.0, y_deg == 0.0) {
-            (true, _) => (y_deg.abs(), DVec2::new(0.0, if y_deg < 0.0 { -1.0 } else { 1.0 })),
-            (false, true) => (x_deg.abs(), DVec2::new(x_deg.signum(), 0.0)),
-            (false, false) => {
-                let tan = DVec2::new(x_deg.to_radians().tan(), y_deg.to_radians().tan());
-                (tan.length().atan().to_degrees(), tan.normalize())
-            }
-        };
-        let place = FieldPlace { field_deg, field_xy_deg: [x_deg, y_deg], object_mm: None };
-        Self { place, angle_rad: field_deg.to_radians(), direction }
+    fn of_angles(angles_deg: [f64; 2]) -> Self {
+        let FieldAngles { angle_deg, direction } = FieldAngles::of_deg(angles_deg);
+        let place = FieldPlace { field_deg: angle_deg, field_xy_deg: angles_deg, object_mm: None };
+        Self { place, angle_rad: angle_deg.to_radians(), direction }
     }
 
     /// Returns the field of this name.
@@ -107,10 +104,7 @@ impl Field {
 
     /// Returns the point, `dioptres` = 1/Z away, as [`ObjectPoint::from_field`] has it.
     pub(super) fn point(&self, lens: &MonoLens, dioptres: f64) -> ObjectPoint {
-        match dioptres == 0.0 {
-            true => ObjectPoint::far(self.angle_rad, self.direction),
-            false => ObjectPoint::from_field(lens, self.direction * self.angle_rad.tan(), dioptres),
-        }
+        FieldAngles { angle_deg: self.place.field_deg, direction: self.direction }.point(lens, dioptres)
     }
 }
 
@@ -120,17 +114,10 @@ impl AnalysisRequest {
         let n_fields = match &self.fields {
             AnalysisFields::ByLight => 1,
             AnalysisFields::AnglesDeg(fields) => {
-                let is_beyond = |field: &&[f64; 2]| {
-                    let [x, y] = field.map(f64::abs);
-                    let is_alone = self.distance_mm.is_infinite() && x.min(y) == 0.0;
-                    let widest = if is_alone { x.max(y) <= WIDEST_FIELD_DEG } else { x.max(y) < 90.0 };
-                    !widest || x.is_nan() || y.is_nan()
-                };
+                let is_beyond = |field: &&[f64; 2]| !FieldAngles::are_known(**field, self.distance_mm);
                 if let Some([x, y]) = fields.iter().find(is_beyond) {
                     let field = if x.abs() > y.abs() || x.is_nan() { x } else { y };
-                    let expected =
-                        "angles of up to 120 degrees along x or along y of a far object, else below 90 degrees";
-                    return Err(wrong("fields_deg", *field, expected));
+                    return Err(wrong("fields_deg", *field, KNOWN_ANGLES));
                 }
                 fields.len()
             }
@@ -164,6 +151,12 @@ impl AnalysisRequest {
         let fields: Vec<Field> = match &self.fields {
             AnalysisFields::ByLight => {
                 let (fields, end) = by_light(lens, 1e3 / way_mm);
+                if end == FieldEnd::BesideAxis {
+                    notes.push(
+                        "no light comes in along the axis: the fields are the first, the middle and the last that is lit beside it"
+                            .to_owned(),
+                    );
+                }
                 if end == FieldEnd::Blur {
                     notes.push(
                         "the fields end where light no longer comes together: beyond, spots are wider than a twentieth of the \
@@ -217,11 +210,39 @@ enum FieldEnd {
     Blur,
     /// No steeper field is looked at.
     Steepest,
+    /// The axis is dark, and light comes in beside it.
+    BesideAxis,
+}
+
+/// Whether any light of a field gets through.
+fn is_lit(lens: &MonoLens, field: &Field, dioptres: f64) -> bool {
+    lens.over_clear_pupil(&|part| {
+        PupilRegion::find(part, &field.point(lens, dioptres), LIT_AZIMUTHS).map_or(0.0, |region| region.area_mm2())
+    }) > 0.0
+}
+
+/// Returns the first, the middle and the last field, in whole degrees, that is lit without a gap from the first on, along the first of the
+/// four directions of x and y that has one.
+fn fields_beside_axis(lens: &MonoLens, dioptres: f64, steepest_deg: f64) -> Option<Vec<Field>> {
+    [DVec2::Y, DVec2::NEG_Y, DVec2::X, DVec2::NEG_X].into_iter().find_map(|direction| {
+        let is_lit = |deg: &u32| is_lit(lens, &Field::along(direction, f64::from(*deg)), dioptres);
+        let all = 1..=steepest_deg as u32;
+        let first = all.clone().find(is_lit)?;
+        let last = (first..).take_while(|deg| all.contains(deg) && is_lit(deg)).last()?;
+        let mut fields_deg = vec![f64::from(first), 0.5 * f64::from(first + last), f64::from(last)];
+        fields_deg.dedup();
+        Some(fields_deg.into_iter().map(|field_deg| Field::along(direction, field_deg)).collect())
+    })
 }
 
 /// Returns fields up to where the light falls to a quarter or no longer comes together, and which of them ends the fields.
 fn by_light(lens: &MonoLens, dioptres: f64) -> (Vec<Field>, FieldEnd) {
     let steepest_deg = if dioptres == 0.0 { WIDEST_FIELD_DEG } else { STEEPEST_FIELD_DEG };
+    if !is_lit(lens, &Field::of_angles([0.0; 2]), dioptres)
+        && let Some(fields) = fields_beside_axis(lens, dioptres, steepest_deg)
+    {
+        return (fields, FieldEnd::BesideAxis);
+    }
     let limit_deg = |direction| {
         let by_light_deg = field_limit_along_deg(lens, DIMMEST, direction, dioptres).unwrap_or(0.0);
         let by_blur_deg = blur_limit_deg(lens, direction, dioptres, by_light_deg);

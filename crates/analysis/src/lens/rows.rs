@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::afocal::AfocalView;
 use crate::PlaneData;
 use dioptric_pipeline::number;
 
@@ -23,6 +24,10 @@ pub struct LensAnalysis {
     pub wavelengths_nm: Vec<f64>,
     /// What there is to say of the request, a sentence each.
     pub notes: Vec<String>,
+    /// How light that leaves in parallel is looked at: focal length, heights, spots and foci are then those of the lens with an ideal
+    /// one behind it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub afocal: Option<AfocalView>,
     /// Index of the object space at the reference wavelength.
     pub object_index: f64,
     /// Index of the image space.

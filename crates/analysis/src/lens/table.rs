@@ -7,7 +7,10 @@ use serde::Serialize;
 
 use dioptric_pipeline::PipelineError;
 
-use super::sharp::SharpDepths;
+use super::{afocal::angular_magnification, sharp::SharpDepths};
+
+/// By how much of it the f-number of the light may differ from that of the axial beam and be taken for the same.
+const SAME_LIGHT: f64 = 0.01;
 
 /// One of the configurations of a lens file that has several: a position of a zoom lens, say.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -76,6 +79,10 @@ pub struct LensData {
     pub stop_limits: bool,
     /// The surface whose rim limits it, counted from 0.
     pub limiting_surface: usize,
+    /// The tangent of the angle under which light of a far point leaves over that under which it comes in, of a lens without power,
+    /// negative for an image upside down.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub angular_magnification: Option<f64>,
     /// Exit-pupil diameter over entrance-pupil diameter.
     pub pupil_magnification: f64,
     /// Radius of the image surface if there were no astigmatism (Petzval's), mm; negative when it bends towards the lens.
@@ -180,6 +187,20 @@ impl LensData {
         })
     }
 
+    /// Returns what the f-number and the pupils' diameters are of, in one sentence, where the light is not that of a round beam about the
+    /// axis; nothing of others.
+    pub fn note_on_light(&self) -> Option<String> {
+        let of_light = self.f_number_of_light?;
+        let first = &self.first_order;
+        ((of_light / first.f_number - 1.0).abs() > SAME_LIGHT).then(|| {
+            format!(
+                "the light is no round beam about the axis: f_number {:.4} and the pupils' diameters are those of the axial beam along y, \
+                 the light and the exposure those of f/{of_light:.4} (f_number_of_light)",
+                first.f_number
+            )
+        })
+    }
+
     /// Returns the data of a lens; with those of an image where an object distance is given.
     ///
     /// The third-order sums are those of an object at that distance, else of a far one.
@@ -213,7 +234,12 @@ impl LensData {
             }
         }
         let object_distance_mm = distance_mm.unwrap_or(f64::INFINITY);
-        let (first, limit) = (mono.first_order_for(object_distance_mm), mono.limiting_beam_for(object_distance_mm));
+        let first = mono.first_order_for(object_distance_mm);
+        // A far point does not fill the stop of a lens whose pupil is infinitely far.
+        let limit = match object_distance_mm.is_infinite() && first.entrance_pupil_diameter_mm.is_infinite() {
+            true => mono.axial_beam(f64::INFINITY).filter(|beam| !beam.is_limited_by_stop),
+            false => mono.limiting_beam_for(object_distance_mm),
+        };
         let has_odd_apertures = !lens.is_rotational() || mono.n_obscurations() > 0;
         let [half_light_field_deg, last_light_field_deg] = field_limits_deg(&mono, [0.5, 0.01]);
         Ok(Self {
@@ -224,6 +250,7 @@ impl LensData {
             f_number_of_light: has_odd_apertures.then(|| mono.f_number_of_light()).flatten(),
             stop_limits: limit.is_none_or(|beam| beam.limiting_surface == mono.stop()),
             limiting_surface: limit.map_or(mono.stop(), |beam| beam.limiting_surface),
+            angular_magnification: angular_magnification(lens, &mono),
             pupil_magnification: first.pupil_magnification(),
             petzval_radius_mm: has_sums.then(|| petzval_radius_mm(lens, &mono)).transpose()?,
             half_light_field_deg,

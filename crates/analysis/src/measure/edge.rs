@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use dioptric_sensor::{EdgeResponse, Tile, Viewing, find_edge};
+use dioptric_sensor::{EdgeResponse, SensorError, Tile, Viewing, find_edge, find_edges};
 use ndarray::{Array2, ArrayView2, s};
 use serde::Serialize;
 
@@ -10,8 +10,10 @@ use super::{CodeCurve, MeasuredPicture, Measurement, PixelRegion};
 use crate::{Corner, LineChart, Scale, Series, palette};
 use dioptric_pipeline::PipelineError;
 
-/// The side of the region that is looked for, in samples of one channel.
-const SIDE: usize = 64;
+/// The sides of the regions that are looked for, in samples of one channel: the first will do where MTF50 is as certain as this share of it, larger
+/// ones are tried where noise asks for more.
+const SIDES: [usize; 4] = [64, 96, 128, 192];
+const CERTAIN: f64 = 0.01;
 /// Pixels a degree where none are given: one a minute of arc.
 const PIXELS_PER_DEGREE: f64 = 60.0;
 /// The luminance at which pictures are looked at, cd/m².
@@ -87,6 +89,8 @@ pub struct EdgeChannel {
     pub response_error: Vec<f64>,
     /// The step of light in standard deviations of a pixel; none where there is no noise.
     pub contrast_to_noise: Option<f64>,
+    /// By how much light changes from the edge to the border of the region, of the step: shading, which was taken off; 0 where there is none.
+    pub shading: f64,
 }
 
 /// A channel in which the edge cannot be measured.
@@ -107,13 +111,20 @@ impl EdgeRequest {
     /// # Errors
     /// When the file cannot be read, there is no edge, or a setting does not go with the picture.
     pub fn measure(&self, path: &Path) -> Result<EdgeMeasurement, PipelineError> {
+        self.measure_picture(&MeasuredPicture::open(path, self.curve)?)
+    }
+
+    /// Measures the edge of a picture that is open.
+    ///
+    /// # Errors
+    /// As [`measure`](Self::measure).
+    pub(super) fn measure_picture(&self, picture: &MeasuredPicture) -> Result<EdgeMeasurement, PipelineError> {
         if let Some(value) = self.pixel_um.filter(|v| !(*v > 0.0 && v.is_finite())) {
             return Err(wrong("--pixel-um", value.to_string(), "a number above 0"));
         }
-        let picture = MeasuredPicture::open(path, self.curve)?;
         let viewing = viewing_of(self.pixels_per_degree, picture.size())?;
-        let samples = self.samples(&picture)?;
-        let region = self.region(&picture, samples.period)?;
+        let samples = self.samples(picture)?;
+        let region = self.region(picture, samples.period)?;
         let mut measured: Vec<(String, EdgeResponse)> = Vec::new();
         let mut not_measured = Vec::new();
         for (channel, parts) in &samples.channels {
@@ -137,11 +148,11 @@ impl EdgeRequest {
                     .map(|(name, response)| self.channel(name, response, &viewing))
                     .collect::<Result<_, _>>()?,
                 not_measured,
-                clipped_share: clipped_share(&picture, region),
+                clipped_share: picture.clipped_share_of(region),
             }),
             (None, first) => {
                 let reason = first.map_or_else(|| "has no channel".to_owned(), |first| first.reason.clone());
-                Err(PipelineError::Read { path: path.to_owned(), reason })
+                Err(PipelineError::Read { path: picture.name.clone().into(), reason })
             }
         }
     }
@@ -204,17 +215,39 @@ impl EdgeRequest {
             return region.check_within((rows, columns));
         }
         let in_file = |reason: String| PipelineError::Read { path: picture.name.clone().into(), reason };
-        // The colors of a mosaic would look like edges: each tile becomes one sample.
-        let luminance = picture.luminance();
-        let binned = Array2::from_shape_fn((rows / period, columns / period), |(r, c)| {
-            let tile = luminance.slice(s![r * period..(r + 1) * period, c * period..(c + 1) * period]);
-            tile.sum() / (period * period) as f32
-        });
+        let binned = binned(picture, period);
         let most = binned.nrows().min(binned.ncols());
-        let side = self.side.map_or(SIDE.min(most), |side| side / period);
-        let (row, column) = find_edge(&binned, side).map_err(|e| in_file(e.to_string()))?;
+        let square = |side: usize| find_edge(&binned, side).map(|corner| (corner, side));
+        let found = match self.side {
+            Some(side) => square(side / period),
+            None => most_certain(&binned, square(SIDES[0].min(most)), SIDES[1..].iter().filter(|side| **side <= most)),
+        };
+        let ((row, column), side) = found.map_err(|e| in_file(e.to_string()))?;
         let (rows, columns) = (side * period, side * period);
         Ok(PixelRegion { row: row * period, column: column * period, rows, columns })
+    }
+
+    /// Returns the side of the squares that are looked for, pixels.
+    pub(super) fn side_for(&self, picture: &MeasuredPicture) -> Result<usize, PipelineError> {
+        let period = self.samples(picture)?.period;
+        let (rows, columns) = picture.size();
+        Ok(self.side.unwrap_or(period * SIDES[0].min(rows.min(columns) / period)))
+    }
+
+    /// Returns the regions all over a picture that look like slanted edges, most like one first, `most` of them at most.
+    pub(super) fn regions(&self, picture: &MeasuredPicture, most: usize) -> Result<Vec<PixelRegion>, PipelineError> {
+        let period = self.samples(picture)?.period;
+        let binned = binned(picture, period);
+        let side = self.side_for(picture)? / period;
+        let corners = find_edges(&binned, side)
+            .map_err(|e| PipelineError::Read { path: picture.name.clone().into(), reason: e.to_string() })?;
+        let region = |(row, column)| PixelRegion {
+            row: row * period,
+            column: column * period,
+            rows: side * period,
+            columns: side * period,
+        };
+        Ok(corners.into_iter().take(most).map(region).collect())
     }
 
     fn channel(&self, name: &str, response: &EdgeResponse, viewing: &Viewing) -> Result<EdgeChannel, PipelineError> {
@@ -237,20 +270,54 @@ impl EdgeRequest {
             response: response.response.clone(),
             response_error: response.standard_error.clone(),
             contrast_to_noise: Some(response.contrast_to_noise).filter(|ratio| ratio.is_finite()),
+            shading: response.shading,
         })
     }
 }
 
-/// Returns the share of samples of a region at the ends of the codes: at 0 where none is below it, as of a raw frame less its black, and at 1
-/// where none is beyond it, as of light in a file of floats.
-fn clipped_share(picture: &MeasuredPicture, PixelRegion { row, column, rows, columns }: PixelRegion) -> f64 {
-    let all = || picture.planes.iter().flat_map(|(_, plane)| plane.iter());
-    let ends = [(0.0, all().all(|v| *v >= 0.0)), (1.0, all().all(|v| *v <= 1.0))];
-    let of_plane = |(_, plane): &(String, Array2<f32>)| {
-        let samples = plane.slice(s![row..row + rows, column..column + columns]);
-        samples.iter().filter(|v| ends.iter().any(|(end, is_code)| *is_code && **v == *end)).count()
+/// Returns the luminance of a picture, each tile of a mosaic as one sample: its colors would look like edges.
+fn binned(picture: &MeasuredPicture, period: usize) -> Array2<f32> {
+    let (rows, columns) = picture.size();
+    let luminance = picture.luminance();
+    Array2::from_shape_fn((rows / period, columns / period), |(r, c)| {
+        let tile = luminance.slice(s![r * period..(r + 1) * period, c * period..(c + 1) * period]);
+        tile.sum() / (period * period) as f32
+    })
+}
+
+/// Returns why an edge is not measured, without the name of the file.
+pub(super) fn reason_of(error: &PipelineError) -> String {
+    match error {
+        PipelineError::Read { reason, .. } => reason.clone(),
+        other => other.to_string(),
+    }
+}
+
+/// A square with an edge: its corner, row and column, and its side.
+type Square = ((usize, usize), usize);
+
+/// Returns the square of those with an edge in which MTF50 is most certain; the first where it is certain enough, or no other can be measured.
+fn most_certain<'a>(
+    picture: &Array2<f32>,
+    first: Result<Square, SensorError>,
+    larger: impl Iterator<Item = &'a usize>,
+) -> Result<Square, SensorError> {
+    let uncertainty = |((row, column), side): Square| {
+        let response = EdgeResponse::measure(&picture.slice(s![row..row + side, column..column + side])).ok()?;
+        Some(response.mtf50_error()? / response.mtf50()?)
     };
-    picture.planes.iter().map(of_plane).sum::<usize>() as f64 / (rows * columns * picture.planes.len()) as f64
+    let first = first?;
+    let mut best = (uncertainty(first).unwrap_or(f64::INFINITY), first);
+    for &side in larger {
+        if best.0 <= CERTAIN {
+            break;
+        }
+        let Ok(corner) = find_edge(picture, side) else { continue };
+        if let Some(uncertainty) = uncertainty((corner, side)).filter(|share| *share < best.0) {
+            best = (uncertainty, (corner, side));
+        }
+    }
+    Ok(best.1)
 }
 
 /// The channels of a picture, each in one or more parts with a sample every `period` pixels.
@@ -298,6 +365,7 @@ fn mean_response(parts: &[EdgeResponse], period: usize) -> EdgeResponse {
         slant_deg: mean(&|part| part.slant_deg),
         contrast: mean(&|part| part.contrast),
         contrast_to_noise: mean(&|part| part.contrast_to_noise),
+        shading: mean(&|part| part.shading),
     }
 }
 

@@ -3,13 +3,18 @@
 mod chart;
 mod compare;
 mod edge;
+mod edge_map;
 mod frames;
+mod grid;
 mod noise;
 mod noise_charts;
 mod open;
 mod points;
 mod region;
 mod region_statistics;
+mod shading;
+mod star;
+mod steps;
 mod texture;
 
 use serde::Serialize;
@@ -17,11 +22,16 @@ use serde::Serialize;
 pub use chart::{ChartMeasurement, ChartRequest, PatchRow};
 pub use compare::{CompareRequest, Comparison, DeltaESummary, PictureViewing};
 pub use edge::{EdgeChannel, EdgeMeasurement, EdgeRequest, UnmeasuredChannel};
+pub use edge_map::{EdgeMap, EdgeMapRequest, EdgePlace, UnmeasuredPlace};
+pub use grid::{GridDot, GridMeasurement, GridRequest, LateralColor};
 pub use noise::{BenchRequest, NoiseData, NoiseDataSheet, NoisePoint, SpatialPatterns, measure_bench, measure_frames};
 pub use open::{CodeCurve, MeasuredPicture, notes_on_picture};
 pub use points::{PointRequest, PointRow, PointSet};
 pub use region::PixelRegion;
 pub use region_statistics::{BandMean, ColorDifference, RegionChannel, RegionColor, RegionMeasurement, RegionRequest};
+pub use shading::{ShadingChannel, ShadingMeasurement, ShadingRequest};
+pub use star::{StarChannel, StarMeasurement, StarRequest};
+pub use steps::{Step, StepRow, StepsChannel, StepsMeasurement, StepsRequest};
 pub use texture::{TextureChannel, TextureCurve, TextureMeasurement, TextureNoiseRequest, TextureRequest};
 
 use crate::LineChart;

@@ -86,32 +86,36 @@ pub struct NoiseData {
     pub responsivity_dn_per_photon: Option<f64>,
     /// Electrons a photon on the whole area of a pixel.
     pub quantum_efficiency: Option<f64>,
-    /// The temporal dark noise σd without that of rounding, electrons.
-    pub dark_noise_e: f64,
+    /// The temporal dark noise σd without that of rounding, electrons; none where dark frames are cut off at the lowest code.
+    pub dark_noise_e: Option<f64>,
     /// Whether rounding hides it, so that it is less than this.
     pub dark_noise_is_limit: bool,
     /// The mean deviation of the signal from a straight line, from 5 to 95 % of saturation, percent; none with fewer than three points there.
     pub linearity_error_percent: Option<f64>,
     /// The largest deviation, percent.
     pub largest_linearity_error_percent: Option<f64>,
-    /// The electrons at which the variance is largest.
-    pub saturation_e: f64,
+    /// The electrons at which the variance is largest; none where the series ends before it falls.
+    pub saturation_e: Option<f64>,
     /// The photons at which it is.
     pub saturation_photons: Option<f64>,
-    /// The electrons at which signal and noise are equal.
-    pub threshold_e: f64,
+    /// The electrons at which signal and noise are equal; none without the dark noise.
+    pub threshold_e: Option<f64>,
     /// The photons at which they are.
     pub threshold_photons: Option<f64>,
     /// Saturation over threshold, dB.
-    pub dynamic_range_db: f64,
+    pub dynamic_range_db: Option<f64>,
     /// The same in powers of two.
-    pub dynamic_range_stops: f64,
-    /// The largest signal-to-noise ratio, dB.
-    pub max_snr_db: f64,
-    /// Dark-signal non-uniformity, rms electrons; none without stacks of three frames or more.
+    pub dynamic_range_stops: Option<f64>,
+    /// The largest signal-to-noise ratio, dB; none where the series ends before saturation.
+    pub max_snr_db: Option<f64>,
+    /// Dark-signal non-uniformity, rms electrons; none without stacks of three frames or more, and where rounding or the lowest code hides it.
     pub dsnu_e: Option<f64>,
+    /// One standard error of it.
+    pub dsnu_error_e: Option<f64>,
     /// Photo-response non-uniformity, rms percent.
     pub prnu_percent: Option<f64>,
+    /// One standard error of it.
+    pub prnu_error_percent: Option<f64>,
     /// What of the first is of rows, columns and single pixels, rms electrons.
     pub dsnu_parts_e: Option<Parts>,
     /// What of the second, rms percent.
@@ -124,6 +128,8 @@ pub struct NoiseData {
     pub dark_current_by_variance_e_per_s: Option<f64>,
     /// By how much the bench raised the black level, DN, so that it does not cut off the noise of darkness; 0 for frames from files.
     pub raised_black_dn: u16,
+    /// What of this is not measured or only a limit, and why, a sentence each.
+    pub notes: Vec<String>,
     /// What the sensor's data sheet says of the same; none for frames from files.
     pub data_sheet: Option<NoiseDataSheet>,
     /// The points of the photon transfer, darkness first.
@@ -356,6 +362,8 @@ struct Measured {
     photons: Option<f64>,
     point: FlatPoint,
     stack: Option<FrameStack>,
+    /// Whether its frames are dark and cut off at the lowest code.
+    is_cut_off: bool,
 }
 
 impl Measured {
@@ -385,7 +393,14 @@ impl Collected {
         self.size = Some(a.dim());
         self.n_frames += stack.n_frames();
         let point = FlatPoint::measure(photons.unwrap_or(0.0), a, b)?;
-        self.series.push(Measured { time_s, photons, point, stack: (stack.n_frames() > 2).then_some(stack) });
+        let is_cut_off = photons == Some(0.0) && is_cut_off(&first, point.variance_dn2);
+        self.series.push(Measured {
+            time_s,
+            photons,
+            point,
+            stack: (stack.n_frames() > 2).then_some(stack),
+            is_cut_off,
+        });
         Ok(())
     }
 
@@ -412,7 +427,12 @@ impl Collected {
         let current = self.dark_current(&transfer);
         let (rows, columns) = self.size.unwrap_or_default();
         let counted = |value: f64| are_counted.then_some(value);
-        let threshold_e = transfer.threshold_photons * transfer.quantum_efficiency;
+        let dark_is_whole = !self.series.iter().any(|s| s.is_cut_off);
+        let threshold_e = dark_is_whole.then_some(transfer.threshold_photons * transfer.quantum_efficiency);
+        let saturation_e = transfer.is_saturated.then_some(transfer.saturation_e);
+        let range = saturation_e.zip(threshold_e).map(|(most, least)| most / least);
+        let dark_pattern = uniformity.filter(|u| dark_is_whole && !u.dsnu_is_hidden);
+        let response = uniformity.filter(|u| !u.prnu_is_hidden);
         Ok(NoiseData {
             source,
             filter: None,
@@ -422,30 +442,33 @@ impl Collected {
             gain_dn_per_e: transfer.gain_dn_per_e,
             responsivity_dn_per_photon: counted(transfer.responsivity_dn_per_photon),
             quantum_efficiency: counted(transfer.quantum_efficiency),
-            dark_noise_e: transfer.dark_noise_e,
+            dark_noise_e: dark_is_whole.then_some(transfer.dark_noise_e),
             dark_noise_is_limit: transfer.dark_noise_is_limit,
             linearity_error_percent: transfer.linearity.as_ref().map(|linearity| 100.0 * linearity.mean_error),
             largest_linearity_error_percent: transfer
                 .linearity
                 .as_ref()
                 .map(|linearity| 100.0 * linearity.largest_error),
-            saturation_e: transfer.saturation_e,
-            saturation_photons: counted(transfer.saturation_e / transfer.quantum_efficiency),
+            saturation_e,
+            saturation_photons: saturation_e.and_then(|e| counted(e / transfer.quantum_efficiency)),
             threshold_e,
-            threshold_photons: counted(transfer.threshold_photons),
-            dynamic_range_db: transfer.dynamic_range_db,
-            dynamic_range_stops: (transfer.saturation_e / threshold_e).log2(),
-            max_snr_db: 20.0 * transfer.max_snr().log10(),
-            dsnu_e: uniformity.map(|u| u.dsnu_e),
-            prnu_percent: uniformity.map(|u| 100.0 * u.prnu_fraction),
-            dsnu_parts_e: uniformity.map(|u| u.dsnu_parts_e),
-            prnu_parts_percent: uniformity.map(|u| percent(u.prnu_parts_fraction)),
+            threshold_photons: threshold_e.and_then(|e| counted(e / transfer.quantum_efficiency)),
+            dynamic_range_db: range.map(|range| 20.0 * range.log10()),
+            dynamic_range_stops: range.map(f64::log2),
+            max_snr_db: saturation_e.map(|_| 20.0 * transfer.max_snr().log10()),
+            dsnu_e: dark_pattern.map(|u| u.dsnu_e),
+            dsnu_error_e: dark_pattern.map(|u| u.dsnu_error_e),
+            prnu_percent: response.map(|u| 100.0 * u.prnu_fraction),
+            prnu_error_percent: response.map(|u| 100.0 * u.prnu_error_fraction),
+            dsnu_parts_e: dark_pattern.map(|u| u.dsnu_parts_e),
+            prnu_parts_percent: response.map(|u| percent(u.prnu_parts_fraction)),
             patterns: self
                 .stacks(&transfer)
                 .map(|(dark, bright)| SpatialPatterns::of(dark, bright, transfer.gain_dn_per_e)),
             dark_current_by_mean_e_per_s: current.map(|c| c.by_mean_e_per_s),
             dark_current_by_variance_e_per_s: current.map(|c| c.by_variance_e_per_s),
             raised_black_dn: 0,
+            notes: notes(&transfer, uniformity.as_ref(), dark_is_whole),
             data_sheet: None,
             points: noise_points(&transfer, uniformity.as_ref(), are_counted),
         })
@@ -482,6 +505,74 @@ impl Collected {
     }
 }
 
+/// The share of dark samples at the lowest code from which on their noise is cut off there (EMVA 1288, 6.5: 0.5 %).
+const CUT_OFF_SHARE: f64 = 0.005;
+
+/// Returns whether dark frames of some temporal variance, DN², lie at the end of the codes: at 0, or piled up at another lowest code.
+fn is_cut_off(frames: &[Array2<f32>], variance_dn2: f64) -> bool {
+    let all = || frames.iter().flat_map(|frame| frame.iter().copied());
+    let least = all().fold(f32::INFINITY, f32::min);
+    let count = |code: f32| all().filter(|v| *v == code).count() as f64;
+    let (at_least, next) = (count(least), count(least + 1.0));
+    let n = frames.iter().map(Array2::len).sum::<usize>().max(1) as f64;
+    // Rounding alone piles up quiet frames too, but for 0 that is no end of the codes.
+    let is_end = least <= 0.0 || (variance_dn2 > 0.24 && at_least > 2.0 * next);
+    is_end && at_least / n > CUT_OFF_SHARE
+}
+
+/// Returns what is not measured or only a limit.
+fn notes(transfer: &PhotonTransfer, uniformity: Option<&NonUniformity>, dark_is_whole: bool) -> Vec<String> {
+    let mut notes = Vec::new();
+    let mut note = |is_said: bool, text: String| is_said.then(|| notes.push(text));
+    note(
+        !dark_is_whole,
+        "dark samples are cut off at the lowest code: dark noise, DSNU, threshold and dynamic range are not measured, and signals \
+         count from a mean that is too high; raise the black level"
+            .to_owned(),
+    );
+    note(
+        !transfer.is_saturated,
+        format!(
+            "the series ends at {:.0} e, before the variance falls: saturation, dynamic range and largest SNR are not measured, and \
+             gain and linearity are those of shares of this range",
+            transfer.saturation_e
+        ),
+    );
+    note(
+        dark_is_whole && transfer.dark_noise_is_limit,
+        "rounding hides the dark noise: it is less than what is stated".to_owned(),
+    );
+    let Some(u) = uniformity else {
+        note(
+            true,
+            "DSNU and PRNU need three or more dark frames and as many under one light: they are not measured"
+                .to_owned(),
+        );
+        return notes;
+    };
+    note(
+        dark_is_whole && u.dsnu_is_hidden,
+        "rounding hides the DSNU, since neither noise nor pattern reaches a step of the codes: it is not measured"
+            .to_owned(),
+    );
+    note(
+        u.prnu_is_hidden,
+        "rounding hides the PRNU, as it does where noise is below half a code: it is not measured".to_owned(),
+    );
+    note(
+        dark_is_whole && !u.dsnu_is_hidden && u.dsnu_e < 2.0 * u.dsnu_error_e,
+        format!("the DSNU is not told from noise: it is less than {:.3} e", u.dsnu_e + 2.0 * u.dsnu_error_e),
+    );
+    note(
+        !u.prnu_is_hidden && u.prnu_fraction < 2.0 * u.prnu_error_fraction,
+        format!(
+            "the PRNU is not told from noise: it is less than {:.3} %",
+            100.0 * (u.prnu_fraction + 2.0 * u.prnu_error_fraction)
+        ),
+    );
+    notes
+}
+
 fn percent(Parts { row, column, pixel }: Parts) -> Parts {
     Parts { row: 100.0 * row, column: 100.0 * column, pixel: 100.0 * pixel }
 }
@@ -509,4 +600,92 @@ fn noise_points(transfer: &PhotonTransfer, uniformity: Option<&NonUniformity>, a
 
 fn too_few(reason: String) -> PipelineError {
     PipelineError::Unsuitable { what: "the frames", reason }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A camera of 0.5 DN an electron in front of rising light.
+    struct Made {
+        black_dn: f64,
+        dark_noise_e: f64,
+        dsnu_e: f64,
+        prnu: f64,
+        top_e: f64,
+    }
+
+    const SIDE: usize = 96;
+    const GAIN: f64 = 0.5;
+    const FULL_DN: f64 = 4095.0;
+
+    fn normal(state: &mut u64) -> f64 {
+        let mut uniform = || {
+            *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (*state >> 11) as f64 / (1_u64 << 53) as f64
+        };
+        (0..12).map(|_| uniform()).sum::<f64>() - 6.0
+    }
+
+    impl Made {
+        fn measured(&self) -> NoiseData {
+            let mut fixed = 17_u64;
+            let patterns: Vec<(f64, f64)> = (0..SIDE * SIDE)
+                .map(|_| (self.dsnu_e * normal(&mut fixed), 1.0 + self.prnu * normal(&mut fixed)))
+                .collect();
+            let mut state = 91_u64;
+            let mut frame = |e: f64| {
+                let sample = |(offset, gain): &(f64, f64)| {
+                    // Shot noise of many electrons is normal.
+                    let signal = e * gain + (e * gain).max(0.0).sqrt() * normal(&mut state);
+                    let dn = self.black_dn + GAIN * (signal + offset + self.dark_noise_e * normal(&mut state));
+                    dn.round().clamp(0.0, FULL_DN) as f32
+                };
+                Array2::from_shape_vec((SIDE, SIDE), patterns.iter().map(sample).collect()).unwrap()
+            };
+            let mut collected = Collected::default();
+            let levels = (1..=16).map(|i| (self.top_e * f64::from(i) / 16.0, 2));
+            for (e, n) in [(0.0, 16)].into_iter().chain(levels).chain([(0.45 * self.top_e, 16)]) {
+                let mut taken = Taken::new(Some(0.01), Some(e / 0.6));
+                (0..n).for_each(|_| taken.add(frame(e)).unwrap());
+                collected.add(taken).unwrap();
+            }
+            collected.analyze("made".to_owned()).unwrap()
+        }
+    }
+
+    const WHOLE: Made = Made { black_dn: 100.0, dark_noise_e: 5.0, dsnu_e: 2.0, prnu: 0.01, top_e: 8400.0 };
+
+    #[test]
+    fn what_is_put_in_comes_back_within_its_error() {
+        let data = WHOLE.measured();
+        assert!(data.notes.is_empty(), "{:?}", data.notes);
+        let within = |value: Option<f64>, wanted: f64, error: f64| {
+            let value = value.unwrap();
+            assert!((value - wanted).abs() < error, "{value}, not {wanted} ± {error}");
+        };
+        within(Some(data.gain_dn_per_e), GAIN, 0.01);
+        within(data.dark_noise_e, 5.0, 0.15);
+        within(data.dsnu_e, 2.0, 4.0 * data.dsnu_error_e.unwrap());
+        within(data.prnu_percent, 1.0, 4.0 * data.prnu_error_percent.unwrap());
+        assert!(data.dsnu_error_e.unwrap() < 0.05 && data.saturation_e.is_some() && data.dynamic_range_db.is_some());
+    }
+
+    #[test]
+    fn what_cannot_be_measured_is_told() {
+        let told = |made: Made, words: &str| {
+            let data = made.measured();
+            assert!(data.notes.iter().any(|note| note.contains(words)), "{words}: {:?}", data.notes);
+            data
+        };
+        let cut = told(Made { black_dn: 0.0, ..WHOLE }, "cut off at the lowest code");
+        assert_eq!((cut.dark_noise_e, cut.dsnu_e, cut.threshold_e, cut.dynamic_range_db), (None, None, None, None));
+        assert!(cut.saturation_e.is_some() && cut.prnu_percent.is_some());
+        let short = told(Made { top_e: 4000.0, ..WHOLE }, "before the variance falls");
+        assert_eq!((short.saturation_e, short.dynamic_range_db, short.max_snr_db), (None, None, None));
+        let coarse = told(Made { dark_noise_e: 0.4, dsnu_e: 0.2, ..WHOLE }, "rounding hides the DSNU");
+        assert!(coarse.dsnu_e.is_none() && coarse.dark_noise_is_limit);
+        let even = told(Made { dsnu_e: 0.0, prnu: 0.0, ..WHOLE }, "the PRNU is not told from noise");
+        assert!(even.notes.iter().any(|note| note.contains("the DSNU is not told")), "{:?}", even.notes);
+    }
 }

@@ -77,7 +77,10 @@ impl NoiseData {
         let line = |x: f64| (x, dark.variance_dn2 + self.gain_dn_per_e * x);
         let reach = signal(last).min((top - dark.variance_dn2) / self.gain_dn_per_e);
         LineChart {
-            title: format!("Photon transfer: K = {:.4} DN/e, σd = {:.2} e", self.gain_dn_per_e, self.dark_noise_e),
+            title: match self.dark_noise_e {
+                Some(noise_e) => format!("Photon transfer: K = {:.4} DN/e, σd = {noise_e:.2} e", self.gain_dn_per_e),
+                None => format!("Photon transfer: K = {:.4} DN/e", self.gain_dn_per_e),
+            },
             x_label: "signal above dark, DN".to_owned(),
             y_label: "temporal variance, DN²".to_owned(),
             x_range: (0.0, 1.02 * signal(last)),
@@ -93,7 +96,8 @@ impl NoiseData {
 
     fn snr_plot(&self) -> LineChart {
         // Beyond saturation there is no noise left to compare with.
-        let lit = || self.points.iter().filter(|p| p.electrons > 0.0 && p.electrons <= self.saturation_e);
+        let most_e = self.saturation_e.unwrap_or(f64::INFINITY);
+        let lit = || self.points.iter().filter(|p| p.electrons > 0.0 && p.electrons <= most_e);
         let measured: Vec<(f64, f64)> = lit().filter_map(|p| Some((p.electrons, p.snr?))).collect();
         let model: Vec<(f64, f64)> = lit().filter_map(|p| Some((p.electrons, p.model_snr?))).collect();
         let total: Vec<(f64, f64)> = lit().filter_map(|p| Some((p.electrons, p.total_snr?))).collect();
@@ -106,7 +110,10 @@ impl NoiseData {
             return empty_chart();
         }
         LineChart {
-            title: format!("Signal to noise: dynamic range {:.1} dB", self.dynamic_range_db),
+            title: match self.dynamic_range_db {
+                Some(db) => format!("Signal to noise: dynamic range {db:.1} dB"),
+                None => "Signal to noise".to_owned(),
+            },
             x_label: "electrons".to_owned(),
             y_label: "SNR".to_owned(),
             x_range: range(|p| p.0),

@@ -2,17 +2,20 @@
 
 use std::{fs::File, io::Read, path::Path};
 
-use dioptric_scene::{PictureSamples, notes_on_samples, read_picture_samples};
-use dioptric_sensor::{ColorSpace, DngFile, Picture, Tile};
+use dioptric_scene::{PictureSamples, StatedColors, notes_on_samples, read_picture_samples};
+use dioptric_sensor::{ColorSpace, DngFile, Picture, Raw, Tile, raw_format_by_name, raw_format_of};
 use dioptric_spectrum::{Xyz, srgb_decode, srgb_encode};
+use image::{ColorType, ImageDecoder, ImageReader};
 use ndarray::{Array2, Array3};
 
+use super::PixelRegion;
 use dioptric_pipeline::PipelineError;
 
 /// How a picture's samples stand for light.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum CodeCurve {
-    /// Linear for 16-bit gray (raw frames) and floating-point samples, the curve of sRGB for everything else.
+    /// Linear for 16-bit gray (raw frames) and floating-point samples, for everything else the curve that the file states, that of sRGB where it says
+    /// nothing.
     #[default]
     ByFile,
     /// Linear.
@@ -30,62 +33,131 @@ pub struct MeasuredPicture {
     pub planes: Vec<(String, Array2<f32>)>,
     /// The mosaic of the single plane of a raw file, and the names of its filters.
     pub mosaic: Option<(Tile, Vec<String>)>,
+    /// What its red, green and blue are.
+    primaries: Primaries,
 }
 
-/// Returns the raw frame of a file that is a DNG, whose first picture is but a preview; `None` for other files.
+/// A channel's name, the plane that holds it, and which pixels are its own.
+pub(crate) type FilterSamples<'a> = (String, &'a Array2<f32>, Box<dyn Fn((usize, usize)) -> bool + 'a>);
+
+/// What red, green and blue of a picture are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Primaries {
+    /// Those of sRGB.
+    Srgb,
+    /// Others: the matrix to linear sRGB.
+    Stated([[f64; 3]; 3]),
+    /// The filters of a camera.
+    Filters,
+}
+
+/// Returns the raw frame of a file that is a DNG, whose first picture is but a preview; `None` for pictures.
 ///
 /// # Errors
-/// When it begins as a DNG does and cannot be read.
+/// When it begins as a DNG does and cannot be read, or is a raw file of another kind.
 pub(crate) fn read_dng(path: &Path) -> Result<Option<DngFile>, PipelineError> {
-    let mut head = [0; 4];
-    let is_tiff = File::open(path).and_then(|mut file| file.read_exact(&mut head)).is_ok()
-        && [*b"II*\0", *b"MM\0*"].contains(&head);
-    if !is_tiff || !std::fs::read(path).is_ok_and(|bytes| DngFile::is_dng(&bytes)) {
+    const LONGEST_HEAD: u64 = 16;
+    let wrong = |reason: String| PipelineError::Read { path: path.to_owned(), reason };
+    let mut head = Vec::new();
+    // Whoever reads the picture says what is wrong with it.
+    let Ok(file) = File::open(path) else { return Ok(None) };
+    if file.take(LONGEST_HEAD).read_to_end(&mut head).is_err() {
         return Ok(None);
     }
-    Ok(Some(DngFile::read(path)?))
+    let is_raw = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("dng")) || raw_format_by_name(path).is_some();
+    if head.is_empty() {
+        return Err(wrong("is empty, expected a picture".to_owned()));
+    }
+    let is_tiff = [&b"II*\0"[..], b"MM\0*"].iter().any(|start| head.starts_with(start));
+    if !is_tiff && !is_raw && raw_format_of(&head).is_none() {
+        return Ok(None);
+    }
+    let is_dng =
+        is_raw || std::fs::read(path).is_ok_and(|bytes| DngFile::is_dng(&bytes) || raw_format_of(&bytes).is_some());
+    if is_dng { Ok(Some(DngFile::read(path)?)) } else { Ok(None) }
 }
 
-/// Returns what of a picture's statements is not used when it is measured, a sentence each: another color space than sRGB, and how it is
-/// turned.
-pub fn notes_on_picture(path: &Path) -> Vec<String> {
-    notes_on_samples(path)
+/// Returns what of a picture's statements is used or not when it is measured, a sentence each: how it is turned, and which colors it has.
+pub fn notes_on_picture(path: &Path, curve: CodeCurve) -> Vec<String> {
+    let mut notes = notes_on_samples(path);
+    // What cannot be read is refused when the picture is opened.
+    if let Ok(Some(colors)) = StatedColors::of(path) {
+        let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
+        let decoder = ImageReader::open(path).ok().and_then(|r| r.with_guessed_format().ok()?.into_decoder().ok());
+        let kind = decoder.map(|decoder| decoder.color_type());
+        let used = match (kind, curve) {
+            (Some(ColorType::L16 | ColorType::La16), CodeCurve::ByFile) => {
+                "its 16-bit gray is taken as linear, not by what it states"
+            }
+            (Some(kind), CodeCurve::Linear | CodeCurve::Srgb) if !kind.has_color() => {
+                "its codes become light as the command line says, not by what it states"
+            }
+            (_, CodeCurve::ByFile) => "its codes become light by what it states",
+            (_, CodeCurve::Linear | CodeCurve::Srgb) => {
+                "its codes become light as the command line says, its primaries are those that it states"
+            }
+        };
+        notes.push(format!("{name}: {used}, {}", colors.name));
+    }
+    notes
 }
 
 impl MeasuredPicture {
     /// Opens a PNG, JPEG, TIFF or EXR file, or the raw frame of a DNG: linear, and corrected as far as the file asks before demosaicing.
     ///
+    /// Planes are those of the file's own primaries; [`rgb`](Self::rgb) and what follows from it are linear sRGB.
+    ///
     /// # Errors
-    /// When the file cannot be read, is empty or holds samples that are not finite.
+    /// When the file cannot be read, is empty, holds samples that are not finite, or colors that cannot be converted.
     pub fn open(path: &Path, curve: CodeCurve) -> Result<Self, PipelineError> {
         if let Some(DngFile { raw, .. }) = read_dng(path)? {
-            let (planes, names) = (raw.linear(), raw.filter_names);
-            // One filter everywhere is no mosaic.
-            let tile = raw.tile.filter(|_| names.len() > 1);
-            let named = if tile.is_some() { vec!["raw".to_owned()] } else { names.clone() };
-            return Ok(Self {
-                name: path.display().to_string(),
-                planes: named.into_iter().zip(planes).collect(),
-                mosaic: tile.map(|tile| (tile, names)),
-            });
+            return Ok(Self::of_raw(path, raw));
         }
-        let PictureSamples { planes, top } = read_picture_samples(path)?;
-        let wrong = |reason: &str| PipelineError::Read { path: path.to_owned(), reason: reason.to_owned() };
+        let PictureSamples { planes, top, colors } = read_picture_samples(path)?;
+        let wrong = |reason: String| PipelineError::Read { path: path.to_owned(), reason };
         if planes.first().is_none_or(|(_, plane)| plane.is_empty()) {
-            return Err(wrong("it has no pixels"));
+            return Err(wrong("it has no pixels".to_owned()));
         }
         if planes.iter().any(|(_, plane)| plane.iter().any(|v| !v.is_finite())) {
-            return Err(wrong("a sample is not finite"));
+            return Err(wrong("a sample is not finite".to_owned()));
         }
         let is_coded = match curve {
             CodeCurve::Linear => false,
             CodeCurve::Srgb => true,
             CodeCurve::ByFile => top.is_some_and(|top| top == u16::from(u8::MAX) || planes.len() > 1),
         };
+        // Whatever the curve, the primaries are the file's.
+        let needs_colors = planes.len() > 1 || (curve == CodeCurve::ByFile && is_coded);
+        let colors = if needs_colors { colors.map_err(wrong)? } else { None };
         let scale = top.map_or(1.0, |top| 1.0 / f32::from(top));
-        let linear = |v: f32| if is_coded { srgb_decode(f64::from(v * scale)) as f32 } else { v * scale };
-        let planes = planes.into_iter().map(|(name, plane)| (name, plane.mapv(linear))).collect();
-        Ok(Self { name: path.display().to_string(), planes, mosaic: None })
+        let own_curve = colors.as_ref().filter(|_| curve == CodeCurve::ByFile && is_coded);
+        let light = |channel: usize, v: f32| match (is_coded, own_curve) {
+            (false, _) => v * scale,
+            (true, None) => srgb_decode(f64::from(v * scale)) as f32,
+            (true, Some(own)) => own.light(channel.min(2), (v * scale * f32::from(u16::MAX)).round() as u16) as f32,
+        };
+        let linear =
+            |(channel, (name, plane)): (usize, (String, Array2<f32>))| (name, plane.mapv(|v| light(channel, v)));
+        Ok(Self {
+            name: path.display().to_string(),
+            planes: planes.into_iter().enumerate().map(linear).collect(),
+            mosaic: None,
+            primaries: colors.as_ref().map_or(Primaries::Srgb, |colors| Primaries::Stated(colors.to_srgb)),
+        })
+    }
+
+    /// Takes the frame of a raw file.
+    fn of_raw(path: &Path, raw: Raw) -> Self {
+        let (planes, names) = (raw.linear(), raw.filter_names);
+        // One filter everywhere is no mosaic.
+        let tile = raw.tile.filter(|_| names.len() > 1);
+        let named = if tile.is_some() { vec!["raw".to_owned()] } else { names.clone() };
+        Self {
+            name: path.display().to_string(),
+            planes: named.into_iter().zip(planes).collect(),
+            mosaic: tile.map(|tile| (tile, names)),
+            primaries: Primaries::Filters,
+        }
     }
 
     /// Refuses a mosaic, whose pixels are not all of one filter.
@@ -101,6 +173,63 @@ impl MeasuredPicture {
         Err(PipelineError::Read { path: self.name.clone().into(), reason: reason.to_owned() })
     }
 
+    /// Takes planes of linear light of sRGB's primaries.
+    #[cfg(test)]
+    pub(crate) fn of_light(name: &str, planes: Vec<(&str, Array2<f32>)>) -> Self {
+        Self {
+            name: name.to_owned(),
+            planes: planes.into_iter().map(|(name, plane)| (name.to_owned(), plane)).collect(),
+            mosaic: None,
+            primaries: Primaries::Srgb,
+        }
+    }
+
+    /// Returns each channel with the plane that holds it and which of its pixels are its own: of a mosaic those of one filter.
+    pub(crate) fn filters(&self) -> Vec<FilterSamples<'_>> {
+        match &self.mosaic {
+            Some((tile, names)) => {
+                let has = |filter: usize| (0..tile.rows()).any(|row| tile.row(row).contains(&filter));
+                let of = |(filter, name): (usize, &String)| -> FilterSamples<'_> {
+                    let is_own = move |(row, column): (usize, usize)| tile.filter_at(row, column) == filter;
+                    (name.clone(), &self.planes[0].1, Box::new(is_own))
+                };
+                names.iter().enumerate().filter(|(filter, _)| has(*filter)).map(of).collect()
+            }
+            None => {
+                let all = |(name, plane)| -> FilterSamples<'_> { (String::clone(name), plane, Box::new(|_| true)) };
+                self.planes.iter().map(|(name, plane)| all((name, plane))).collect()
+            }
+        }
+    }
+
+    /// Returns the share of samples of a region at the ends of the codes: at 0 where none is below it, as of a raw frame less its black, and at 1
+    /// where none is beyond it, as of light in a file of floats.
+    pub(crate) fn clipped_share_of(&self, region: PixelRegion) -> f64 {
+        let all = || self.planes.iter().flat_map(|(_, plane)| plane.iter());
+        let ends = [(0.0, all().all(|v| *v >= 0.0)), (1.0, all().all(|v| *v <= 1.0))];
+        let of_plane = |(_, plane): &(String, Array2<f32>)| {
+            region.of(plane).iter().filter(|v| ends.iter().any(|(end, is_code)| *is_code && **v == *end)).count()
+        };
+        let n = region.rows * region.columns * self.planes.len();
+        self.planes.iter().map(of_plane).sum::<usize>() as f64 / n as f64
+    }
+
+    /// Returns the same of the whole picture.
+    pub(crate) fn clipped_share(&self) -> f64 {
+        let (rows, columns) = self.size();
+        self.clipped_share_of(PixelRegion { column: 0, row: 0, columns, rows })
+    }
+
+    /// What a sample is.
+    pub(crate) fn unit(&self) -> &'static str {
+        match self.primaries {
+            Primaries::Filters => {
+                "share of saturation, as the camera's filters see it: no color before `dioptric develop`"
+            }
+            Primaries::Srgb | Primaries::Stated(_) => "share of the highest code; of EXR files their own",
+        }
+    }
+
     /// Rows and columns.
     pub fn size(&self) -> (usize, usize) {
         self.planes[0].1.dim()
@@ -111,10 +240,10 @@ impl MeasuredPicture {
         self.planes.iter().find(|(own, _)| own == name).map(|(_, plane)| plane)
     }
 
-    /// Returns the three channels R, G and B, or one gray channel three times; rows × columns × 3.
+    /// Returns red, green and blue in linear light of sRGB's primaries, or one gray channel three times; rows × columns × 3.
     ///
     /// # Errors
-    /// When the picture has other channels, or is a mosaic.
+    /// When the picture has other channels, or is the frame of a raw file, whose planes are what the camera's filters see.
     pub fn rgb(&self) -> Result<Array3<f32>, PipelineError> {
         self.require_whole()?;
         let planes = match (self.plane("R"), self.plane("G"), self.plane("B"), self.planes.as_slice()) {
@@ -127,21 +256,35 @@ impl MeasuredPicture {
             }
         };
         let (rows, columns) = self.size();
-        Ok(Array3::from_shape_fn((rows, columns, 3), |(r, c, k)| planes[k][(r, c)]))
+        match self.primaries {
+            Primaries::Filters if self.planes.len() > 1 => {
+                let reason = "holds what a camera's filters see, which is no color yet, expected a picture: \
+                              `dioptric develop` makes one";
+                Err(PipelineError::Read { path: self.name.clone().into(), reason: reason.to_owned() })
+            }
+            Primaries::Stated(matrix) if self.planes.len() > 1 => {
+                let at = |(r, c, k): (usize, usize, usize)| {
+                    matrix[k].iter().zip(planes).map(|(m, plane)| m * f64::from(plane[(r, c)])).sum::<f64>() as f32
+                };
+                Ok(Array3::from_shape_fn((rows, columns, 3), at))
+            }
+            _ => Ok(Array3::from_shape_fn((rows, columns, 3), |(r, c, k)| planes[k][(r, c)])),
+        }
     }
 
-    /// Returns the luminance where there are R, G and B, else the mean of all channels.
+    /// Returns the luminance where there are colors, else the mean of all channels.
     pub fn luminance(&self) -> Array2<f32> {
-        match (self.plane("R"), self.plane("G"), self.plane("B")) {
-            (Some(r), Some(g), Some(b)) => Array2::from_shape_fn(self.size(), |at| {
-                Xyz::from_linear_srgb([r[at], g[at], b[at]].map(f64::from)).luminance_cd_m2() as f32
-            }),
-            _ => {
-                let mut sum = Array2::zeros(self.size());
-                self.planes.iter().for_each(|(_, plane)| sum += plane);
-                sum / self.planes.len() as f32
-            }
+        if self.planes.len() > 1
+            && let Ok(rgb) = self.rgb()
+        {
+            return Array2::from_shape_fn(self.size(), |(r, c)| {
+                let light = [0, 1, 2].map(|k| f64::from(rgb[(r, c, k)]));
+                Xyz::from_linear_srgb(light).luminance_cd_m2() as f32
+            });
         }
+        let mut sum = Array2::zeros(self.size());
+        self.planes.iter().for_each(|(_, plane)| sum += plane);
+        sum / self.planes.len() as f32
     }
 
     /// Returns the picture as sRGB codes of 0–1.

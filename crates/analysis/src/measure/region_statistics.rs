@@ -174,9 +174,9 @@ impl RegionRequest {
         };
         let (own, other) = (mean_xyz(region), reference.and_then(mean_xyz));
         Ok(RegionMeasurement {
+            unit: picture.unit().to_owned(),
             picture: picture.name,
             region,
-            unit: "share of the highest code or of saturation; of EXR files their own".to_owned(),
             channels,
             color: own.map(|xyz| RegionColor::of(xyz, Some(Xyz::D65))),
             spectrum: Vec::new(),

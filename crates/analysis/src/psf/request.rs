@@ -1,9 +1,14 @@
 //! Which point-spread functions to compute, and how.
 
-use dioptric_optics::{Lens, MonoLens, glam::DVec2};
+use std::borrow::Cow;
+
+use dioptric_optics::{Lens, MonoLens, ObjectPoint};
 use dioptric_psf::{Diffraction, ImageSettings, PointImage, PsfError};
 
-use crate::{AnalysisFilm, FilmPlace, FilmUse};
+use crate::{
+    AfocalView, AnalysisFilm, FilmPlace, FilmUse,
+    field_angles::{FieldAngles, KNOWN_ANGLES},
+};
 use dioptric_pipeline::{PipelineError, REFERENCE_WAVELENGTH_NM, nearest_to_reference_nm};
 
 /// Wavelengths that are seen.
@@ -17,7 +22,8 @@ const AZIMUTHS: usize = 96;
 /// Which point-spread functions to compute, and how.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PsfRequest {
-    /// Field angles at the entrance pupil, to the right of the picture and upwards, degrees.
+    /// Field angles at the entrance pupil, to the right of the picture and upwards, degrees; of far points up to 120 along one of
+    /// them.
     pub fields_deg: Vec<[f64; 2]>,
     /// Distances of the points before the first vertex, mm; infinity for a star.
     pub distances_mm: Vec<f64>,
@@ -69,13 +75,19 @@ pub(crate) struct Item {
 }
 
 impl Item {
-    pub(crate) fn field_tan(&self) -> DVec2 {
-        DVec2::new(self.field_deg.to_radians().tan(), self.field_y_deg.to_radians().tan())
+    pub(crate) fn angles(&self) -> FieldAngles {
+        FieldAngles::of_deg([self.field_deg, self.field_y_deg])
+    }
+
+    /// Returns the point, seen through the lens at the reference wavelength.
+    pub(crate) fn point(&self, reference: &MonoLens) -> ObjectPoint {
+        self.angles().point(reference, self.dioptres)
     }
 
     /// Returns the point as the lens images it; `None` of a dark one.
     pub(crate) fn image(&self, lens: &Lens, settings: &ImageSettings) -> Result<Option<PointImage>, PipelineError> {
-        Ok(PointImage::trace(lens, settings, self.field_tan(), self.dioptres, self.wavelength_nm)?)
+        let point = self.point(&lens.at(settings.reference_wavelength_nm)?);
+        Ok(PointImage::of_point(lens, settings, point, self.wavelength_nm)?)
     }
 }
 
@@ -96,15 +108,27 @@ impl PsfRequest {
         Ok(self.reference(lens)?.wavelength_nm())
     }
 
+    fn film_use(&self, reference_nm: f64) -> FilmUse<'_> {
+        let wavelengths_nm = if self.focus_nm.is_empty() { &self.wavelengths_nm } else { &self.focus_nm };
+        let distance_mm = self.distances_mm.first().copied().unwrap_or(f64::INFINITY);
+        FilmUse { wavelengths_nm, reference_nm, distance_mm }
+    }
+
+    /// Returns the lens that is looked through: where its light leaves in parallel and no film is given, the lens with an ideal one
+    /// behind it.
+    pub(crate) fn lens_with_image<'a>(
+        &self,
+        lens: &'a Lens,
+    ) -> Result<(Cow<'a, Lens>, Option<AfocalView>), PipelineError> {
+        AfocalView::applied(lens, self.film, &self.film_use(self.reference_nm(lens)?))
+    }
+
     /// Returns where the film is: of a focus to be found, that of the first distance.
     ///
     /// # Errors
     /// When the lens is not known at a wavelength, or has no image to focus on.
     pub fn film_place(&self, lens: &Lens) -> Result<FilmPlace, PipelineError> {
-        let reference_nm = self.reference_nm(lens)?;
-        let wavelengths_nm = if self.focus_nm.is_empty() { &self.wavelengths_nm } else { &self.focus_nm };
-        let distance_mm = self.distances_mm.first().copied().unwrap_or(f64::INFINITY);
-        self.film.place(lens, FilmUse { wavelengths_nm, reference_nm, distance_mm })
+        self.film.place(lens, self.film_use(self.reference_nm(lens)?))
     }
 
     /// Returns the points: fields outermost, then distances, then wavelengths.
@@ -144,14 +168,20 @@ impl PsfRequest {
     }
 
     pub(crate) fn check(&self) -> Result<(), PipelineError> {
-        for &field in self.fields_deg.iter().flatten() {
-            if field.is_nan() || field.abs() >= 89.9 {
-                return Err(self.wrong("fields_deg", &field.to_string(), "angles below 89.9 degrees"));
-            }
-        }
         for &distance in &self.distances_mm {
             if distance.is_nan() || distance <= 0.0 {
                 return Err(self.wrong("distances_mm", &distance.to_string(), "numbers above 0, or inf"));
+            }
+        }
+        // The paper's rays go to a grid across the axis.
+        let is_paper = matches!(self.sampling, PsfSampling::Paper { .. });
+        let nearest_mm = self.distances_mm.iter().copied().fold(f64::INFINITY, f64::min);
+        for &field in &self.fields_deg {
+            if !FieldAngles::are_known(field, if is_paper { 0.0 } else { nearest_mm }) {
+                let [x, y] = field;
+                let found = if x.abs() > y.abs() || x.is_nan() { x } else { y };
+                let expected = if is_paper { "angles below 90 degrees in the paper mode" } else { KNOWN_ANGLES };
+                return Err(self.wrong("fields_deg", &found.to_string(), expected));
             }
         }
         for &wavelength in &self.wavelengths_nm {

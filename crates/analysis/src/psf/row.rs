@@ -8,6 +8,7 @@ use dioptric_psf::Picture;
 use serde::Serialize;
 
 use super::spot::Moments;
+use crate::field_angles::FieldAngles;
 
 /// What is measured of one point-spread function.
 ///
@@ -56,8 +57,9 @@ pub struct PsfRow {
     pub es50_half_width_um: f64,
     /// Half the side of the square about the centroid that holds 80 % of the energy, µm.
     pub es80_half_width_um: f64,
-    /// The area of the pupil that reaches the film over that of an axial point at the same distance and wavelength, or over that of the
-    /// paraxial entrance pupil where the axis is dark (paper mode: the share of the rays over the front rim's disc).
+    /// The light of the point that reaches the film over that of an axial point at the same distance and wavelength, or over that through
+    /// the paraxial entrance pupil where the axis is dark: solid angles, or cross-sections of the beams of far points (paper mode: the
+    /// share of the rays over the front rim's disc).
     pub energy: f64,
     /// The share of the point's light that lies on the picture: what the picture's metrics are of, but for the modulation, in which
     /// the rest counts as well.
@@ -76,7 +78,8 @@ pub struct PsfRow {
     #[serde(skip)]
     pub(crate) curves: Option<WaveCurves>,
     /// What the line widths, the encircled energies and the modulations are of: `waves` and `rays and diffraction limit`, which know of
-    /// no pixels and count all light, or the `picture` on its pixels.
+    /// no pixels and count all light, `coarser pixels` that hold all light of a blur larger than the picture (the modulations are the
+    /// picture's), or the `picture` on its pixels.
     pub measured_on: &'static str,
     /// Modulation at the frequencies asked for, of all light of the point: what lies outside of the picture counts as if it fell off
     /// with the third power of the distance.
@@ -116,10 +119,8 @@ pub(crate) struct WaveCurves {
 /// Places of a curve.
 const CURVE_PLACES: usize = 160;
 
-/// Returns the direction of the meridional plane on the film, from +x, for tangents of field angles.
-pub(crate) fn meridian_rad(field_tan: DVec2) -> f64 {
-    if field_tan == DVec2::ZERO { 0.0 } else { field_tan.to_angle() }
-}
+/// The share of the light on a picture from which on its widths are those of the point.
+pub(crate) const WHOLE: f64 = 0.97;
 
 /// Which point a row is of.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -171,7 +172,7 @@ impl PsfRow {
 
     /// Returns the direction of the point's meridional plane, from +x.
     pub(crate) fn meridian_rad(&self) -> f64 {
-        meridian_rad(DVec2::new(self.field_deg.to_radians().tan(), self.field_y_deg.to_radians().tan()))
+        FieldAngles::of_deg([self.field_deg, self.field_y_deg]).meridian_rad()
     }
 
     /// Returns the row with the modulations at these frequencies, of a wave along a direction from +x.
@@ -227,6 +228,22 @@ impl PsfRow {
         }
     }
 
+    /// Returns the row with the widths and radii of a picture that holds all of the light, of coarser pixels.
+    pub(crate) fn with_widths_of(self, whole: &Picture) -> Self {
+        let [encircled, ensquared] = [whole.encircled(), whole.ensquared()];
+        let width_um = |direction: f64| whole.line_spread(direction).full_width_at_half_maximum_um();
+        Self {
+            lsf_fwhm_um: width_um(0.0),
+            lsf_fwhm_y_um: width_um(FRAC_PI_2),
+            ee50_radius_um: encircled.reach_um(0.5),
+            ee80_radius_um: encircled.reach_um(0.8),
+            es50_half_width_um: ensquared.reach_um(0.5),
+            es80_half_width_um: ensquared.reach_um(0.8),
+            measured_on: "coarser pixels",
+            ..self
+        }
+    }
+
     /// Whether none of the point's light reaches the film: all that is measured of it is then no number.
     pub fn is_dark(&self) -> bool {
         self.energy.is_nan() || self.energy <= 0.0
@@ -234,7 +251,7 @@ impl PsfRow {
 
     /// Whether so much of the light lies beside the picture that its metrics are not those of the point.
     pub fn is_cut(&self) -> bool {
-        !self.is_dark() && self.picture_share < 0.97 && self.curves.is_none()
+        !self.is_dark() && self.picture_share < WHOLE && self.measured_on == "picture"
     }
 
     /// Whether any of the picture is the diffraction integral.

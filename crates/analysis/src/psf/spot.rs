@@ -20,7 +20,7 @@ const RULE: PupilRule = PupilRule { n_rings: 24, n_azimuths: AZIMUTHS };
 pub(crate) struct Spot {
     pub(crate) at_mm: Vec<DVec2>,
     pub(crate) weights: Vec<f64>,
-    /// The share of the light that entered that reached the film.
+    /// How much light reached the film, over that of an axial point (of the paper's rays, over that of all rays).
     pub(crate) energy: f64,
 }
 
@@ -35,8 +35,8 @@ pub(crate) struct Moments {
 impl Spot {
     /// Sends the light of a point through its true pupil.
     ///
-    /// `energy` is the area of that pupil over that which an axial point sees, both without what obscurations stop; where the axis is dark,
-    /// over that of the paraxial entrance pupil.
+    /// `energy` is the solid angle (of a far point the cross-section of the beam) over that of the axial point; where the axis is dark, over
+    /// that of the paraxial entrance pupil.
     pub(crate) fn through_pupil(
         mono: &MonoLens,
         point: &ObjectPoint,
@@ -44,17 +44,11 @@ impl Spot {
         film_distance_mm: f64,
     ) -> Self {
         let Some(light) = PupilLight::to_film(mono, point, film_distance_mm, RULE) else { return Self::default() };
-        let area_mm2 = |point: &ObjectPoint| {
-            mono.over_clear_pupil(&|lens| {
-                PupilRegion::find(lens, point, AZIMUTHS).map_or(0.0, |region| area_of(point, &region))
-            })
-        };
-        // Where the axis is dark, as the light of a window beside it.
-        let stated_mm2 = || 0.25 * PI * mono.first_order_of_stop().entrance_pupil_diameter_mm.powi(2);
+        let on_axis = PupilLight::to_film(mono, axial, film_distance_mm, RULE);
         Self {
             at_mm: mono.landed(light.rays(), film_distance_mm).map(FilmPoint::in_picture_mm).collect(),
             weights: light.weights().to_vec(),
-            energy: area_mm2(point) / Some(area_mm2(axial)).filter(|area| *area > 0.0).unwrap_or_else(stated_mm2),
+            energy: light.collected() / on_axis.map_or_else(|| stated_light(mono, axial), |light| light.collected()),
         }
     }
 
@@ -100,6 +94,31 @@ impl Spot {
         let products = mean(&|p| (p - centroid_mm) * (p - centroid_mm).yx());
         let second_mm2 = Covariance { xx: squares.x, xy: products.x, yy: squares.y };
         Some(Moments { centroid_mm, second_mm2 })
+    }
+}
+
+/// Returns the area of the pupil that a point sees in a plane across the axis over that which an axial point sees, both without what
+/// obscurations stop; where the axis is dark, over that of the paraxial entrance pupil.
+pub(crate) fn pupil_share(mono: &MonoLens, point: &ObjectPoint, axial: &ObjectPoint) -> f64 {
+    let area_mm2 = |point: &ObjectPoint| {
+        mono.over_clear_pupil(&|lens| {
+            PupilRegion::find(lens, point, AZIMUTHS).map_or(0.0, |region| area_of(point, &region))
+        })
+    };
+    let stated_mm2 = || 0.25 * PI * mono.first_order_of_stop().entrance_pupil_diameter_mm.powi(2);
+    area_mm2(point) / Some(area_mm2(axial)).filter(|area| *area > 0.0).unwrap_or_else(stated_mm2)
+}
+
+/// Returns what the paraxial entrance pupil takes up of an axial point: sr, or mm² of a far one.
+fn stated_light(mono: &MonoLens, axial: &ObjectPoint) -> f64 {
+    let first = mono.first_order_of_stop();
+    let radius_mm = 0.5 * first.entrance_pupil_diameter_mm;
+    match axial {
+        ObjectPoint::Infinite(_) => PI * radius_mm.powi(2),
+        ObjectPoint::Finite(place) => {
+            let way_mm = first.entrance_pupil_z_mm - place.z;
+            2.0 * PI * (1.0 - way_mm.abs() / way_mm.hypot(radius_mm))
+        }
     }
 }
 

@@ -2,12 +2,11 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-use dioptric_optics::{Lens, ObjectPoint};
+use dioptric_optics::Lens;
 use dioptric_psf::PointImage;
 use rayon::prelude::*;
 
 use super::request::Item;
-use super::row::meridian_rad;
 use super::spot::{PaperRays, Spot};
 use super::windowed::Windowed;
 use crate::{PsfRequest, PsfSampling, PsfSet};
@@ -47,6 +46,8 @@ impl PsfRequest {
     /// Those of [`compute`](Self::compute).
     pub fn through_focus(&self, lens: &Lens, set: &PsfSet) -> Result<ThroughFocus, PipelineError> {
         let cycles_per_mm = self.mtf_per_mm.iter().copied().find(|f| *f > 0.0).unwrap_or(FREQUENCY_PER_MM);
+        let (lens, _) = self.lens_with_image(lens)?;
+        let lens = &*lens;
         let reference = self.reference(lens)?;
         let first = reference.first_order();
         // A telecentric lens has the cone of its object's image on any film.
@@ -113,7 +114,7 @@ impl Here<'_> {
             let [asked, drawn] = [self.request.pixel_um, pitch_um].map(|um| self.pixels(um, direction));
             (own * asked / drawn).min(1.0)
         };
-        let meridian = meridian_rad(item.field_tan());
+        let meridian = item.angles().meridian_rad();
         (modulation(meridian), modulation(meridian + FRAC_PI_2))
     }
 
@@ -133,12 +134,12 @@ impl Here<'_> {
     fn of_rays(&self, item: &Item, rays: &PaperRays) -> Result<(f64, f64), PipelineError> {
         let reference = self.request.reference(self.lens)?;
         let mono = self.lens.at(item.wavelength_nm)?;
-        let point = ObjectPoint::from_field(&reference, item.field_tan(), item.dioptres);
+        let point = item.point(&reference);
         let spot = Spot::over_front(&mono, &point, self.film_distance_mm, rays);
         let modulation = |direction: f64| {
             spot.modulation(direction, self.cycles_per_mm) * self.pixels(self.request.pixel_um, direction)
         };
-        let meridian = meridian_rad(item.field_tan());
+        let meridian = item.angles().meridian_rad();
         Ok((modulation(meridian), modulation(meridian + FRAC_PI_2)))
     }
 

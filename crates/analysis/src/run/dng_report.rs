@@ -1,7 +1,7 @@
 //! Numbers of a raw file and its picture.
 
 use dioptric_pipeline::DevelopedFile;
-use dioptric_sensor::{DngProfile, DngShot, Processing};
+use dioptric_sensor::{DngProfile, DngShot, Processing, WhiteBalance};
 use dioptric_spectrum::ColorTemperature;
 use serde::Serialize;
 
@@ -79,7 +79,15 @@ impl DngReport {
             brightness: developed.brightness,
             processing: processing.clone(),
             opcodes: file.opcodes.clone(),
-            notes: file.notes.clone(),
+            notes: file.notes.iter().cloned().chain(white_note(of)).collect(),
         }
     }
+}
+
+/// Returns the note on a white that the file does not tell.
+fn white_note(of: &DevelopedFile) -> Option<String> {
+    let is_untold = of.file.neutral.is_none() && of.file.raw.filter_names.len() > 1;
+    (is_untold && of.processing.white == WhiteBalance::Scene).then(|| {
+        "the file does not tell the white of the shot (AsShotNeutral or AsShotWhiteXY): the mean of the frame was made gray".to_owned()
+    })
 }

@@ -6,9 +6,9 @@ mod dual_pixel;
 mod pixel_optics;
 mod statistics;
 
-use dioptric_pipeline::{AberrationSummary, Camera, Capture, FilmPart, PipelineError};
+use dioptric_pipeline::{AberrationSummary, Camera, Capture, FilmPart, PipelineError, Quality, SceneSource};
 use dioptric_psf::{Diffraction, LensImageModel};
-use dioptric_scene::SceneLight;
+use dioptric_scene::{Pattern, SceneLight};
 use dioptric_spectrum::{ColorTemperature, DepthMap};
 use serde::Serialize;
 
@@ -168,6 +168,31 @@ fn note_on_round_halos(run: &Run<'_>) -> Option<String> {
     })
 }
 
+/// How many pixels apart samples of a scene may be before that is told; a film of the scene's own size has one a pixel, or a little less.
+const COARSE_PIXELS: f64 = 1.1;
+
+/// States that the samples of a scene are farther apart than pixels, where that is what limits the sharpness of the picture.
+fn note_on_coarse_samples(run: &Run<'_>) -> Option<String> {
+    let capture = run.capture;
+    let is_computed = match &capture.camera.scene.source {
+        SceneSource::World(_) => true,
+        SceneSource::Target { pattern, .. } => *pattern == Pattern::Uniform,
+        SceneSource::File(_) | SceneSource::StillLife { .. } => false,
+    };
+    if is_computed || capture.quality != Quality::Full {
+        return None;
+    }
+    let sample_um = 1e3 * capture.lens.reference.first_order().efl_mm.abs() * capture.scene.sample_tangent?;
+    let pixels = sample_um / capture.place.pitch_um;
+    (pixels > COARSE_PIXELS && pixels.is_finite()).then(|| {
+        format!(
+            "{}: its samples are {pixels:.1} pixels apart, which sets how sharp the picture can be: more of them, or a narrower field of view, \
+             show what the lens does",
+            capture.scene.name
+        )
+    })
+}
+
 impl RunReport {
     /// Returns the numbers of a run.
     ///
@@ -215,7 +240,8 @@ impl RunReport {
                 light_temperature: scene.light.as_ref().map(|light| light.illuminant.color_temperature()),
                 notes: {
                     let narrow = capture.irradiance.summary.narrow_surfaces;
-                    scene.notes.iter().cloned().chain(narrow.and_then(|narrow| narrow.note())).collect()
+                    let narrow = narrow.and_then(|narrow| narrow.note());
+                    scene.notes.iter().cloned().chain(narrow).chain(note_on_coarse_samples(run)).collect()
                 },
             },
             irradiance: IrradianceData {

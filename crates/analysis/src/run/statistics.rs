@@ -5,7 +5,7 @@ use dioptric_sensor::Tile;
 use serde::Serialize;
 
 use super::pixel_optics::PixelOpticsData;
-use crate::psf::spot::Spot;
+use crate::psf::spot::pupil_share;
 use crate::{LensData, LensInfoRequest};
 use dioptric_pipeline::{Capture, Frames, PipelineError, REFERENCE_WAVELENGTH_NM};
 
@@ -151,13 +151,10 @@ pub(super) fn losses(capture: &Capture, field_tans: &[DVec2]) -> Result<Vec<Loss
     let beside_focus = 1.0 / capture.scene.near_m;
     let focus_mm = capture.place.focus_distance_mm;
     let dioptres = focus_mm.map_or(beside_focus, |mm| 1e3 / (mm + mono.projection_center_z_mm()));
-    Ok(field_tans
-        .iter()
-        .map(|&field_tan| loss_row(mono, capture.place.film_distance_mm, field_tan, dioptres))
-        .collect())
+    Ok(field_tans.iter().map(|&field_tan| loss_row(mono, field_tan, dioptres)).collect())
 }
 
-fn loss_row(mono: &MonoLens, film_distance_mm: f64, field_tan: DVec2, dioptres: f64) -> LossRow {
+fn loss_row(mono: &MonoLens, field_tan: DVec2, dioptres: f64) -> LossRow {
     let axial = ObjectPoint::from_field(mono, DVec2::ZERO, dioptres);
     let point = ObjectPoint::from_field(mono, field_tan, dioptres);
     let mut rays = rays_over_front(mono, &point, LOSS_RAYS);
@@ -179,7 +176,7 @@ fn loss_row(mono: &MonoLens, film_distance_mm: f64, field_tan: DVec2, dioptres: 
         ended_by_stop: share(by_stop),
         ended_by_rims: share(by_rims),
         missed_or_reflected: share(otherwise),
-        vignetting: Spot::through_pupil(mono, &point, &axial, film_distance_mm).energy,
+        vignetting: pupil_share(mono, &point, &axial),
     }
 }
 

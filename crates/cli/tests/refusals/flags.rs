@@ -55,7 +55,7 @@ pub(crate) const LINES: &[(&str, &str)] = &[
     ("run camera.ron --tilt-deg 400", "--tilt-deg is 400, expected "),
     (
         "run camera.ron --scene note.txt --fov-deg 10 --depth-m 2",
-        "expected a .exr, .hdr (ENVI or Radiance), .mat, .npy",
+        "expected a .exr, .hdr (ENVI or Radiance), .mat, .h5, .npy, .npz",
     ),
     ("run camera.ron --scene . --fov-deg 10 --depth-m 2", ".: no spectral band found: expected PNG or TIFF"),
     ("run camera.ron --scene absent.png --fov-deg 10 --depth-m 2", "absent.png: cannot be read: there is no such file"),
@@ -106,7 +106,13 @@ pub(crate) const LINES: &[(&str, &str)] = &[
     ("glass list --glasses absent.agf", "unexpected argument '--glasses' found"),
     ("glass show SCHOTT:UNOBTAINIUM", "no glass is named 'SCHOTT:UNOBTAINIUM'; no name is"),
     ("psf dgauss-50mm --focus-mm -5", "--focus-mm is -5, expected "),
-    ("psf dgauss-50mm --focus-mm 2000 --fields-deg 91", "psf: fields_deg is 91, expected angles below 89.9"),
+    (
+        "psf dgauss-50mm --focus-mm 2000 --fields-deg 91",
+        "psf: fields_deg is 91, expected angles of up to 120 degrees along",
+    ),
+    ("psf dgauss-50mm --distances-mm inf --fields-deg 121", "psf: fields_deg is 121, expected angles of up to 120 deg"),
+    ("psf dgauss-50mm --distances-mm inf --mode paper --fields-deg 95", "below 90 degrees in the paper mode"),
+    ("lens info dgauss-50mm --catalog NOSUCH", "catalog is NOSUCH, expected a catalogue (.agf, .yml) or a maker: "),
     ("psf dgauss-50mm --focus-mm 2000 --fields-deg x", "--fields-deg: 'x' is neither a number nor a range"),
     ("psf dgauss-50mm --focus-mm 2000 --distances-mm 0", "--distances-mm is 0, expected "),
     ("psf dgauss-50mm --focus-mm 2000 --pixel-um 0 -o x.exr", "--pixel-um is 0, expected "),

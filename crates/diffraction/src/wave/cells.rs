@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use dioptric_optics::{MonoLens, ObjectPoint, PupilBoundary, Vignetting, quadrature::gauss_legendre_on};
+use dioptric_optics::{MonoLens, ObjectPoint, PupilBoundary, PupilPlane, Vignetting, quadrature::gauss_legendre_on};
 use glam::{DVec2, DVec3};
 
 use super::{
@@ -11,7 +11,7 @@ use super::{
 };
 use crate::DiffractionError;
 
-/// The cells of a pupil in the entrance-pupil plane, azimuth by azimuth.
+/// The cells of a pupil in its plane, azimuth by azimuth.
 ///
 /// A hole is counted by cells of negative area: what is stopped is what an opening of its shape would pass. So every
 /// part is a region with an edge of few corners, and sums over its nodes converge as fast as those over a disc.
@@ -22,7 +22,7 @@ pub(crate) struct PupilCells {
     pub(crate) energy: Vec<f64>,
     /// The solid angle or cross-section of the beam.
     pub(super) collected: f64,
-    pub(crate) z_mm: f64,
+    pub(crate) plane: PupilPlane,
     /// A place within the pupil's outer edge.
     pub(crate) center_mm: DVec2,
     /// Half the distance of the neighbors that derivatives are taken from, mm.
@@ -61,17 +61,17 @@ impl PupilCells {
     /// Lays nodes over the pupil of a lens without obscurations; energies are solid angles.
     fn of_region(lens: &MonoLens, point: &ObjectPoint, grid: PupilGrid) -> Option<Self> {
         let (boundary, azimuths) = azimuths(lens, point, grid)?;
-        let (center_mm, z_mm) = (boundary.center_mm(), boundary.z_mm());
+        let (center_mm, plane) = (boundary.center_mm(), *boundary.plane());
         let radii = gauss_legendre_on(grid.n_radii, 0.0, 1.0);
         let (targets_mm, areas_mm2): (Vec<DVec2>, Vec<f64>) =
             polar(&azimuths, &radii).map(|(offset, area)| (center_mm + offset, area)).unzip();
-        let taken = |(target, area): (&DVec2, &f64)| area * solid_angle_per_area(point, target.extend(z_mm));
+        let taken = |(target, area): (&DVec2, &f64)| area * solid_angle_on_plane(point, &plane, *target);
         let energy: Vec<f64> = targets_mm.iter().zip(&areas_mm2).map(taken).collect();
         let narrowest_mm = azimuths.iter().map(|azimuth| azimuth.rho_mm).fold(f64::INFINITY, f64::min);
         // Truncation is of order the step squared, 1e-8 of a derivative's own change over the pupil; rounding is
         // 1e-16 over it. The outermost node stays further than that from the edge, up to 80 radii.
         let step_mm = narrowest_mm * 1e-4f64.min(0.5 / (grid.n_radii * grid.n_radii) as f64);
-        Some(Self { targets_mm, areas_mm2, energy, collected: 0.0, z_mm, center_mm, step_mm })
+        Some(Self { targets_mm, areas_mm2, energy, collected: 0.0, plane, center_mm, step_mm })
     }
 
     pub(super) fn n_nodes(&self) -> usize {
@@ -88,7 +88,7 @@ impl PupilCells {
         let steps = [DVec2::ZERO, DVec2::X, -DVec2::X, DVec2::Y, -DVec2::Y].map(|u| u * self.step_mm);
         let targets_mm: Vec<DVec2> =
             steps.iter().flat_map(|step| self.targets_mm.iter().map(move |target| target + step)).collect();
-        let mut rays = lens.rays_towards(point, &targets_mm, self.z_mm, 0.0);
+        let mut rays = self.plane.rays(lens, point, &targets_mm);
         lens.trace(&mut rays, Vignetting::Off);
         lens.to_film(&mut rays, film_distance_mm);
         let (n_rays, n_lost) = (rays.len(), rays.len() - rays.n_in_flight());
@@ -197,6 +197,17 @@ fn polar<'a>(azimuths: &'a [Spoke], radii: &'a [(f64, f64)]) -> impl Iterator<It
 pub(super) fn disc(grid: PupilGrid) -> Vec<(DVec2, f64)> {
     let (azimuths, radii) = (equal_azimuths(&vec![1.0; grid.n_azimuths]), gauss_legendre_on(grid.n_radii, 0.0, 1.0));
     polar(&azimuths, &radii).collect()
+}
+
+/// Returns the solid angle (for a far point: the cross-section of the beam) per area of a pupil's plane at a place of it, mm.
+pub(super) fn solid_angle_on_plane(point: &ObjectPoint, plane: &PupilPlane, place_mm: DVec2) -> f64 {
+    match *point {
+        ObjectPoint::Finite(from) => {
+            let way = plane.in_lens_mm(place_mm) - from;
+            (way.dot(plane.normal()) / way.length().powi(3)).abs()
+        }
+        ObjectPoint::Infinite(direction) => direction.dot(plane.normal()),
+    }
 }
 
 /// Returns the solid angle (for a far point: the cross-section of the beam) per area of a plane across the axis.

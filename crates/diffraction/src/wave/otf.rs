@@ -19,7 +19,7 @@ use rayon::prelude::*;
 
 use super::{
     PupilGrid,
-    cells::{PupilCells, solid_angle_per_area},
+    cells::{PupilCells, solid_angle_on_plane},
     propagation::{FilmRays, Propagation, Waves},
 };
 use crate::{DiffractionError, airy::bessel_j, zernike::fit};
@@ -390,7 +390,7 @@ impl Layout<'_> {
             .into_par_iter()
             .map(|row| {
                 let targets = targets_mm.row(row).to_vec();
-                let mut rays = self.lens.rays_towards(self.point, &targets, cells.z_mm, 0.0);
+                let mut rays = cells.plane.rays(self.lens, self.point, &targets);
                 self.lens.trace(&mut rays, Vignetting::Off);
                 self.lens.to_film(&mut rays, self.film_distance_mm);
                 let is_there: Vec<bool> = rays.fate.iter().map(|fate| fate.is_in_flight()).collect();
@@ -412,7 +412,7 @@ impl Layout<'_> {
                 .into_par_iter()
                 .map(|row| {
                     let targets = targets_mm.row(row).to_vec();
-                    part.clearances_mm(part.rays_towards(self.point, &targets, cells.z_mm, 0.0))
+                    part.clearances_mm(cells.plane.rays(part, self.point, &targets))
                 })
                 .collect();
             let clearances_mm = Array2::from_shape_fn((n, n), |(row, column)| rows[row][column]);
@@ -435,8 +435,9 @@ impl Layout<'_> {
             if coverage <= 0.0 || !is_there || !turns.is_finite() {
                 continue;
             }
-            let target = targets_mm[(row, column)].extend(cells.z_mm);
-            let density = solid_angle_per_area(self.point, target) * stretch(&targets_mm, row, column, step);
+            let target = targets_mm[(row, column)];
+            let density =
+                solid_angle_on_plane(self.point, &cells.plane, target) * stretch(&targets_mm, row, column, step);
             let amplitude = density.sqrt();
             let (re, im) = DVec2::from_angle(TAU * (turns - piston)).into();
             let weighed = amplitude * coverage.min(1.0);

@@ -2,7 +2,7 @@
 
 use glam::{DMat2, DVec2};
 
-use crate::{MonoLens, ObjectPoint, Vignetting, rays_towards};
+use crate::{MonoLens, ObjectPoint, PupilPlane, RayBatch, Vignetting};
 
 /// Newton steps before an aim is given up from where it started.
 const NEWTON_STEPS: usize = 25;
@@ -17,10 +17,11 @@ const SHORTEST_PIECE: f64 = 1e-5;
 const MOST_PIECES: usize = 200;
 
 /// Rays of one object point, aimed at places of the real stop: where they cross the plane of the paraxial entrance
-/// pupil (of the first vertex, where that is infinitely far).
+/// pupil (of the first vertex, where that is infinitely far) or, of light that comes in across the axis or from behind,
+/// the plane through the first vertex that faces it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StopAim {
-    z_mm: f64,
+    plane: PupilPlane,
     targets_mm: Vec<Option<DVec2>>,
 }
 
@@ -30,23 +31,24 @@ impl StopAim {
     /// Newton's method is led to the point's own rays from those of the axis, in pieces as long as it can bear, so
     /// that the strong pupil aberration of a fisheye does not lead it astray. What cannot be reached is `None`.
     pub fn find(lens: &MonoLens, point: &ObjectPoint, stop_places: &[DVec2]) -> Self {
-        let search = Search::new(lens);
-        let lost = |z_mm| Self { z_mm, targets_mm: vec![None; stop_places.len()] };
+        let search = Search::new(lens, point);
+        let plane = search.plane(point);
+        let lost = || Self { plane, targets_mm: vec![None; stop_places.len()] };
         let Some(chief) = search.lead(DVec2::ZERO, |share| (search.point_at(point, share), DVec2::ZERO)) else {
-            return lost(search.z_mm);
+            return lost();
         };
-        let Some(chief_slope) = search.slope(point, chief) else { return lost(search.z_mm) };
+        let Some(chief_slope) = search.slope(point, chief) else { return lost() };
         let aim_at = |&place: &DVec2| {
             let first = chief + chief_slope.inverse() * place;
             let direct = search.newton(point, place, first);
             direct.or_else(|| search.lead(chief, |share| (*point, place * share)))
         };
-        Self { z_mm: search.z_mm, targets_mm: stop_places.iter().map(aim_at).collect() }
+        Self { plane, targets_mm: stop_places.iter().map(aim_at).collect() }
     }
 
-    /// z of the plane of the targets from the first vertex, mm.
-    pub fn z_mm(&self) -> f64 {
-        self.z_mm
+    /// The plane of the targets.
+    pub fn plane(&self) -> &PupilPlane {
+        &self.plane
     }
 
     /// Where each ray crosses that plane, mm; `None` for a place of the stop that no ray was found to.
@@ -60,16 +62,27 @@ struct Search<'a> {
     z_mm: f64,
     /// The radius of the entrance pupil or, where that is infinite, of the stop, mm.
     radius_mm: f64,
+    /// Whether targets lie in planes that face the light: all the way, where it ends across the axis or behind.
+    is_facing: bool,
 }
 
 impl<'a> Search<'a> {
-    fn new(lens: &'a MonoLens) -> Self {
+    fn new(lens: &'a MonoLens, point: &ObjectPoint) -> Self {
         let first = lens.first_order();
         let (z_mm, radius_mm) = (first.entrance_pupil_z_mm, 0.5 * first.entrance_pupil_diameter_mm);
+        let is_facing = matches!(point, ObjectPoint::Infinite(_)) && !PupilPlane::of(lens, point).is_across_axis();
         match z_mm.is_finite() && radius_mm.is_finite() {
-            true => Self { lens, z_mm, radius_mm },
-            false => Self { lens, z_mm: 0.0, radius_mm: lens.stop_semi_aperture_mm() },
+            true => Self { lens, z_mm, radius_mm, is_facing },
+            false => Self { lens, z_mm: 0.0, radius_mm: lens.stop_semi_aperture_mm(), is_facing },
         }
+    }
+
+    fn plane(&self, point: &ObjectPoint) -> PupilPlane {
+        if self.is_facing { PupilPlane::facing(point) } else { PupilPlane::across_axis(self.z_mm) }
+    }
+
+    fn rays(&self, point: &ObjectPoint, targets_mm: &[DVec2]) -> RayBatch {
+        self.plane(point).rays(self.lens, point, targets_mm)
     }
 
     /// Returns the point at a share of the angle from the axis.
@@ -78,8 +91,7 @@ impl<'a> Search<'a> {
         match *point {
             ObjectPoint::Infinite(direction) => {
                 let across = direction.truncate();
-                let factor = shrink(across.length() / direction.z);
-                ObjectPoint::Infinite((across * factor).extend(direction.z).normalize())
+                ObjectPoint::far(share * across.length().atan2(direction.z), -across)
             }
             ObjectPoint::Finite(place) => {
                 let factor = shrink(place.truncate().length() / (self.z_mm - place.z));
@@ -90,7 +102,7 @@ impl<'a> Search<'a> {
 
     /// Returns where the rays to these targets pass the stop, in units of its radius, if all of them do.
     fn at_stop<const N: usize>(&self, point: &ObjectPoint, targets_mm: [DVec2; N]) -> Option<[DVec2; N]> {
-        let mut rays = rays_towards(point, &targets_mm, self.z_mm, 0.0);
+        let mut rays = self.rays(point, &targets_mm);
         self.lens.trace_surfaces(0..self.lens.stop() + 1, &mut rays, Vignetting::Off);
         let radius_mm = self.lens.stop_semi_aperture_mm();
         let all = rays.n_in_flight() == N;
@@ -157,6 +169,30 @@ mod tests {
     use super::*;
     use crate::Lens;
 
+    /// Past 90° light comes from behind: its chief ray goes on moving outwards on the film, as steadily as before.
+    #[test]
+    fn chief_rays_go_on_beyond_90_degrees() {
+        let lens = Lens::built_in("fisheye-12.5mm").unwrap().at(550.0).unwrap();
+        let film_mm = lens.film_distance_mm_for(f64::INFINITY).unwrap();
+        let height_mm = |field_deg: f64| {
+            let point = ObjectPoint::far(field_deg.to_radians(), DVec2::Y);
+            -lens.chief_film_point_mm(&point, film_mm).expect("a chief ray").y
+        };
+        // Both planes of targets have the same ray.
+        let from_front = ObjectPoint::far(89.0f64.to_radians(), DVec2::Y);
+        let facing = Search { is_facing: true, ..Search::new(&lens, &from_front) };
+        let way = |share| (facing.point_at(&from_front, share), DVec2::ZERO);
+        let mut rays = facing.rays(&from_front, &[facing.lead(DVec2::ZERO, way).unwrap()]);
+        lens.trace(&mut rays, Vignetting::Off);
+        lens.to_film(&mut rays, film_mm);
+        assert!((-rays.point_mm(0).y / height_mm(89.0) - 1.0).abs() < 1e-9);
+        let heights: Vec<f64> = (0..=8).map(|i| height_mm(80.0 + 2.5 * f64::from(i))).collect();
+        for steps in heights.windows(3).map(|h| [h[1] - h[0], h[2] - h[1]]) {
+            // Steps of the angle lead ever less far, by no more than a quarter; a wrong sign would be a hundred times a step.
+            assert!(steps[0] > 0.0 && (0.75..1.0).contains(&(steps[1] / steps[0])), "{heights:?}");
+        }
+    }
+
     fn point_at(lens: &MonoLens, field_deg: f64, dioptres: f64) -> ObjectPoint {
         let direction = DVec2::new(0.6, 0.8);
         ObjectPoint::from_field(lens, direction * field_deg.to_radians().tan(), dioptres)
@@ -167,7 +203,7 @@ mod tests {
     fn check(lens: &MonoLens, point: &ObjectPoint, places: &[DVec2]) {
         let aim = StopAim::find(lens, point, places);
         let targets: Vec<DVec2> = aim.targets_mm().iter().map(|target| target.expect("the aim is found")).collect();
-        let mut rays = rays_towards(point, &targets, aim.z_mm(), 0.0);
+        let mut rays = aim.plane().rays(lens, point, &targets);
         lens.trace_surfaces(0..lens.stop() + 1, &mut rays, Vignetting::Off);
         for (i, place) in places.iter().enumerate() {
             let miss = (rays.point_mm(i).truncate() / lens.stop_semi_aperture_mm() - *place).length();

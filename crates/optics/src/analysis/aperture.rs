@@ -23,7 +23,7 @@ impl NumericalApertures {
     pub fn find(lens: &MonoLens, point: &ObjectPoint) -> Option<Self> {
         let aim = StopAim::find(lens, point, &[DVec2::Y * EDGE, DVec2::NEG_Y * EDGE]);
         let targets_mm: Vec<DVec2> = aim.targets_mm().iter().copied().collect::<Option<_>>()?;
-        let mut rays = lens.rays_towards(point, &targets_mm, aim.z_mm(), 0.0);
+        let mut rays = aim.plane().rays(lens, point, &targets_mm);
         let half_sine = |rays: &crate::RayBatch| (0.5 * rays.direction(0).angle_between(rays.direction(1))).sin();
         let object = lens.object_index() * half_sine(&rays);
         lens.trace(&mut rays, Vignetting::Off);

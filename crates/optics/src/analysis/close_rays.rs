@@ -3,7 +3,7 @@
 use glam::DVec2;
 
 use super::aim::StopAim;
-use crate::{MonoLens, ObjectPoint, Vignetting, rays_towards};
+use crate::{MonoLens, ObjectPoint, Vignetting};
 
 /// Distance of the outer close rays from the chief ray in the pupil, in units of the pupil's radius.
 const CLOSE: f64 = 2e-3;
@@ -83,7 +83,7 @@ impl<'a> CloseRays<'a> {
         };
         let h = 0.5 * CLOSE * radius_mm;
         let targets_mm = [-2.0, -1.0, 1.0, 2.0].map(|share| chief_mm + direction * (share * h));
-        let mut rays = rays_towards(point, &targets_mm, aim.z_mm(), 0.0);
+        let mut rays = aim.plane().rays(lens, point, &targets_mm);
         lens.trace(&mut rays, Vignetting::Off);
         lens.to_film_plane(&mut rays, 0.0);
         if rays.n_in_flight() < targets_mm.len() {

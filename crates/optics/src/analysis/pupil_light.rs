@@ -36,6 +36,7 @@ pub struct PupilLight {
     // Invariant: all rays are in flight.
     rays: RayBatch,
     weights: Vec<f64>,
+    collected: f64,
 }
 
 impl PupilLight {
@@ -44,7 +45,7 @@ impl PupilLight {
     ///
     /// A point shines alike in all directions: a far one evenly on a plane that faces it.
     pub fn to_film(lens: &MonoLens, point: &ObjectPoint, film_distance_mm: f64, rule: PupilRule) -> Option<Self> {
-        let mut light = Self { rays: RayBatch::default(), weights: Vec::new() };
+        let mut light = Self { rays: RayBatch::default(), weights: Vec::new(), collected: 0.0 };
         lens.for_each_clear_part(&mut |part, sign| {
             let n_before = light.weights.len();
             if let Some(region) = PupilRegion::find(part, point, rule.n_azimuths) {
@@ -54,6 +55,7 @@ impl PupilLight {
         });
         let sum: f64 = light.weights.iter().sum();
         light.weights.iter_mut().for_each(|weight| *weight /= sum);
+        light.collected = sum;
         (sum > 0.0).then_some(light)
     }
 
@@ -65,6 +67,12 @@ impl PupilLight {
     /// The share of the light that each ray stands for, in their order.
     pub fn weights(&self) -> &[f64] {
         &self.weights
+    }
+
+    /// How much light of the point gets to the film: of a far one the cross-section of its beam before the lens, mm²; of a near
+    /// one the solid angle of its cone, steradians.
+    pub fn collected(&self) -> f64 {
+        self.collected
     }
 
     /// Returns where the rays meet the film, mm along its own x and y, and how much light each stands for.
@@ -109,11 +117,15 @@ impl PupilLight {
     }
 }
 
-/// Returns the solid angle that a unit of area of the pupil's plane has as seen from the point, up to a common factor.
+/// Returns the cross-section of a far point's beam, or the solid angle of a near one's in sr/mm², for a unit of area of the
+/// pupil's plane.
 fn solid_angle_per_area(plane: &PupilPlane, point: &ObjectPoint, direction: DVec3) -> f64 {
     match point {
-        ObjectPoint::Infinite(_) => 1.0,
+        ObjectPoint::Infinite(_) => direction.dot(plane.normal()).abs(),
         // cos θ / d², and the plane is everywhere d cos θ from the point.
-        ObjectPoint::Finite(_) => direction.dot(plane.normal()).abs().powi(3),
+        ObjectPoint::Finite(place) => {
+            let away_mm = plane.normal().dot(plane.in_lens_mm(DVec2::ZERO) - *place);
+            direction.dot(plane.normal()).abs().powi(3) / (away_mm * away_mm)
+        }
     }
 }

@@ -67,7 +67,7 @@ impl PupilCoordinates {
                 let scaled: Vec<DVec2> = places.iter().map(|place| *place * scale).collect();
                 let aim = StopAim::find(lens, point, &scaled);
                 let targets_mm: Vec<DVec2> = aim.targets_mm().iter().map(|t| t.unwrap_or(DVec2::ZERO)).collect();
-                let mut rays = lens.rays_towards(point, &targets_mm, aim.z_mm(), 0.0);
+                let mut rays = aim.plane().rays(lens, point, &targets_mm);
                 for (fate, target) in rays.fate.iter_mut().zip(aim.targets_mm()) {
                     if target.is_none() {
                         *fate = RayFate::Missed { surface: lens.stop() as u16 };

@@ -184,7 +184,10 @@ impl System {
         let stop_semi_aperture_mm = self.stop_semi_aperture_mm(&mono)?;
         let mut interfaces = lens.interfaces().to_vec();
         interfaces[stop].surface.semi_aperture_mm = stop_semi_aperture_mm;
-        if self.surfaces.iter().enumerate().any(|(i, surface)| i != stop && surface.semi_aperture_mm.is_none()) {
+        let are_rims_found =
+            self.surfaces.iter().enumerate().any(|(i, surface)| i != stop && surface.semi_aperture_mm.is_none());
+        self.notes.extend(self.note_on_vignetting(are_rims_found));
+        if are_rims_found {
             let found = self.clear_semi_apertures_mm(&lens, stop_semi_aperture_mm)?;
             for (i, (interface, found)) in interfaces.iter_mut().zip(found).enumerate() {
                 if i != stop && self.surfaces[i].semi_aperture_mm.is_none() {
@@ -423,6 +426,19 @@ impl System {
             2.0 * beam_mm
         ));
         rim_mm
+    }
+
+    /// Returns a sentence on the vignetting factors of the fields, if the file states any: rims end rays, factors do not.
+    fn note_on_vignetting(&self, are_rims_found: bool) -> Option<String> {
+        let n_fields = self.fields.iter().filter(|(_, vignetting)| *vignetting != FieldVignetting::default()).count();
+        let of_fields = if n_fields == 1 { "1 field" } else { &format!("{n_fields} fields") };
+        let use_of_them = match are_rims_found {
+            true => {
+                "rims that the file does not state are those that the so narrowed pupils need, and end rays of every field alike"
+            }
+            false => "the rims that the file states end rays, and the factors do not",
+        };
+        (n_fields > 0).then(|| format!("vignetting factors of {of_fields}: {use_of_them}"))
     }
 
     /// The medium before a surface.

@@ -317,6 +317,7 @@ fn write_phase(text: &mut String, lens: &Lens, i: usize, construction_nm: f64) -
             let (x, y) = (along_x / lines_per_mm, along_y / lines_per_mm);
             let _ = writeln!(text, "  GRX {}\n  GRY {}", written(x), written(y));
         }
+        PhaseProfile::Wavefront(_) => return Err(cannot(FORMAT, i, "has a wavefront error")),
         PhaseProfile::Rings { radius_mm, coefficients_rad } => {
             // The program's coefficients are paths at the wavelength of construction, over powers of r.
             let _ = writeln!(text, "  DIF DOE\n  HOR {order}\n  HWL {}\n  HCT R", written(construction_nm));

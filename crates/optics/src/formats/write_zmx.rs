@@ -389,6 +389,7 @@ fn write_zmx_shape(text: &mut String, lens: &Lens, i: usize) -> Result<(), Optic
                 let _ = write!(behind, "  XDAT {place} {number:e} 0 0\r\n");
             }
         }
+        Some((PhaseProfile::Wavefront(_), ..)) => return Err(cannot("a .zmx file", i, "has a wavefront error")),
         Some(_) => {
             return Err(cannot(
                 "a .zmx file",

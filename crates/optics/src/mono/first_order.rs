@@ -23,8 +23,14 @@ impl MonoLens {
     /// the diameters of the pupils and the f-number are those of the real beam that gets through; the pupils stay where the
     /// images of the stop are.
     pub fn first_order(&self) -> FirstOrder {
-        let Some(beam) = self.limiting_beam() else { return self.first_order };
-        self.first_order.with_entrance_pupil_diameter_mm(2.0 * beam.height_mm)
+        match self.limiting_beam() {
+            Some(beam) => self.first_order.with_entrance_pupil_diameter_mm(2.0 * beam.height_mm),
+            // Of a pupil infinitely far no width says how much light of a far point gets through: its rays do.
+            None if self.first_order.f_number == 0.0 => {
+                FirstOrder { f_number: self.real_f_number().unwrap_or(f64::NAN), ..self.first_order }
+            }
+            None => self.first_order,
+        }
     }
 
     /// The same, with the diameters of the pupils and the f-number of a beam from the point on the axis at this distance before the first
@@ -68,9 +74,9 @@ impl MonoLens {
         }
     }
 
-    /// Whether a far point on the axis has an image and its light a width before the lens.
+    /// Whether the light of a far point on the axis that fills the stop has a width before the lens.
     fn has_far_pupil(&self) -> bool {
-        self.first_order.entrance_pupil_diameter_mm.is_finite() && self.first_order.power_per_mm != 0.0
+        self.first_order.entrance_pupil_diameter_mm.is_finite()
     }
 
     /// Returns a sentence on what limits the light of the point on the axis at this distance before the first vertex, mm (infinite
@@ -87,8 +93,15 @@ impl MonoLens {
         let (filled_mm, stop_mm) = (2.0 * beam.stop_radius_mm, 2.0 * self.stop_semi_aperture_mm());
         let (point, f_numbers) = match is_far {
             true => {
-                let (real, of_stop) = (self.first_order().f_number, self.first_order.f_number);
-                ("far away".to_owned(), format!(": f/{real:.3}, where the stop alone has f/{of_stop:.3}"))
+                let (real, of_stop) = (self.first_order(), self.first_order);
+                let limits = match real.power_per_mm == 0.0 {
+                    true => format!(
+                        ": a beam of {:.4} mm, where the stop alone has {:.4} mm",
+                        real.entrance_pupil_diameter_mm, of_stop.entrance_pupil_diameter_mm
+                    ),
+                    false => format!(": f/{:.3}, where the stop alone has f/{:.3}", real.f_number, of_stop.f_number),
+                };
+                ("far away".to_owned(), limits)
             }
             false => (format!("{object_distance_mm} mm before the lens"), String::new()),
         };

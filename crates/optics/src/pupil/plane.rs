@@ -43,6 +43,11 @@ impl PupilPlane {
         if is_in_front {
             return Self::across_axis(z_mm);
         }
+        Self::facing(point)
+    }
+
+    /// Returns the plane through the first vertex that faces a point.
+    pub fn facing(point: &ObjectPoint) -> Self {
         let rotation = DMat3::from_quat(DQuat::from_rotation_arc(DVec3::Z, point.direction_to(DVec3::ZERO)));
         Self { placement: Placement { vertex_mm: DVec3::ZERO, rotation }, is_across_axis: false }
     }
@@ -84,12 +89,12 @@ impl PupilPlane {
     }
 
     /// Returns the point of the lens frame of a place of the plane, mm.
-    pub(super) fn in_lens_mm(&self, place_mm: DVec2) -> DVec3 {
+    pub fn in_lens_mm(&self, place_mm: DVec2) -> DVec3 {
         self.placement.lens_from_surface(place_mm.extend(0.0))
     }
 
     /// Returns where the line through a point of the lens frame, mm, with this direction meets the plane, mm.
-    pub(super) fn meets_mm(&self, on_line_mm: DVec3, direction: DVec3) -> DVec2 {
+    pub fn meets_mm(&self, on_line_mm: DVec3, direction: DVec3) -> DVec2 {
         let (own_mm, along) =
             (self.placement.surface_from_lens(on_line_mm), self.placement.rotation.transpose() * direction);
         (own_mm - along * (own_mm.z / along.z)).truncate()

@@ -3,25 +3,78 @@
 use glam::{DVec2, DVec3};
 
 use super::{Kind, Step};
-use crate::{PhaseProfile, RayFate, rays::RaySlices};
+use crate::{RayFate, rays::RaySlices, wavefront_error::WavefrontMap};
 
-/// The phase of a surface in one order, as a path.
+/// What a surface adds to the paths of light of one wavelength in one order.
 #[derive(Clone, Debug)]
-pub(crate) struct Phase {
-    pub(crate) profile: PhaseProfile,
-    /// The order times the wavelength: the path that a cycle adds, mm.
-    pub(crate) path_per_cycle_mm: f64,
+pub(crate) enum Phase {
+    /// A path that grows evenly.
+    Grating {
+        /// Its slopes along x and y.
+        slope: DVec2,
+    },
+    /// A sum of even powers of the distance from the axis.
+    Rings {
+        /// One over the square of the radius that distances count in.
+        per_mm2: f64,
+        /// The coefficients of ρ², ρ⁴ and on, mm.
+        coefficients_mm: Vec<f64>,
+    },
+    /// A wavefront error, which is ahead where paths are shorter.
+    Wavefront(WavefrontMap),
 }
 
 impl Phase {
-    /// The paraxial power, 1/mm.
+    /// Returns the path that is added at a place, mm, and its slopes there.
+    fn at(&self, place_mm: DVec2) -> (f64, DVec2) {
+        match self {
+            Self::Grating { slope } => (slope.dot(place_mm), *slope),
+            Self::Rings { per_mm2, coefficients_mm } => {
+                let square = place_mm.length_squared() * per_mm2;
+                let (mut sum, mut derivative) = (0.0, 0.0);
+                for a in coefficients_mm.iter().rev() {
+                    sum = (sum + a) * square;
+                }
+                for (i, a) in coefficients_mm.iter().enumerate().rev() {
+                    derivative = derivative * square + (i + 1) as f64 * a;
+                }
+                (sum, place_mm * (2.0 * derivative * per_mm2))
+            }
+            Self::Wavefront(map) => {
+                let (ahead_mm, slope) = map.at(place_mm);
+                (-ahead_mm, -slope)
+            }
+        }
+    }
+
+    /// The coefficient of r² or r⁴ (`i` 1 or 2) of the path, 1/mm or 1/mm³.
+    fn of_power(&self, i: usize) -> f64 {
+        match self {
+            Self::Grating { .. } => 0.0,
+            Self::Rings { per_mm2, coefficients_mm } => {
+                coefficients_mm.get(i - 1).copied().unwrap_or(0.0) * per_mm2.powi(i as i32)
+            }
+            Self::Wavefront(map) => -map.of_power(i),
+        }
+    }
+
+    /// The paraxial power, 1/mm: what it takes from n u over the height.
     pub(crate) fn power(&self) -> f64 {
-        self.profile.power_of_path() * self.path_per_cycle_mm
+        -2.0 * self.of_power(1)
     }
 
     /// The coefficient of r⁴ of the path, 1/mm³.
     pub(crate) fn fourth_order_per_mm3(&self) -> f64 {
-        self.profile.fourth_order_per_mm4() * self.path_per_cycle_mm
+        self.of_power(2)
+    }
+
+    /// Whether the path depends on the distance from the axis alone.
+    fn is_rotational(&self) -> bool {
+        match self {
+            Self::Grating { slope } => *slope == DVec2::ZERO,
+            Self::Rings { .. } => true,
+            Self::Wavefront(map) => map.is_rotational(),
+        }
     }
 }
 
@@ -33,7 +86,7 @@ impl Step {
 
     /// Whether what it does to light is the same all around its axis.
     pub(crate) fn is_rotational(&self) -> bool {
-        let is_phase_round = self.phase.as_ref().is_none_or(|phase| phase.profile.is_rotational());
+        let is_phase_round = self.phase.as_ref().is_none_or(Phase::is_rotational);
         is_phase_round && !matches!(self.kind, Kind::Toric(_))
     }
 
@@ -70,14 +123,14 @@ impl Step {
     /// new direction, or `None` where the order does not propagate, and how much longer the path becomes.
     fn diffract(&self, phase: &Phase, place_mm: DVec2, direction: DVec3) -> (Option<DVec3>, f64) {
         let normal = self.normal_at(place_mm).normalize();
-        let per_mm = phase.profile.gradient_per_mm(place_mm) * phase.path_per_cycle_mm;
-        let optical = direction * self.index_before + per_mm.extend(0.0);
+        let (longer_mm, slope) = phase.at(place_mm);
+        let optical = direction * self.index_before + slope.extend(0.0);
         // What is along the surface stays, what is across it makes the length that of the index behind.
         let along = optical - normal * optical.dot(normal);
         let across2 = self.index_after * self.index_after - along.length_squared();
         let across = if self.is_mirror { -across2.sqrt() } else { across2.sqrt() };
         let after = (across2 >= 0.0).then(|| (along + normal * across) / self.index_after);
-        (after, phase.profile.cycles_at(place_mm) * phase.path_per_cycle_mm)
+        (after, longer_mm)
     }
 
     /// Turns the rays in flight that are on the surface, given in its own frame; those whose order does not propagate end there.

@@ -3,6 +3,7 @@
 
 mod first_order;
 mod lens;
+mod opticstudio;
 mod rays;
 mod reader;
 mod seidel;

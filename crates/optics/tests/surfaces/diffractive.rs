@@ -102,6 +102,7 @@ fn curved_surfaces_bend_by_their_tangential_phase() {
                     (8.0 * (at(h) - at(-h)) - (at(2.0 * h) - at(-2.0 * h))) / (12.0 * h)
                 };
                 let gradient_per_mm = match &profile {
+                    PhaseProfile::Wavefront(_) => unreachable!("diffraction/tests/wavefront_error.rs has them"),
                     PhaseProfile::Grating { lines_per_mm } => DVec2::from_array(*lines_per_mm),
                     PhaseProfile::Rings { .. } => {
                         let s = p.truncate().length_squared() / 25.0;

@@ -188,6 +188,14 @@ impl LensReadOptions {
         let is_maker = |path: &Path| built_in.iter().any(|maker| path.as_os_str().eq_ignore_ascii_case(maker));
         let (makers, files): (Vec<&PathBuf>, Vec<&PathBuf>) =
             self.glasses.iter().partition(|path| is_maker(path) && !path.exists());
+        if let Some(unknown) = files.iter().find(|path| path.extension().is_none() && !path.exists()) {
+            return Err(PipelineError::Value {
+                origin: "the glasses".to_owned(),
+                key: "catalog",
+                found: unknown.display().to_string(),
+                expected: format!("a catalogue (.agf, .yml) or a maker: {}", built_in.join(", ")),
+            });
+        }
         let catalogues = files.into_iter().map(|path| GlassCatalogue::read(path)).collect::<Result<_, _>>()?;
         let makers = makers.into_iter().map(|path| path.to_string_lossy().into_owned()).collect();
         let Self { missing_glass, seq_numbers, configuration, .. } = *self;

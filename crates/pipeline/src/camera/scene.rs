@@ -298,7 +298,7 @@ impl SceneSpec {
                 paint(&self.still_life(*columns, *rows), &bands_or_own(wanted)?)?
             }
             SceneSource::Target { pattern, columns, rows } => Target {
-                pattern: *pattern,
+                pattern: pattern.clone(),
                 rows: *rows,
                 columns: *columns,
                 light: TargetLight::Illuminant(light),
@@ -339,7 +339,8 @@ impl SceneSpec {
             depth_m: self.depth_m,
             horizontal_fov_deg: self.field_of_view_deg,
             fill_depth: self.fill_depth,
-            finest_tangent,
+            // Two files of the same samples are read as they are.
+            finest_tangent: finest_tangent.filter(|_| self.hidden.is_none()),
             white_level: self.white_level,
             reading: self.reading.clone(),
         };

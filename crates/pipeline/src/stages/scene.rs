@@ -33,6 +33,9 @@ pub struct SceneSummary {
     pub light: Option<SceneLight>,
     /// Centers of its bands, nm.
     pub wavelengths_nm: Vec<f64>,
+    /// The tangent between two samples, where it is a picture of samples.
+    #[serde(default)]
+    pub sample_tangent: Option<f64>,
     /// What was done to its samples to make it, a sentence each: depths filled, bands resampled.
     #[serde(default)]
     pub notes: Vec<String>,
@@ -50,6 +53,7 @@ impl SceneSummary {
             mean_luminance_cd_m2: scene.mean_luminance_cd_m2(),
             light: scene.light.clone(),
             wavelengths_nm: scene.radiance.grid().centers_nm().to_vec(),
+            sample_tangent: scene.view.map(|view| 1.0 / view.focal_px),
             notes: scene.notes.clone(),
         })
     }
@@ -113,6 +117,8 @@ pub(super) fn open(
     let fewer = |n: usize, binning: usize| (n / binning).max(1);
     let computed = match source {
         SceneSource::File(_) | SceneSource::World(_) => None,
+        // Fewer samples would make its squares and lines larger.
+        SceneSource::Target { pattern, .. } if pattern.counts_samples() => None,
         SceneSource::StillLife { columns, rows } => {
             let binning = quality.scene_binning(*columns);
             let (columns, rows) = (fewer(*columns, binning), fewer(*rows, binning));
@@ -121,7 +127,7 @@ pub(super) fn open(
         SceneSource::Target { pattern, columns, rows } => {
             let binning = quality.scene_binning(*columns);
             let (columns, rows) = (fewer(*columns, binning), fewer(*rows, binning));
-            Some((SceneSource::Target { pattern: *pattern, columns, rows }, binning))
+            Some((SceneSource::Target { pattern: pattern.clone(), columns, rows }, binning))
         }
     };
     match computed {

@@ -371,9 +371,12 @@ fn is_large_picture(scene: &SceneSpec) -> bool {
     is_flat
         && scene.hidden.is_none()
         && scene.reading.depth.is_none()
-        && ["png", "jpg", "jpeg", "tif", "tiff"].contains(&ending.as_str())
-        && dioptric_pictures::size_of(path)
-            .is_ok_and(|(columns, rows)| (columns as u64 * rows as u64).saturating_mul(4 * USUAL_BANDS) > LARGE_BYTES)
+        && match ending.as_str() {
+            "png" | "jpg" | "jpeg" | "tif" | "tiff" => dioptric_pictures::size_of(path).is_ok_and(|(columns, rows)| {
+                (columns as u64 * rows as u64).saturating_mul(4 * USUAL_BANDS) > LARGE_BYTES
+            }),
+            _ => dioptric_scene::envi_bytes(path).is_some_and(|bytes| bytes > LARGE_BYTES),
+        }
 }
 
 /// Whether a view of the still life is needed for the summary of the scene alone: rays from the film make the picture, which does not have

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use dioptric_pictures::DynamicImage;
+use dioptric_pictures::{DynamicImage, StatedColors};
 use dioptric_spectrum::{Quantity, SpectralImage, SpectrumError, WavelengthGrid};
 use ndarray::Array2;
 use rayon::prelude::*;
@@ -13,7 +13,7 @@ use super::{
     no_data::mend,
     raw_depth::RawDepth,
     read_options::ReadOptions,
-    reading::{FileQuantity, Frame, Place, light_unit},
+    reading::{FileQuantity, Frame, Panorama, Place, light_unit},
     unusable::unreadable,
 };
 use crate::{SceneError, SceneLight};
@@ -30,6 +30,8 @@ pub(super) struct Contents {
     pub(super) view: Option<CameraData>,
     /// The picture that other camera data speaks of; all of the image where `None`.
     pub(super) frame: Option<Frame>,
+    /// Whether the file says that its picture is one of all directions.
+    pub(super) panorama: Option<Panorama>,
     pub(super) hidden: Option<(SpectralImage, Array2<f32>)>,
     pub(super) light: Option<SceneLight>,
     pub(super) notes: Vec<String>,
@@ -46,8 +48,8 @@ pub(super) enum Image {
         /// The luminance of white, cd/m², where the file states it.
         white_cd_m2: Option<f64>,
     },
-    /// Codes of sRGB.
-    Codes(DynamicImage),
+    /// Codes of sRGB, or of the colors that the file states.
+    Codes(DynamicImage, Option<StatedColors>),
 }
 
 /// Which of the options that say what a file does not may be said of it.
@@ -73,7 +75,7 @@ impl Image {
                 Ok(())
             }
             // Only EXR files have frames.
-            Self::Codes(_) => Ok(()),
+            Self::Codes(..) => Ok(()),
         }
     }
 }
@@ -94,6 +96,7 @@ impl Contents {
             depth: None,
             view: None,
             frame: None,
+            panorama: None,
             hidden: None,
             light: None,
             notes: vec![],
@@ -107,15 +110,23 @@ impl Contents {
         let given = [
             ("a factor on its numbers (--scale)", reading.scale.is_some(), self.heeds == Heeds::Nothing),
             ("a unit (--unit)", reading.unit.is_some(), !matches!(self.heeds, Heeds::Unit | Heeds::Cube)),
-            ("a quantity (--quantity)", reading.quantity.is_some(), !matches!(self.heeds, Heeds::Unit | Heeds::Cube)),
+            ("a quantity (--quantity)", reading.quantity.is_some(), !self.heeds_quantity(reading.quantity)),
             ("a white level (--white-level)", options.white_level.is_some(), self.heeds != Heeds::Cube),
             ("wavelengths (--wavelengths-nm)", reading.wavelengths_nm.is_some(), self.heeds != Heeds::Cube),
-            ("a variable (--variable)", reading.variable.is_some(), !is_of(path, &["mat"])),
-            ("an order of axes (--axes)", reading.axes.is_some(), !is_of(path, &["npy", "mat"])),
+            ("a variable (--variable)", reading.variable.is_some(), !is_of(path, &["mat", "h5", "hdf5", "npz"])),
+            ("an order of axes (--axes)", reading.axes.is_some(), !is_of(path, &["npy", "npz", "mat", "h5", "hdf5"])),
         ];
         match given.into_iter().find(|(_, is_given, is_wrong)| *is_given && *is_wrong) {
             Some((what, ..)) => Err(SceneError::DoesNotApply { file: path.to_owned(), what, kind: self.what.clone() }),
             None => Ok(()),
+        }
+    }
+
+    /// Whether such a quantity may be said of the file: of a picture, that it is one of things that reflect light.
+    fn heeds_quantity(&self, quantity: Option<FileQuantity>) -> bool {
+        match self.image {
+            Image::Spectral(_) => matches!(self.heeds, Heeds::Unit | Heeds::Cube),
+            Image::Linear { .. } | Image::Codes(..) => quantity == Some(FileQuantity::Reflectance),
         }
     }
 
@@ -124,7 +135,7 @@ impl Contents {
         match &self.image {
             Image::Spectral(image) => (image.rows(), image.columns()),
             Image::Linear { planes, .. } => planes[0].dim(),
-            Image::Codes(picture) => (picture.height() as usize, picture.width() as usize),
+            Image::Codes(picture, _) => (picture.height() as usize, picture.width() as usize),
         }
     }
 }

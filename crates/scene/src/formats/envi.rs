@@ -2,31 +2,27 @@
 
 use std::{
     fs::{self, File},
-    io::{Read, Seek, SeekFrom},
-    ops::Range,
+    io::Read,
     path::{Path, PathBuf},
 };
 
 use dioptric_spectrum::{Quantity, SpectralImage, WavelengthGrid};
-use ndarray::Array2;
-use rayon::prelude::*;
 
 use super::{
     contents::{Contents, Image},
-    envi_header::{self, DataType, EnviHeader, Interleave},
+    envi_data::{EnviFile, Meaning, Wanted},
+    envi_header::{self, DataType},
     light_unit::LightUnit,
-    no_data::mend,
     read_options::ReadOptions,
-    reading::{FileQuantity, light_unit},
+    reading::{FileQuantity, NoData, light_unit},
+    reduced::reduced_size,
     stated::{name_of, note_of, short},
-    unusable::{check_made, unreadable},
+    unusable::unreadable,
 };
 use crate::{SceneError, resample::resampling_weights};
 
 /// A text header longer than this is none.
 const LIMIT_HEADER_BYTES: u64 = 64 << 20;
-/// Bytes of the file, and of its numbers as floats, that are in memory at a time; a line of the wanted bands is at least.
-const AT_ONCE_BYTES: usize = 8 << 20;
 /// Endings of the file of numbers beside `NAME.hdr`; none at all as well.
 const DATA_ENDINGS: [&str; 9] = ["", "raw", "img", "dat", "bsq", "bil", "bip", "bin", "cube"];
 
@@ -56,13 +52,29 @@ pub(super) fn contents_of_envi(path: &Path, options: &ReadOptions) -> Result<Con
     } else {
         resampling_weights(&own, &wanted)?
     };
-    let mut planes = file.planes(&order, &weights, &meaning)?;
     let choice = options.reading.no_data.unwrap_or_default();
-    notes.extend(mend(path, &wanted, &mut planes, choice)?.note(path, choice));
+    let own_size = (file.header.rows, file.header.columns);
+    // Rows that get the nearest of other rows need all of them.
+    let reduced = match choice {
+        NoData::Fill => None,
+        NoData::Black | NoData::Refuse => reduced_size(path, options, own_size, 4 * wanted.len() as u64),
+    };
+    notes.extend(reduced.as_ref().map(|reduced| reduced.note.clone()));
+    let size = reduced.map_or(own_size, |reduced| (reduced.rows, reduced.columns));
+    let asked = Wanted { order: &order, weights: &weights, grid: &wanted, size, choice };
+    let (planes, mended) = file.planes(&asked, &meaning)?;
+    notes.extend(mended.note(path, choice));
     let quantity = if matches!(meaning, Meaning::Light(..)) { Quantity::Radiance } else { Quantity::Reflectance };
     let image = SpectralImage::new(quantity, wanted, planes)
         .map_err(|reason| SceneError::Values { file: path.to_owned(), reason })?;
     Ok(Contents { notes, own_grid: Some(own), ..Contents::of(Image::Spectral(image), what) })
+}
+
+/// Returns the length of the numbers of an ENVI file, by its header or themselves; `None` where it is none.
+pub fn envi_bytes(path: &Path) -> Option<u64> {
+    let is_header = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("hdr"));
+    let header = if is_header { path.to_owned() } else { header_of(path)? };
+    Some(fs::metadata(data_file(&header, &mut vec![]).ok()?).ok()?.len())
 }
 
 /// Returns the header that belongs to a file: itself, or `a.raw.hdr` or `a.hdr` for `a.raw`.
@@ -74,25 +86,6 @@ pub(super) fn header_of(path: &Path) -> Option<PathBuf> {
     };
     let candidates = [appended(".hdr"), path.with_extension("hdr"), appended(".HDR"), path.with_extension("HDR")];
     candidates.into_iter().find(|header| header != path && header.is_file())
-}
-
-/// What makes light or reflectances of the numbers of each band.
-enum Meaning {
-    /// Light: a factor a band.
-    Light(Vec<f64>),
-    /// A reflectance: a factor.
-    Reflectance(f64),
-    /// A reflectance between cubes of a perfect white and of no light.
-    Between(Box<[EnviFile; 2]>),
-}
-
-/// A header, and where its numbers are.
-struct EnviFile {
-    header_path: PathBuf,
-    data_path: PathBuf,
-    header: EnviHeader,
-    wavelengths_nm: Vec<f64>,
-    notes: Vec<String>,
 }
 
 impl EnviFile {
@@ -293,181 +286,6 @@ impl EnviFile {
         found.sort();
         found.first().map(|path| Self::open(path, None, Some(&self.wavelengths_nm))).transpose()
     }
-
-    /// Reads the planes that are sums of bands (by their places in `order`, with weights).
-    fn planes(
-        &self,
-        order: &[usize],
-        weights: &[Vec<(usize, f64)>],
-        meaning: &Meaning,
-    ) -> Result<Vec<Array2<f32>>, SceneError> {
-        let (rows, columns) = (self.header.rows, self.header.columns);
-        // What is wanted of it, and a few lines at a time.
-        let bytes = [rows, columns, weights.len(), 4].iter().fold(1_u64, |n, &side| n.saturating_mul(side as u64));
-        check_made(&self.data_path, bytes.saturating_add(2 * AT_ONCE_BYTES as u64))?;
-        let mut needed: Vec<usize> = weights.iter().flatten().map(|(place, _)| order[*place]).collect();
-        needed.sort_unstable();
-        needed.dedup();
-        let references = match meaning {
-            Meaning::Between(pair) => Some([pair[0].lines(&needed, rows)?, pair[1].lines(&needed, rows)?]),
-            _ => None,
-        };
-        let mut planes: Vec<Array2<f32>> = weights.iter().map(|_| Array2::zeros((rows, columns))).collect();
-        let mut file = File::open(&self.data_path).map_err(|error| unreadable(&self.data_path, error))?;
-        for lines in self.chunks(needed.len()) {
-            let mut raw = self.read(&mut file, &needed, lines.clone())?;
-            raw.par_iter_mut().zip(&needed).enumerate().for_each(|(index, (samples, &band))| match meaning {
-                Meaning::Light(factors) => self.convert(samples, band, factors[band]),
-                Meaning::Reflectance(factor) => self.convert(samples, band, *factor),
-                Meaning::Between(_) => {
-                    self.convert(samples, band, 1.0);
-                    let Some([white, dark]) = &references else { return };
-                    for (at, sample) in samples.iter_mut().enumerate() {
-                        let (row, column) = (lines.start + at / columns, at % columns);
-                        let of = |lines: &[Array2<f32>]| lines[index][(row % lines[index].nrows(), column)];
-                        let (white, dark) = (of(white), of(dark));
-                        *sample = if white > dark { (*sample - dark) / (white - dark) } else { f32::NAN };
-                    }
-                }
-            });
-            let place = |band: usize| needed.binary_search(&band).expect("it was asked for");
-            planes.par_iter_mut().zip(weights).for_each(|(plane, weights)| {
-                let mut part = plane.slice_mut(ndarray::s![lines.clone(), ..]);
-                let part = part.as_slice_mut().expect("whole rows of a new plane follow each other");
-                if let [(only, 1.0)] = weights[..] {
-                    part.copy_from_slice(&raw[place(order[only])]);
-                    return;
-                }
-                let bands: Vec<(&[f32], f64)> =
-                    weights.iter().map(|&(at, weight)| (raw[place(order[at])].as_slice(), weight)).collect();
-                for (at, sample) in part.iter_mut().enumerate() {
-                    *sample = bands.iter().map(|(samples, weight)| weight * f64::from(samples[at])).sum::<f64>() as f32;
-                }
-            });
-        }
-        Ok(planes)
-    }
-
-    /// Returns a reference's lines: as many as the cube has, or else their mean.
-    fn lines(&self, bands: &[usize], cube_rows: usize) -> Result<Vec<Array2<f32>>, SceneError> {
-        let (rows, columns) = (self.header.rows, self.header.columns);
-        let is_whole = rows == cube_rows;
-        let mut sums = vec![Array2::<f64>::zeros((if is_whole { rows } else { 1 }, columns)); bands.len()];
-        let mut file = File::open(&self.data_path).map_err(|error| unreadable(&self.data_path, error))?;
-        for lines in self.chunks(bands.len()) {
-            let mut raw = self.read(&mut file, bands, lines.clone())?;
-            for ((samples, &band), sum) in raw.iter_mut().zip(bands).zip(&mut sums) {
-                self.convert(samples, band, 1.0);
-                for (at, sample) in samples.iter().enumerate() {
-                    let row = if is_whole { lines.start + at / columns } else { 0 };
-                    sum[(row, at % columns)] += f64::from(*sample);
-                }
-            }
-        }
-        let share = if is_whole { 1.0 } else { 1.0 / rows as f64 };
-        Ok(sums.into_iter().map(|sum| sum.mapv(|v| (v * share) as f32)).collect())
-    }
-
-    /// Makes what the header says of numbers as they are stored, and a factor more; those to be ignored become no numbers.
-    fn convert(&self, samples: &mut [f32], band: usize, factor: f64) {
-        let of = |list: &Option<Vec<f64>>, usual: f64| list.as_ref().map_or(usual, |list| list[band]);
-        let (gain, offset) = (of(&self.header.gains, 1.0), of(&self.header.offsets, 0.0));
-        let ignored = self.header.ignored.map(|v| v as f32);
-        for sample in samples {
-            let is_ignored = ignored.is_some_and(|ignored| *sample == ignored);
-            *sample = if is_ignored { f32::NAN } else { ((f64::from(*sample) * gain + offset) * factor) as f32 };
-        }
-    }
-
-    /// Returns ranges of lines that fit into memory.
-    fn chunks(&self, n_bands: usize) -> impl Iterator<Item = Range<usize>> + use<> {
-        let line = self.header.columns
-            * (4 * n_bands).max(match self.header.interleave {
-                Interleave::Bsq => 1,
-                Interleave::Bil | Interleave::Bip => self.header.bands * self.header.data_type.bytes(),
-            });
-        let (rows, step) = (self.header.rows, (AT_ONCE_BYTES / line).max(1));
-        (0..rows).step_by(step).map(move |first| first..(first + step).min(rows))
-    }
-
-    /// Bytes of a frame with what is skipped before and after it.
-    fn frame_bytes(&self) -> u64 {
-        let (rows, columns, bands) = (self.header.rows as u64, self.header.columns as u64, self.header.bands as u64);
-        let samples = match self.header.interleave {
-            Interleave::Bsq => rows.saturating_mul(columns),
-            Interleave::Bil | Interleave::Bip => columns.saturating_mul(bands),
-        };
-        let [before, after] = self.header.frame_offsets;
-        samples.saturating_mul(self.header.data_type.bytes() as u64).saturating_add(before).saturating_add(after)
-    }
-
-    fn n_frames(&self) -> u64 {
-        match self.header.interleave {
-            Interleave::Bsq => self.header.bands as u64,
-            Interleave::Bil | Interleave::Bip => self.header.rows as u64,
-        }
-    }
-
-    /// Reads lines of bands as they are stored.
-    fn read(&self, file: &mut File, bands: &[usize], lines: Range<usize>) -> Result<Vec<Vec<f32>>, SceneError> {
-        let (size, columns) = (self.header.data_type.bytes(), self.header.columns);
-        let start =
-            |frame: usize| self.header.offset + frame as u64 * self.frame_bytes() + self.header.frame_offsets[0];
-        let mut bytes_at = |from: u64, n: usize| -> Result<Vec<u8>, SceneError> {
-            let mut bytes = vec![0; n];
-            file.seek(SeekFrom::Start(from))
-                .and_then(|_| file.read_exact(&mut bytes))
-                .map_err(|error| unreadable(&self.data_path, error))?;
-            Ok(bytes)
-        };
-        let floats = |bytes: &[u8]| -> Vec<f32> {
-            numbers(bytes, (0, size), bytes.len() / size, self.header.data_type, self.header.is_big_endian)
-        };
-        let line_bytes = columns * size;
-        match self.header.interleave {
-            Interleave::Bsq => {
-                let of_band = |&band: &usize| {
-                    Ok(floats(&bytes_at(start(band) + (lines.start * line_bytes) as u64, lines.len() * line_bytes)?))
-                };
-                bands.iter().map(of_band).collect()
-            }
-            Interleave::Bil => {
-                let mut result = vec![Vec::with_capacity(lines.len() * columns); bands.len()];
-                for line in lines {
-                    // Most bands are read in one go, few each by itself.
-                    let whole = match 4 * bands.len() >= self.header.bands {
-                        true => Some(bytes_at(start(line), self.header.bands * line_bytes)?),
-                        false => None,
-                    };
-                    for (samples, &band) in result.iter_mut().zip(bands) {
-                        match &whole {
-                            Some(bytes) => samples.extend(floats(&bytes[band * line_bytes..(band + 1) * line_bytes])),
-                            None => {
-                                samples.extend(floats(&bytes_at(start(line) + (band * line_bytes) as u64, line_bytes)?))
-                            }
-                        }
-                    }
-                }
-                Ok(result)
-            }
-            Interleave::Bip => {
-                let stride = self.header.bands * size;
-                let n = lines.len() * columns;
-                let [before, after] = self.header.frame_offsets;
-                let mut bytes = Vec::new();
-                if before + after == 0 {
-                    bytes = bytes_at(start(lines.start), n * stride)?;
-                } else {
-                    for line in lines {
-                        bytes.extend(bytes_at(start(line), columns * stride)?);
-                    }
-                }
-                let (kind, is_big) = (self.header.data_type, self.header.is_big_endian);
-                let of_band = |&band: &usize| numbers(&bytes, (band * size, stride), n, kind, is_big);
-                Ok(bands.par_iter().map(of_band).collect())
-            }
-        }
-    }
 }
 
 /// Returns the file of numbers: `a.raw` and the like beside `a.hdr`, or `a.raw` beside `a.raw.hdr`.
@@ -484,43 +302,11 @@ fn data_file(header_path: &Path, notes: &mut Vec<String>) -> Result<PathBuf, Sce
     Ok(first)
 }
 
-/// Returns `n` numbers, the first at a place of the bytes and each so many bytes behind the one before.
-fn numbers(bytes: &[u8], (first, stride): (usize, usize), n: usize, kind: DataType, is_big_endian: bool) -> Vec<f32> {
-    /// One loop a type and order, so that it holds no other choice.
-    fn all<const N: usize>(bytes: &[u8], at: (usize, usize), n: usize, of: impl Fn([u8; N]) -> f32) -> Vec<f32> {
-        let number = |i: usize| {
-            let from = at.0 + i * at.1;
-            of(bytes[from..from + N].try_into().expect("a slice of N bytes"))
-        };
-        (0..n).map(number).collect()
-    }
-    let at = (first, stride);
-    macro_rules! of {
-        ($type:ty, $to:expr) => {
-            if is_big_endian {
-                all(bytes, at, n, |b| $to(<$type>::from_be_bytes(b)))
-            } else {
-                all(bytes, at, n, |b| $to(<$type>::from_le_bytes(b)))
-            }
-        };
-    }
-    match kind {
-        DataType::U8 => of!(u8, f32::from),
-        DataType::I16 => of!(i16, f32::from),
-        DataType::U16 => of!(u16, f32::from),
-        DataType::I32 => of!(i32, |v| v as f32),
-        DataType::U32 => of!(u32, |v| v as f32),
-        DataType::F32 => of!(f32, |v| v),
-        DataType::F64 => of!(f64, |v| v as f32),
-        DataType::I64 => of!(i64, |v| v as f32),
-        DataType::U64 => of!(u64, |v| v as f32),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::{FileReading, ReadOptions};
+    use ndarray::Array2;
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
@@ -784,5 +570,36 @@ mod tests {
         let at = |nm: f64| image.spectrum_at(row, column)[image.grid().nearest(nm)];
         // A yellow kernel: blue is absorbed, red is not.
         assert!(at(450.0) < 0.5 * at(600.0) && at(600.0) > 0.2 && at(600.0) < 1.2);
+    }
+
+    /// Samples that are far finer than those of the film are read as their means, the same as those of the whole cube.
+    #[test]
+    fn fine_cubes_are_read_as_means() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("fine.hdr");
+        let (rows, columns) = (41, 62);
+        let head = format!(
+            "ENVI\nsamples = {columns}\nlines = {rows}\nbands = 2\ndata type = 12\ninterleave = bil\nbyte order = 0\n\
+             reflectance scale factor = 4000\ndata ignore value = 0\nwavelength = {{500, 600}}\n"
+        );
+        std::fs::write(&path, head).unwrap();
+        let number = |row: usize, band: usize, column: usize| (1000 * band + 20 * row + column) as u16;
+        let lines = (0..rows).flat_map(|row| (0..2).map(move |band| (row, band)));
+        let numbers = lines.flat_map(|(row, band)| (0..columns).map(move |column| number(row, band, column)));
+        std::fs::write(path.with_extension("raw"), numbers.flat_map(u16::to_le_bytes).collect::<Vec<u8>>()).unwrap();
+        let whole = ReadOptions { horizontal_fov_deg: Some(20.0), ..ReadOptions::default() };
+        let own = 2.0 * 10.0_f64.to_radians().tan() / columns as f64;
+        let fine = ReadOptions { finest_tangent: Some(4.1 * own), ..whole.clone() };
+        let ((all, _), (means, notes)) = (read_with(&path, &whole).unwrap(), read_with(&path, &fine).unwrap());
+        assert_eq!((means.rows(), means.columns()), (10, 15));
+        assert!(notes.iter().any(|note| note.contains("62 × 41 samples are read as 15 × 10 means")), "{notes:?}");
+        for (mean, all) in means.planes().iter().zip(all.planes()) {
+            for ((row, column), found) in mean.indexed_iter() {
+                let within =
+                    |block: usize, n: usize, own: usize| (block * own).div_ceil(n)..((block + 1) * own).div_ceil(n);
+                let block = all.slice(ndarray::s![within(row, 10, rows), within(column, 15, columns)]);
+                assert!((found - block.mean().unwrap()).abs() < 1e-6);
+            }
+        }
     }
 }

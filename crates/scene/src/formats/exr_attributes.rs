@@ -1,6 +1,9 @@
 //! The header attributes of our EXR files: units, sample pitch, camera data.
 
-use exr::prelude::{AttributeValue, LayerAttributes, Text};
+use exr::{
+    meta::attribute::EnvironmentMap,
+    prelude::{AttributeValue, LayerAttributes, Text},
+};
 
 use super::{light_unit::LightUnit, stated::Stated};
 use crate::{SceneError, SceneLight, View};
@@ -29,8 +32,8 @@ pub(crate) struct Attributes {
     pub(super) light: Result<Option<SceneLight>, String>,
     /// The luminance of red, green and blue of 1, cd/m².
     pub(super) white_cd_m2: Option<f64>,
-    /// Whether the picture is one of all directions.
-    pub(super) is_environment: bool,
+    /// Of what kind the picture is, where it is one of all directions.
+    pub(super) environment: Option<EnvironmentMap>,
     /// What else there is.
     pub(super) others: Stated<()>,
 }
@@ -133,7 +136,7 @@ pub(crate) fn from_layer(layer: &LayerAttributes) -> Attributes {
     Attributes {
         light,
         white_cd_m2: layer.white_luminance.map(f64::from),
-        is_environment: layer.environment_map.is_some(),
+        environment: layer.environment_map,
         others: Stated::new("attribute", others.into_iter().map(|name| (name, ())).collect()),
         unit,
         pitch_um: number(PITCH).filter(|pitch| pitch.is_finite() && *pitch > 0.0),

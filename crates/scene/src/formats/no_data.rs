@@ -17,6 +17,22 @@ pub(super) struct Mended {
 }
 
 impl Mended {
+    /// Adds what was mended of another part.
+    pub(super) fn add(&mut self, other: Self) {
+        self.n_missing += other.n_missing;
+        self.n_negative += other.n_negative;
+        self.n_samples += other.n_samples;
+    }
+
+    /// Checks that some sample has a number.
+    pub(super) fn checked(self, file: &Path) -> Result<Self, SceneError> {
+        if self.n_missing == self.n_samples {
+            let reason = "none of its samples has a number".to_owned();
+            return Err(SceneError::Unreadable { file: file.to_owned(), reason });
+        }
+        Ok(self)
+    }
+
     /// Returns what was done, in a sentence; `None` where nothing was.
     pub(super) fn note(self, file: &Path, choice: NoData) -> Option<String> {
         let mut parts = vec![];
@@ -45,6 +61,17 @@ pub(super) fn mend(
     planes: &mut [Array2<f32>],
     choice: NoData,
 ) -> Result<Mended, SceneError> {
+    mend_rows(file, grid, planes, choice, 0)?.checked(file)
+}
+
+/// As [`mend`] for some of the rows, the first of which is so far down.
+pub(super) fn mend_rows(
+    file: &Path,
+    grid: &WavelengthGrid,
+    planes: &mut [Array2<f32>],
+    choice: NoData,
+    first_row: usize,
+) -> Result<Mended, SceneError> {
     let mut mended = Mended::default();
     for (plane, &wavelength_nm) in planes.iter_mut().zip(grid.centers_nm()) {
         mended.n_samples += plane.len();
@@ -55,7 +82,7 @@ pub(super) fn mend(
         if choice == NoData::Refuse
             && let Some(((row, column), &value)) = plane.indexed_iter().find(|(_, value)| !is_light(**value))
         {
-            let reason = SpectrumError::Sample { wavelength_nm, row, column, value };
+            let reason = SpectrumError::Sample { wavelength_nm, row: first_row + row, column, value };
             return Err(SceneError::Values { file: file.to_owned(), reason });
         }
         let negative = plane.iter_mut().filter(|value| value.is_finite() && **value < 0.0);
@@ -66,10 +93,6 @@ pub(super) fn mend(
             fill(plane);
         }
         plane.mapv_inplace(|value| if value.is_finite() { value } else { 0.0 });
-    }
-    if mended.n_missing == mended.n_samples {
-        let reason = "none of its samples has a number".to_owned();
-        return Err(SceneError::Unreadable { file: file.to_owned(), reason });
     }
     Ok(mended)
 }

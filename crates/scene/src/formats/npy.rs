@@ -35,7 +35,8 @@ pub(super) fn read_npy(path: &Path) -> Result<NpyArray, SceneError> {
     parse(&bytes).map_err(|reason| unreadable(path, reason))
 }
 
-fn parse(bytes: &[u8]) -> Result<NpyArray, String> {
+/// Reads the array of these bytes.
+pub(super) fn parse(bytes: &[u8]) -> Result<NpyArray, String> {
     let truncated = || "the file ends too early (truncated)".to_owned();
     if !bytes.starts_with(MAGIC) {
         return Err("it is no array of NumPy".to_owned());

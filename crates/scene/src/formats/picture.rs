@@ -1,14 +1,15 @@
-//! Ordinary sRGB pictures, lifted to spectra through a display's primaries.
+//! Ordinary pictures, lifted to spectra through a display's primaries.
 
 use std::path::Path;
 
-use dioptric_pictures::{Curve, DynamicImage, ImageError, read_reduced, size_of};
+use dioptric_pictures::{Curve, DynamicImage, ImageError, StatedColors, read_reduced, size_of};
 use dioptric_spectrum::{Display, Quantity, SpectralImage, WavelengthGrid, srgb_decode, srgb_encode};
 use image::{ImageDecoder, metadata::Orientation};
 use ndarray::Array2;
 use rayon::prelude::*;
 
 use super::{
+    primaries::into_srgb,
     stated::{name_of, note_of},
     unusable::{check_made, unreadable},
 };
@@ -19,16 +20,18 @@ const AT_ONCE: usize = 1 << 13;
 
 /// What a pixel takes as codes of 16 bits while it is lifted to bands, bytes.
 const CODES_BYTES: u64 = 6;
+/// A color is beyond the display's gamut where it has less of a primary than this share of white below 0.
+const BEYOND: f64 = 0.01;
 /// What a pixel takes as planes of single floats beside its codes, bytes.
 const SAMPLES_BYTES: u64 = 15;
 
 /// Reads a PNG, JPEG or TIFF picture of 8 or 16 bits as the radiance of a display that shows it.
 ///
-/// The picture's white has the luminance `white_cd_m2`. A color beyond the display's gamut is clipped at 0 in the
-/// bands where it would need negative light.
+/// The picture's white has the luminance `white_cd_m2`. Codes are those of the colors that the file states, of sRGB where it says nothing. A color
+/// beyond the display's gamut is clipped at 0 in the bands where it would need negative light.
 ///
 /// # Errors
-/// When the file is no such picture, or too large.
+/// When the file is no such picture, too large, or of colors that cannot be converted.
 pub fn read_picture(
     path: &Path,
     display: &Display,
@@ -42,21 +45,42 @@ pub fn read_picture(
             expected: "a finite number above 0".to_owned(),
         });
     }
-    lifted_codes(path, oriented(path, None)?.0, &display.srgb_basis(grid, white_cd_m2), grid)
+    let Oriented { picture, colors, .. } = oriented(path, None)?;
+    Ok(lifted_codes(path, picture, colors.as_ref(), &display.srgb_basis(grid, white_cd_m2), grid)?.0)
 }
 
-/// Returns the light of a picture of sRGB codes: sums of the spectra of red, green and blue. What would need negative light is 0.
+/// Returns the light of a picture of codes: sums of the spectra of red, green and blue of sRGB, `basis`. What would need negative light is 0; the share
+/// of pixels of which a channel is below 0 by more than a hundredth of white comes with it.
 pub(super) fn lifted_codes(
     path: &Path,
     picture: DynamicImage,
+    colors: Option<&StatedColors>,
     basis: &[Vec<f64>; 3],
     grid: &WavelengthGrid,
-) -> Result<SpectralImage, SceneError> {
+) -> Result<(SpectralImage, f64), SceneError> {
     let n = u64::from(picture.width()) * u64::from(picture.height());
     check_made(path, (4 * grid.len() as u64 + CODES_BYTES).saturating_mul(n))?;
     let picture = picture.into_rgb16();
     let (columns, rows) = (picture.width() as usize, picture.height() as usize);
-    let linear: Vec<f64> = (0..=u16::MAX).map(|code| srgb_decode(f64::from(code) / 65535.0)).collect();
+    let linear = [0, 1, 2].map(|channel| -> Vec<f64> {
+        let light = |code| colors.map_or_else(|| srgb_light(code), |colors| colors.light(channel, code));
+        (0..=u16::MAX).map(light).collect()
+    });
+    // The light of the file's own red, green and blue.
+    let own_basis = colors.map(|colors| {
+        [0, 1, 2].map(|own| -> Vec<f64> {
+            let at = |band: usize| (0..3).map(|k| colors.to_srgb[k][own] * basis[k][band]).sum();
+            (0..grid.len()).map(at).collect()
+        })
+    });
+    let beyond_share = colors.map_or(0.0, |colors| {
+        let is_beyond = |codes: &&[u16]| {
+            let light = [0, 1, 2].map(|k| linear[k][usize::from(codes[k])]);
+            colors.to_srgb.iter().any(|row| row.iter().zip(light).map(|(m, v)| m * v).sum::<f64>() < -BEYOND)
+        };
+        picture.as_raw().par_chunks_exact(3).filter(is_beyond).count() as f64 / n.max(1) as f64
+    });
+    let basis = own_basis.as_ref().unwrap_or(basis);
     let mut planes: Vec<Array2<f32>> = (0..grid.len()).map(|_| Array2::zeros((rows, columns))).collect();
     // A part of the picture in all bands before the next, while its colors are at hand.
     let mut parts: Vec<Vec<&mut [f32]>> = (0..(rows * columns).div_ceil(AT_ONCE)).map(|_| vec![]).collect();
@@ -66,13 +90,35 @@ pub(super) fn lifted_codes(
     }
     parts.into_par_iter().zip(picture.as_raw().par_chunks(3 * AT_ONCE)).for_each(|(bands, codes)| {
         let colors = [0, 1, 2].map(|color| -> Vec<f64> {
-            codes.iter().skip(color).step_by(3).map(|&code| linear[usize::from(code)]).collect()
+            codes.iter().skip(color).step_by(3).map(|&code| linear[color][usize::from(code)]).collect()
         });
         for (band, samples) in bands.into_iter().enumerate() {
             lift(&colors, [0, 1, 2].map(|color| basis[color][band]), samples);
         }
     });
-    Ok(SpectralImage::new(Quantity::Radiance, grid.clone(), planes)?)
+    Ok((SpectralImage::new(Quantity::Radiance, grid.clone(), planes)?, beyond_share))
+}
+
+/// Returns linear sRGB of a picture of codes; what lies beyond sRGB is below 0 or above 1.
+pub(super) fn linear_srgb(picture: DynamicImage, colors: Option<&StatedColors>) -> [Array2<f32>; 3] {
+    let picture = picture.into_rgb16();
+    let size = (picture.height() as usize, picture.width() as usize);
+    let plane = |channel: usize| {
+        let light = |code| colors.map_or_else(|| srgb_light(code), |colors| colors.light(channel, code)) as f32;
+        let table: Vec<f32> = (0..=u16::MAX).map(light).collect();
+        let codes = picture.as_raw().iter().skip(channel).step_by(3);
+        let samples = codes.map(|&code| table[usize::from(code)]).collect();
+        Array2::from_shape_vec(size, samples).expect("a sample a pixel")
+    };
+    let mut planes = [plane(0), plane(1), plane(2)];
+    if let Some(colors) = colors {
+        into_srgb(&mut planes, &colors.to_srgb);
+    }
+    planes
+}
+
+fn srgb_light(code: u16) -> f64 {
+    srgb_decode(f64::from(code) / 65535.0)
 }
 
 /// Puts the radiance of colors in a band into `samples`.
@@ -106,27 +152,44 @@ pub(super) fn picture_size_of(path: &Path) -> Result<(usize, usize), SceneError>
     size_of(path).map_err(|error| undecodable(path, &error))
 }
 
-/// Reads a picture upright, as its orientation says, with notes of what else it states of its colors; of means over blocks where it has
-/// more pixels than `size`, columns and rows.
+/// A picture as the photographer sees it.
+pub(super) struct Oriented {
+    pub(super) picture: DynamicImage,
+    /// What its codes are, where they are not those of sRGB.
+    pub(super) colors: Option<StatedColors>,
+    /// What else it states, a sentence each.
+    pub(super) notes: Vec<String>,
+}
+
+/// Reads a picture upright, as its orientation says, with the colors that it states; of means over blocks where it has more pixels than `size`,
+/// columns and rows.
 ///
 /// # Errors
-/// As [`decode`].
-pub(super) fn oriented(path: &Path, size: Option<(usize, usize)>) -> Result<(DynamicImage, Vec<String>), SceneError> {
+/// As [`decode`], and when its colors cannot be converted.
+pub(super) fn oriented(path: &Path, size: Option<(usize, usize)>) -> Result<Oriented, SceneError> {
+    let colors = stated_colors(path)?;
     let mut picture = match size {
         Some(size) => {
+            let own = colors.as_ref();
             let curve = Curve {
-                to_light: &|code| srgb_decode(f64::from(code) / 65535.0),
-                to_code: &|light| (65535.0 * srgb_encode(light)).round() as u16,
+                to_light: &|code| own.map_or_else(|| srgb_light(code), |own| own.light(1, code)),
+                to_code: &|light| {
+                    own.map_or_else(|| (65535.0 * srgb_encode(light)).round() as u16, |own| own.code(light))
+                },
             };
             read_reduced(path, size, &curve).map_err(|error| undecodable(path, &error))?
         }
         None => decode(path, CODES_BYTES)?,
     };
-    let (orientation, mut notes) = stated_beside(path);
+    let mut notes = vec![];
+    let orientation = orientation_of(path);
     if orientation != Orientation::NoTransforms {
         picture.apply_orientation(orientation);
-        notes.insert(0, format!("{}: it is turned upright, as its orientation says", name_of(path)));
+        notes.push(format!("{}: it is turned upright, as its orientation says", name_of(path)));
     }
+    notes.extend(colors.as_ref().map(|colors| {
+        format!("{}: its codes are converted to light by what it states, {}", name_of(path), colors.name)
+    }));
     if picture.color().has_alpha() {
         let opaque = match &picture {
             DynamicImage::ImageLumaA8(p) => p.pixels().all(|p| p.0[1] == u8::MAX),
@@ -139,42 +202,48 @@ pub(super) fn oriented(path: &Path, size: Option<(usize, usize)>) -> Result<(Dyn
             notes.extend(note_of(path, "channel", &["opacity".to_owned()]));
         }
     }
-    Ok((picture, notes))
+    Ok(Oriented { picture, colors, notes })
 }
 
-/// Returns the orientation that a picture states, and notes of its color space.
-fn stated_beside(path: &Path) -> (Orientation, Vec<String>) {
+/// Returns the note on colors that a display cannot show, a share of all pixels.
+pub(super) fn note_beyond(path: &Path, share: f64) -> Option<String> {
+    (share > 0.0).then(|| {
+        format!(
+            "{}: {:.2} % of its pixels have colors beyond the display's gamut, which are held at its edge",
+            name_of(path),
+            100.0 * share
+        )
+    })
+}
+
+/// Returns the colors that a picture states; `None` for sRGB.
+fn stated_colors(path: &Path) -> Result<Option<StatedColors>, SceneError> {
+    StatedColors::of(path).map_err(|reason| unreadable(path, reason))
+}
+
+/// Returns the orientation that a picture states.
+fn orientation_of(path: &Path) -> Orientation {
     let reader = image::ImageReader::open(path).ok().and_then(|reader| reader.with_guessed_format().ok());
-    let Some(mut decoder) = reader.and_then(|reader| reader.into_decoder().ok()) else {
-        return (Orientation::NoTransforms, vec![]);
-    };
-    // The name of the usual profile stands in its text, of one byte a letter or of two.
-    let profile = decoder.icc_profile().ok().flatten();
-    let says_srgb = |profile: &Vec<u8>| {
-        [&b"sRGB"[..], b"s\0R\0G\0B"].iter().any(|name| profile.windows(name.len()).any(|at| at == *name))
-    };
-    let mut notes = vec![];
-    if profile.is_some_and(|profile| !profile.is_empty() && !says_srgb(&profile)) {
-        let own = ["ICC profile".to_owned()];
-        notes.extend(note_of(path, "color space", &own).map(|note| note + ": its codes are taken as sRGB"));
-    }
-    (decoder.orientation().unwrap_or(Orientation::NoTransforms), notes)
+    let decoder = reader.and_then(|reader| reader.into_decoder().ok());
+    decoder.and_then(|mut decoder| decoder.orientation().ok()).unwrap_or(Orientation::NoTransforms)
 }
 
 /// Returns what of a picture's statements [`read_picture_samples`] does not use, a sentence each.
 pub fn notes_on_samples(path: &Path) -> Vec<String> {
-    let (orientation, mut notes) = stated_beside(path);
-    if orientation != Orientation::NoTransforms {
-        notes.push(format!("{}: its pixels are counted as stored, not turned as its orientation says", name_of(path)));
-    }
-    notes
+    let is_turned = orientation_of(path) != Orientation::NoTransforms;
+    let note = || format!("{}: its pixels are counted as stored, not turned as its orientation says", name_of(path));
+    is_turned.then(note).into_iter().collect()
 }
 
 /// Returns what a picture's samples are, in words.
-pub(super) fn kind_of(picture: &DynamicImage) -> String {
+pub(super) fn kind_of(picture: &DynamicImage, colors: Option<&StatedColors>) -> String {
     let color = picture.color();
     let bits = 8 * u16::from(color.bytes_per_pixel()) / u16::from(color.channel_count());
-    let what = if color.has_color() { "sRGB" } else { "gray" };
+    let what = match (color.has_color(), colors) {
+        (false, _) => "gray",
+        (true, None) => "sRGB",
+        (true, Some(_)) => "RGB",
+    };
     format!("{what} of {bits} bits")
 }
 
@@ -185,6 +254,9 @@ pub struct PictureSamples {
     pub planes: Vec<(String, Array2<f32>)>,
     /// The highest code of a file of whole numbers, 255 or 65 535; `None` for floating-point samples.
     pub top: Option<u16>,
+    /// What the samples of red, green and blue, or of gray, are, where they are not those of sRGB, or of floats in its primaries; the reason where they
+    /// cannot be converted to light.
+    pub colors: Result<Option<StatedColors>, String>,
 }
 
 /// Reads the samples of a PNG, JPEG, TIFF or EXR file, neither scaled nor decoded; opacity is left out.
@@ -193,8 +265,11 @@ pub struct PictureSamples {
 /// When the file is no such picture, or too large.
 pub fn read_picture_samples(path: &Path) -> Result<PictureSamples, SceneError> {
     if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr")) {
-        return Ok(PictureSamples { planes: super::spectral_exr::read_planes_exr(path)?, top: None });
+        let (planes, to_srgb) = super::spectral_exr::read_planes_and_primaries_exr(path)?;
+        let colors = to_srgb.map(|matrix| StatedColors::linear("chromaticities of its header".to_owned(), matrix));
+        return Ok(PictureSamples { planes, top: None, colors: Ok(colors) });
     }
+    let colors = StatedColors::of(path);
     let picture = decode(path, SAMPLES_BYTES)?;
     let (columns, rows) = (picture.width() as usize, picture.height() as usize);
     let parted = |samples: Vec<f32>, names: &[&str]| {
@@ -223,7 +298,7 @@ pub fn read_picture_samples(path: &Path) -> Result<PictureSamples, SceneError> {
         }
         other => (parted(other.into_rgb32f().into_raw(), &RGB), None),
     };
-    Ok(PictureSamples { planes, top })
+    Ok(PictureSamples { planes, top, colors })
 }
 
 /// Decodes a picture of any kind that is recognized by the file's content, of which `beside_bytes` are made for each pixel.

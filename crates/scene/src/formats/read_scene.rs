@@ -6,25 +6,29 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use dioptric_spectrum::{
-    DepthMap, Display, Illuminant, Quantity, SpectralImage, Spectrum, SpectrumError, WavelengthGrid,
-};
+use dioptric_spectrum::{DepthMap, Quantity, SpectralImage, SpectrumError, WavelengthGrid};
 use ndarray::Array2;
 
 use super::{
     band_folder::band_folder,
     camera::CameraData,
+    chart_table::read_chart,
     contents::{Contents, Cube, Heeds, Image, pad_spectral, straightened, straightened_depth},
     depth::{depth_beside, files_beside, likely_beside, read_depth},
     envi::{contents_of_envi, header_of},
+    lighting::lit,
     mat::{MatScene, read_mat},
     no_data::mend,
     npy::read_npy,
+    npz::read_npz,
+    panorama::look,
     pfm::read_pfm,
-    picture::{lifted, lifted_codes, oriented, picture_size_of},
+    picture::{Oriented, oriented, picture_size_of},
+    primaries::into_srgb,
     raw_depth::{DepthWords, RawDepth},
     read_options::ReadOptions,
     reading::{DepthKind, FileQuantity, FileReading, Frame, light_unit},
+    reduced::reduced_size,
     spectral_exr::{RawFile, RawImage, read_raw_exr},
     stated::{name_of, note_of},
     tiff_file::{TiffFile, read_tiff},
@@ -32,13 +36,11 @@ use super::{
     unmeasured::{self, FillDepth},
     unusable::unreadable,
 };
-use crate::{HiddenLayer, Scene, SceneError, SceneLight, View, resampled};
+use crate::{HiddenLayer, Scene, SceneError, View};
 
-/// The illuminance on reflectances, and on a white of ordinary pictures, lx.
-const USUAL_LUX: f64 = 1000.0;
-
-/// Reads a scene from a spectral or ordinary EXR (`.exr`), an ENVI header (`.hdr`) or its file of numbers, a MATLAB file (`.mat`), an
-/// array of `NumPy` (`.npy`), a TIFF of any kind, a folder with a picture a band, or an ordinary picture (`.png`, `.jpg`, `.webp`, `.bmp`,
+/// Reads a scene from a spectral or ordinary EXR (`.exr`), an ENVI header (`.hdr`) or its file of numbers, a MATLAB file (`.mat`), HDF5
+/// (`.h5`), an array of `NumPy` (`.npy`, `.npz`), a TIFF of any kind, a folder with a picture a band,
+/// a table of reflectances (`.csv`), which becomes a chart, or an ordinary picture (`.png`, `.jpg`, `.webp`, `.bmp`,
 /// `.ppm`, `.pfm`, Radiance `.hdr`).
 ///
 /// Camera data comes from the options, else from the file, else from a `NAME.camera.json` beside it; depth from the options, else
@@ -109,8 +111,10 @@ fn contents_of(path: &Path, options: &ReadOptions) -> Result<Contents, SceneErro
     match extension.as_str() {
         "exr" => of_exr(path, options),
         "hdr" if !starts_with(path, b"#?")? => contents_of_envi(path, options),
-        "mat" => of_mat(path, options),
+        "mat" | "h5" | "hdf5" => of_mat(path, options),
         "npy" => of_npy(path, options),
+        "npz" => read_npz(path, options)?.into_contents(path, options),
+        "csv" => read_chart(path)?.into_contents(path, options),
         "pfm" => of_pfm(path),
         "tif" | "tiff" => of_tiff(path, options),
         "jpg" | "jpeg" if cfg!(not(feature = "jpeg")) => {
@@ -133,16 +137,14 @@ fn starts_with(path: &Path, start: &[u8]) -> Result<bool, SceneError> {
 
 /// An ordinary picture: what a display shows, or linear colors where it has floats.
 fn of_picture(path: &Path, options: &ReadOptions, mut notes: Vec<String>) -> Result<Contents, SceneError> {
-    let size = reduced_size(path, options)?;
-    let (picture, more) = oriented(path, size)?;
+    let (columns, rows) = picture_size_of(path)?;
+    let bands = options.grid.as_ref().map_or(31, WavelengthGrid::len);
+    let reduced = reduced_size(path, options, (rows, columns), 4 * bands as u64);
+    let Oriented { picture, colors, notes: more } =
+        oriented(path, reduced.as_ref().map(|reduced| (reduced.columns, reduced.rows)))?;
     notes.extend(more);
-    if let Some((columns, rows)) = size {
-        let (own_columns, own_rows) = picture_size_of(path)?;
-        notes.push(format!(
-            "its {own_columns} × {own_rows} pixels are read as {columns} × {rows} means, finer than those of the film by far"
-        ));
-    }
-    let what = format!("a picture as a display shows it ({})", super::picture::kind_of(&picture));
+    notes.extend(reduced.map(|reduced| reduced.note));
+    let what = format!("a picture as a display shows it ({})", super::picture::kind_of(&picture, colors.as_ref()));
     let image = match picture {
         dioptric_pictures::DynamicImage::ImageRgb32F(_) | dioptric_pictures::DynamicImage::ImageRgba32F(_) => {
             let (columns, rows) = (picture.width() as usize, picture.height() as usize);
@@ -151,23 +153,15 @@ fn of_picture(path: &Path, options: &ReadOptions, mut notes: Vec<String>) -> Res
                 let values = samples.iter().skip(k).step_by(3).copied().collect();
                 Array2::from_shape_vec((rows, columns), values).expect("three samples a pixel")
             };
-            return Ok(linear([plane(0), plane(1), plane(2)], None, notes));
+            let mut planes = [plane(0), plane(1), plane(2)];
+            if let Some(colors) = &colors {
+                into_srgb(&mut planes, &colors.to_srgb);
+            }
+            return Ok(linear(planes, None, notes));
         }
-        picture => Image::Codes(picture),
+        picture => Image::Codes(picture, colors),
     };
     Ok(Contents { notes, heeds: Heeds::Nothing, ..Contents::of(image, what) })
-}
-
-/// Returns the columns and rows as which a picture is read, where they are fewer than its own: where the options allow that and nothing lies
-/// beside it that counts its pixels.
-fn reduced_size(path: &Path, options: &ReadOptions) -> Result<Option<(usize, usize)>, SceneError> {
-    let (Some(finest), Some(fov_deg)) = (options.finest_tangent, options.horizontal_fov_deg) else { return Ok(None) };
-    let (columns, rows) = picture_size_of(path)?;
-    let own = 2.0 * (0.5 * fov_deg.to_radians()).tan() / columns as f64;
-    // Whole numbers of pixels, of which the last block of a row may have one more.
-    let block = ((finest / own) as usize).min(columns).min(rows);
-    let is_counted = options.reading.depth.is_some() || !files_beside(path).is_empty();
-    Ok((block >= 2 && !is_counted).then(|| (columns / block, rows / block)))
 }
 
 fn linear(planes: [Array2<f32>; 3], white_cd_m2: Option<f64>, notes: Vec<String>) -> Contents {
@@ -216,7 +210,7 @@ fn of_npy(path: &Path, options: &ReadOptions) -> Result<Contents, SceneError> {
 }
 
 fn of_exr(path: &Path, options: &ReadOptions) -> Result<Contents, SceneError> {
-    let RawFile { image, depth, view, frame, light, hidden, mut notes } = read_raw_exr(path)?;
+    let RawFile { image, depth, view, frame, panorama, light, hidden, mut notes } = read_raw_exr(path)?;
     let reading = &options.reading;
     let choice = reading.no_data.unwrap_or_default();
     let view = view.map(|view| CameraData::of_view(path, view));
@@ -262,7 +256,7 @@ fn of_exr(path: &Path, options: &ReadOptions) -> Result<Contents, SceneError> {
             (Image::Linear { planes, white_cd_m2 }, what, Heeds::Scale)
         }
     };
-    Ok(Contents { depth, view, frame: Some(frame), light, hidden, notes, heeds, ..Contents::of(image, what) })
+    Ok(Contents { depth, view, frame: Some(frame), panorama, light, hidden, notes, heeds, ..Contents::of(image, what) })
 }
 
 /// Depths that differ are taken as distances from the camera, as renderers leave them; depths that are all alike are those of a
@@ -295,14 +289,6 @@ fn of_mat(path: &Path, options: &ReadOptions) -> Result<Contents, SceneError> {
     let image = SpectralImage::new(Quantity::Radiance, grid, planes)?;
     let contents = Contents::of(Image::Spectral(image), "radiance of its photons");
     Ok(Contents { depth, view, light: scene.light, notes, heeds: Heeds::Nothing, ..contents })
-}
-
-/// Returns the bands of a picture without a spectrum.
-fn picture_bands(options: &ReadOptions) -> Result<WavelengthGrid, SceneError> {
-    Ok(match &options.grid {
-        Some(grid) => grid.clone(),
-        None => WavelengthGrid::uniform(400.0, 700.0, 10.0)?,
-    })
 }
 
 /// Returns what is said of a depth, and by the camera file beside the picture.
@@ -427,11 +413,23 @@ fn raw_depth(
 
 /// Lights a reflectance, moves it to the bands wanted and adds what the options give.
 fn finish(path: &Path, name: String, mut contents: Contents, options: &ReadOptions) -> Result<Scene, SceneError> {
-    let (rows, columns) = contents.size();
-    let frame = contents.frame.unwrap_or_else(|| Frame::whole(rows, columns));
-    let mut camera = camera_of(path, &mut contents, frame, options)?;
+    let whole = |contents: &Contents| {
+        let (rows, columns) = contents.size();
+        contents.frame.unwrap_or_else(|| Frame::whole(rows, columns))
+    };
+    let frame = whole(&contents);
     let mut depth = raw_depth(path, &mut contents, frame, options)?;
-    let mut sources = Sources { what: contents.what.clone(), ..Sources::default() };
+    if let Some(kind) = options.reading.panorama.or(contents.panorama) {
+        look(path, &mut contents, &mut depth, kind, options)?;
+    }
+    let frame = whole(&contents);
+    let (rows, columns) = contents.size();
+    let mut camera = camera_of(path, &mut contents, frame, options)?;
+    let what = match (&contents.image, options.reading.quantity) {
+        (Image::Spectral(_), _) | (_, None) => contents.what.clone(),
+        (_, Some(_)) => format!("{}, its colors taken for those of reflectances", contents.what),
+    };
+    let mut sources = Sources { what, ..Sources::default() };
     if !frame.is_whole(rows, columns) {
         sources.what += &format!(
             ", samples {}–{} × {}–{} of {} × {}",
@@ -562,143 +560,12 @@ fn resampling_note(own: &WavelengthGrid, wanted: Option<&WavelengthGrid>) -> Opt
     ))
 }
 
-/// Returns the radiance on the bands wanted, and the light that is on it, where that is known.
-///
-/// A picture on a display is light of its own: its white is that of the display on these very bands, or, where another light is asked
-/// for, of that light.
-fn lit(
-    path: &Path,
-    contents: Contents,
-    options: &ReadOptions,
-    notes: &mut Vec<String>,
-) -> Result<(SpectralImage, Option<SceneLight>), SceneError> {
-    let lux = |own: Option<f64>| options.illuminance_lux.or(own).unwrap_or(USUAL_LUX);
-    let choice = options.reading.no_data.unwrap_or_default();
-    let image = match contents.image {
-        Image::Spectral(image) => image,
-        colors => {
-            let grid = picture_bands(options)?;
-            let own_lux = match &colors {
-                Image::Linear { white_cd_m2: Some(white), .. } => Some(std::f64::consts::PI * white),
-                _ => None,
-            };
-            let lux = lux(own_lux);
-            let (basis, light) = white_basis(&grid, options.light.as_ref(), lux)?;
-            let n_dark = (0..grid.len()).filter(|&band| basis.iter().all(|color| color[band] <= 0.0)).count();
-            if n_dark > 0 {
-                let name = name_of(path);
-                notes.push(format!(
-                    "{name}: in {n_dark} of {} bands a display sends no light, nor does the picture",
-                    grid.len()
-                ));
-            }
-            let image = match colors {
-                Image::Codes(picture) => lifted_codes(path, picture, &basis, &grid)?,
-                Image::Linear { mut planes, .. } => {
-                    let scale = options.reading.scale.unwrap_or(1.0) as f32;
-                    let bands = WavelengthGrid::new(vec![450.0, 550.0, 650.0])?;
-                    let mended = mend_colors(path, &bands, &mut planes, choice)?;
-                    notes.extend(mended.note(path, choice));
-                    if scale != 1.0 {
-                        planes.iter_mut().for_each(|plane| plane.mapv_inplace(|v| v * scale));
-                    }
-                    lifted(&planes, &basis, &grid)?
-                }
-                Image::Spectral(image) => image,
-            };
-            return Ok((image, Some(light)));
-        }
-    };
-    let image = match &options.grid {
-        Some(grid) if grid != image.grid() => resampled(&image, grid)?,
-        _ => image,
-    };
-    if image.quantity() != Quantity::Reflectance {
-        return Ok((image, contents.light));
-    }
-    let light = SceneLight::new(options.light.clone().unwrap_or(Illuminant::D65), lux(None));
-    notes.extend(beyond_table(&light.illuminant, image.grid()));
-    let white = light.illuminant.white_radiance(image.grid(), lux(None));
-    let grid = image.grid().clone();
-    let mut planes = image.into_planes();
-    for (plane, white) in planes.iter_mut().zip(white) {
-        plane.mapv_inplace(|v| (f64::from(v) * white) as f32);
-    }
-    Ok((SpectralImage::new(Quantity::Radiance, grid, planes)?, Some(light)))
-}
-
-/// Mends colors, of which negative ones are beyond the gamut and stay.
-fn mend_colors(
-    path: &Path,
-    bands: &WavelengthGrid,
-    planes: &mut [Array2<f32>; 3],
-    choice: super::reading::NoData,
-) -> Result<super::no_data::Mended, SceneError> {
-    let kept: Vec<Array2<bool>> = planes.iter().map(|plane| plane.mapv(|v| v.is_finite() && v < 0.0)).collect();
-    let colors = planes.clone();
-    let finite = planes.iter_mut().zip(&kept);
-    finite.for_each(|(plane, kept)| {
-        ndarray::Zip::from(plane).and(kept).for_each(|v, kept| *v = if *kept { 0.0 } else { *v })
-    });
-    let mended = mend(path, bands, planes, choice)?;
-    for ((plane, kept), own) in planes.iter_mut().zip(&kept).zip(&colors) {
-        ndarray::Zip::from(plane).and(kept).and(own).for_each(|v, kept, own| *v = if *kept { *own } else { *v });
-    }
-    Ok(mended)
-}
-
-/// Returns the spectra of red, green and blue on a grid, and the light of which their sum is the white.
-fn white_basis(
-    grid: &WavelengthGrid,
-    wanted: Option<&Illuminant>,
-    lux: f64,
-) -> Result<([Vec<f64>; 3], SceneLight), SceneError> {
-    if !(lux.is_finite() && lux > 0.0) {
-        return Err(SceneError::Setting {
-            what: "the illuminance on the picture's white",
-            value: format!("{lux} lx"),
-            expected: "a finite number above 0".to_owned(),
-        });
-    }
-    let display = Display::apple_studio();
-    let mut basis = display.srgb_basis(grid, lux / std::f64::consts::PI);
-    let white: Vec<f64> =
-        (0..grid.len()).map(|band| (basis[0][band] + basis[1][band] + basis[2][band]).max(0.0)).collect();
-    let Some(wanted) = wanted else {
-        // On the picture's own bands: a white from other samples of the display's spectrum would tint it.
-        let is_known = grid.len() > 1 && white.iter().any(|v| *v > 0.0);
-        let spectrum = if is_known {
-            Spectrum::new(grid.centers_nm().to_vec(), white)?
-        } else {
-            let fine = WavelengthGrid::uniform(380.0, 780.0, 1.0)?;
-            let [r, g, b] = display.srgb_basis(&fine, 1.0);
-            Spectrum::new(fine.centers_nm().to_vec(), (0..fine.len()).map(|i| (r[i] + g[i] + b[i]).max(0.0)).collect())?
-        };
-        return Ok((basis, SceneLight::new(Illuminant::Spectrum(spectrum), lux)));
-    };
-    wanted.check()?;
-    let target = wanted.white_radiance(grid, lux);
-    for color in &mut basis {
-        for ((v, white), target) in color.iter_mut().zip(&white).zip(&target) {
-            *v = if *white > 0.0 { *v * target / white } else { 0.0 };
-        }
-    }
-    Ok((basis, SceneLight::new(wanted.clone(), lux)))
-}
-
-/// Returns what is said of bands beyond a light's table.
-fn beyond_table(light: &Illuminant, grid: &WavelengthGrid) -> Option<String> {
-    let Illuminant::Spectrum(spectrum) = light else { return None };
-    let ((first, last), (from, to)) = (grid.range_nm(), spectrum.range_nm());
-    let is_beyond = first < from || last > to;
-    is_beyond.then(|| format!("the light is known from {from} to {to} nm; beyond, its end values are held"))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::write_spectral_exr;
+    use crate::{SceneLight, write_spectral_exr};
     use approx::assert_relative_eq;
+    use dioptric_spectrum::Illuminant;
     use ndarray::Array2;
 
     #[test]

@@ -15,7 +15,7 @@ use crate::SceneError;
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct FileReading {
-    /// What the numbers of a cube are.
+    /// What the numbers of a cube are; of a picture, that its colors are those of things under a light: `Reflectance`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub quantity: Option<FileQuantity>,
     /// Their unit, as `W/m^2/sr/nm`, `uW/(cm^2 sr nm)` or `photons/s/m^2/sr/nm`.
@@ -27,7 +27,7 @@ pub struct FileReading {
     /// The center of each band, nm, in the order of the file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub wavelengths_nm: Option<Vec<f64>>,
-    /// The variable of a MATLAB file that holds the cube.
+    /// The variable of a MATLAB file, or the array of an HDF5 or `.npz` file, that holds the cube.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub variable: Option<String>,
     /// The order of the axes of an array: `yxb` (rows, columns, bands) and its like.
@@ -49,6 +49,9 @@ pub struct FileReading {
     /// A file of camera data, in place of one in the scene's file or beside it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub view: Option<PathBuf>,
+    /// The picture is one of all directions, of which the scene is what a field of view around this one holds.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub panorama: Option<Panorama>,
 }
 
 impl FileReading {
@@ -71,6 +74,9 @@ impl FileReading {
         }
         if let Some(axes) = &self.axes {
             axis_order(axes)?;
+        }
+        if let Some(panorama) = self.panorama {
+            panorama.check()?;
         }
         if self.wavelengths_nm.as_ref().is_some_and(Vec::is_empty) {
             return Err(setting("the wavelengths of the scene's bands", "none", "one a band, nm"));
@@ -111,6 +117,81 @@ impl FromStr for FileQuantity {
 
     fn from_str(text: &str) -> Result<Self, SceneError> {
         named(&Self::NAMES, "the quantity of the scene's numbers", text)
+    }
+}
+
+/// A picture of all directions, and where in it a camera looks.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub enum Panorama {
+    /// Twice as wide as high: columns by the angle to the right, straight ahead in the middle, rows by height, the zenith at the top.
+    Equirectangular {
+        /// To the right of its middle, degrees.
+        #[serde(default)]
+        yaw_deg: f64,
+        /// Above its middle, degrees.
+        #[serde(default)]
+        pitch_deg: f64,
+    },
+    /// The six faces of a cube, seen from its middle: as a cross, 4 × 3 (left, front, right and back in a row, up and down above and below
+    /// the front), or side by side (right, left, up, down, front, back), each turned as in the cross.
+    Cube {
+        /// To the right of the front, degrees.
+        #[serde(default)]
+        yaw_deg: f64,
+        /// Above the front, degrees.
+        #[serde(default)]
+        pitch_deg: f64,
+    },
+}
+
+impl Panorama {
+    /// Where the camera looks: to the right, and up, degrees.
+    pub(super) fn looks_deg(self) -> [f64; 2] {
+        match self {
+            Self::Equirectangular { yaw_deg, pitch_deg } | Self::Cube { yaw_deg, pitch_deg } => [yaw_deg, pitch_deg],
+        }
+    }
+
+    /// Checks that its angles can be.
+    ///
+    /// # Errors
+    /// When they cannot.
+    pub fn check(self) -> Result<(), SceneError> {
+        let [yaw_deg, pitch_deg] = self.looks_deg();
+        if yaw_deg.abs() <= 360.0 && pitch_deg.abs() <= 90.0 {
+            return Ok(());
+        }
+        let expected = "within ±360° to the right and ±90° up";
+        Err(setting("where in the panorama the camera looks", &format!("{yaw_deg}°, {pitch_deg}°"), expected))
+    }
+}
+
+impl FromStr for Panorama {
+    type Err = SceneError;
+
+    /// Reads `equirectangular`, `cube`, or either with `:YAW_DEG,PITCH_DEG` behind it.
+    fn from_str(text: &str) -> Result<Self, SceneError> {
+        let wrong = || {
+            let expected = "equirectangular or cube, or either with :YAW_DEG,PITCH_DEG";
+            setting("the kind of panorama", &format!("'{text}'"), expected)
+        };
+        let (word, numbers) = text.trim().split_once(':').unwrap_or((text.trim(), ""));
+        let numbers = numbers.split(',').map(str::trim).filter(|number| !number.is_empty());
+        let numbers: Vec<f64> =
+            numbers.map(str::parse).collect::<Result<_, _>>().map_err(|_: std::num::ParseFloatError| wrong())?;
+        let (yaw_deg, pitch_deg) = match numbers[..] {
+            [] => (0.0, 0.0),
+            [yaw_deg, pitch_deg] => (yaw_deg, pitch_deg),
+            _ => return Err(wrong()),
+        };
+        let panorama = match word {
+            "equirectangular" => Self::Equirectangular { yaw_deg, pitch_deg },
+            "cube" => Self::Cube { yaw_deg, pitch_deg },
+            _ => return Err(wrong()),
+        };
+        panorama.check()?;
+        Ok(panorama)
     }
 }
 

@@ -4,7 +4,10 @@ use std::{collections::HashMap, fs::File, io::BufReader, path::Path};
 
 use dioptric_spectrum::{DepthMap, Quantity, SpectralImage, WavelengthGrid, Xyz, adapt_bradford};
 use exr::{
-    meta::{MetaData, attribute::Chromaticities},
+    meta::{
+        MetaData,
+        attribute::{Chromaticities, EnvironmentMap},
+    },
     prelude::{AnyChannel, AnyChannels, FlatSamples, Layer, ReadChannels, ReadLayers, SampleType, read},
 };
 use glam::{DMat3, DVec3};
@@ -14,8 +17,9 @@ use super::{
     band_name::{self, BandKind},
     exr_attributes::{self, Attributes},
     light_unit::LightUnit,
+    primaries::into_srgb,
     raw_depth::RawDepth,
-    reading::{DepthKind, Frame},
+    reading::{DepthKind, Frame, Panorama},
     stated::{Stated, name_of, note_of},
     unusable::{check_memory, unreadable},
 };
@@ -71,7 +75,10 @@ pub(super) fn axial(distance_m: &Array2<f32>, view: View) -> Array2<f32> {
 /// One sentence with the file's name when it is truncated, too large, without spectral bands, of mixed units, or holds
 /// a sample that is not finite or is negative.
 pub fn read_spectral_exr(path: &Path) -> Result<SpectralFile, SceneError> {
-    let RawFile { image, depth, view, hidden, .. } = read_raw_exr(path)?;
+    let RawFile { image, depth, view, hidden, panorama, .. } = read_raw_exr(path)?;
+    if panorama.is_some() {
+        return Err(unreadable(path, "it is an environment map, expected a picture in perspective"));
+    }
     let values = |reason| SceneError::Values { file: path.to_owned(), reason };
     let image = match image {
         RawImage::Spectral { image, .. } => image,
@@ -101,6 +108,8 @@ pub(super) struct RawFile {
     pub(super) depth: Option<RawDepth>,
     pub(super) view: Option<View>,
     pub(super) frame: Frame,
+    /// Whether it says that it is a picture of all directions.
+    pub(super) panorama: Option<Panorama>,
     pub(super) light: Option<SceneLight>,
     /// Radiance and axial depth of the layer behind.
     pub(super) hidden: Option<(SpectralImage, Array2<f32>)>,
@@ -127,9 +136,13 @@ pub(super) fn read_raw_exr(path: &Path) -> Result<RawFile, SceneError> {
     let (head, mut layers) = read_layers(path)?;
     let hidden = layers.iter().position(|layer| layer.name == HIDDEN_LAYER && layer.has_bands());
     let hidden = hidden.filter(|_| layers.len() > 1).map(|index| layers.remove(index));
-    if layers.iter().any(|layer| layer.attributes.is_environment) {
-        return Err(unreadable(path, "it is an environment map, expected a picture in perspective"));
-    }
+    let panorama = match layers.iter().find_map(|layer| layer.attributes.environment) {
+        None => None,
+        Some(EnvironmentMap::LatitudeLongitude) => Some(Panorama::Equirectangular { yaw_deg: 0.0, pitch_deg: 0.0 }),
+        Some(EnvironmentMap::Cube) => {
+            return Err(unreadable(path, "it is a cube of OpenEXR, expected a panorama by latitude and longitude"));
+        }
+    };
     let mut notes = vec![];
     let index = layers.iter().position(RawLayer::has_bands);
     let mut first = layers.remove(index.unwrap_or(0));
@@ -164,7 +177,8 @@ pub(super) fn read_raw_exr(path: &Path) -> Result<RawFile, SceneError> {
     let (image, prefix) = if bands.is_empty() {
         let (prefix, mut planes) = colors_of(&mut channels).ok_or_else(|| no_bands(path))?;
         if let Some(own) = &head.chromaticities {
-            to_srgb(&mut planes, own).map_err(|reason| unreadable(path, reason))?;
+            let no_colors = || unreadable(path, "its chromaticities are no three primaries and a white");
+            into_srgb(&mut planes, &srgb_from(own).ok_or_else(no_colors)?);
             notes.push(format!("{}: its primaries become those of sRGB, its white D65", name_of(path)));
         }
         (RawImage::Rgb { planes, white_cd_m2: attributes.white_cd_m2.filter(|white| *white > 0.0) }, prefix)
@@ -200,7 +214,7 @@ pub(super) fn read_raw_exr(path: &Path) -> Result<RawFile, SceneError> {
         },
         None => None,
     };
-    Ok(RawFile { image, depth, view, frame, light, hidden, notes })
+    Ok(RawFile { image, depth, view, frame, panorama, light, hidden, notes })
 }
 
 /// Takes red, green and blue: `R`, `G` and `B`, or those of a layer, Blender's `….Combined` before others; or gray, `Y`. Returns
@@ -280,17 +294,6 @@ pub(super) fn depth_channel(planes: Vec<(String, Array2<f32>)>) -> Option<(Strin
     Some((name, plane, others))
 }
 
-/// Makes colors of these primaries and this white linear sRGB.
-fn to_srgb(planes: &mut [Array2<f32>; 3], own: &Chromaticities) -> Result<(), String> {
-    let matrix = srgb_from(own).ok_or("its chromaticities are no three primaries and a white")?;
-    let [red, green, blue] = planes;
-    ndarray::Zip::from(red).and(green).and(blue).par_for_each(|r, g, b| {
-        let rgb = [*r, *g, *b].map(f64::from);
-        [*r, *g, *b] = matrix.map(|row| row.iter().zip(rgb).map(|(m, v)| m * v).sum::<f64>() as f32);
-    });
-    Ok(())
-}
-
 /// Returns the matrix from colors of these primaries to linear sRGB, their white adapted to D65 (Bradford).
 fn srgb_from(own: &Chromaticities) -> Option<[[f64; 3]; 3]> {
     let xyz = |p: exr::prelude::Vec2<f32>| {
@@ -318,7 +321,21 @@ fn srgb_from(own: &Chromaticities) -> Option<[[f64; 3]; 3]> {
 /// # Errors
 /// When the file is truncated, too large or no EXR.
 pub fn read_planes_exr(path: &Path) -> Result<Vec<(String, Array2<f32>)>, SceneError> {
-    Ok(read_layers(path)?.1.swap_remove(0).planes)
+    Ok(read_planes_and_primaries_exr(path)?.0)
+}
+
+/// The channels of an EXR file by name, and the matrix from its primaries to linear sRGB.
+pub(super) type PlanesAndPrimaries = (Vec<(String, Array2<f32>)>, Option<[[f64; 3]; 3]>);
+
+/// Reads the same, with the matrix from the primaries that the file states to linear sRGB; none where they are those of sRGB.
+pub(super) fn read_planes_and_primaries_exr(path: &Path) -> Result<PlanesAndPrimaries, SceneError> {
+    let (head, mut layers) = read_layers(path)?;
+    let has_colors = |planes: &[(String, Array2<f32>)]| planes.iter().any(|(name, _)| name == "R");
+    let layer = layers.swap_remove(0);
+    let own = head.chromaticities.filter(|_| has_colors(&layer.planes));
+    let no_colors = || unreadable(path, "its chromaticities are no three primaries and a white");
+    let matrix = own.map(|own| srgb_from(&own).ok_or_else(no_colors)).transpose()?;
+    Ok((layer.planes, matrix))
 }
 
 /// What a file states of all its layers.

@@ -105,6 +105,12 @@ pub(super) fn read_tiff(path: &Path) -> Result<TiffFile, SceneError> {
     let n_pages = if is_linear { 1 } else { pages.len() };
     let mut planes = vec![];
     for page in &pages[..n_pages] {
+        if page.has_tiles_of_planes {
+            // What decodes it stumbles over such tiles.
+            return Err(wrong(
+                "its bands lie apart and in tiles, expected strips, or the bands of a sample together".to_owned(),
+            ));
+        }
         decoder.seek_to_image(page.index).map_err(broken)?;
         planes.extend(planes_of(&mut decoder, page).map_err(broken)?);
     }
@@ -146,6 +152,7 @@ struct Page {
     bits: u8,
     is_colored: bool,
     is_reduced: bool,
+    has_tiles_of_planes: bool,
     name: Option<String>,
     description: Option<String>,
     no_data: Option<f64>,
@@ -161,6 +168,9 @@ impl Page {
         let format = decoder.find_tag_unsigned_vec::<u16>(Tag::SampleFormat)?.and_then(|list| list.first().copied());
         let photometric = decoder.find_tag_unsigned::<u16>(Tag::PhotometricInterpretation)?.unwrap_or(1);
         let kind = decoder.find_tag_unsigned::<u32>(Tag::NewSubfileType)?.unwrap_or(0);
+        let is_planar = decoder.find_tag_unsigned::<u16>(Tag::PlanarConfiguration)? == Some(2);
+        let has_tiles_of_planes =
+            is_planar && n_samples > 1 && decoder.find_tag_unsigned::<u32>(Tag::TileWidth)?.is_some();
         let mut text = |tag| decoder.get_tag_ascii_string(tag).ok().filter(|text| !text.trim().is_empty());
         let (name, description) = (text(PAGE_NAME), text(Tag::ImageDescription));
         let no_data = text(Tag::GdalNodata).and_then(|text| text.trim().parse().ok());
@@ -178,6 +188,7 @@ impl Page {
             bits,
             is_colored: matches!(photometric, 2 | 3 | 5 | 6),
             is_reduced: kind & 1 != 0,
+            has_tiles_of_planes,
             name,
             description,
             no_data,

@@ -1,6 +1,7 @@
 //! Test targets made from formulas: a flat pattern at one distance under one light.
 
 mod leaves;
+mod levels;
 mod pattern;
 
 use dioptric_spectrum::{
@@ -17,7 +18,7 @@ const MIN_LEAF_PX: f64 = 0.1;
 const MAX_LEAF_PX: f64 = 1e6;
 
 /// What is drawn on a target.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub enum Pattern {
@@ -63,6 +64,131 @@ pub enum Pattern {
         /// The seed of all discs: the same seed, the same discs.
         seed: u64,
     },
+    /// The sum of waves about the middle gray, half of white; their contrasts add up to 1 at most.
+    Harmonics {
+        /// The waves.
+        waves: Vec<Wave>,
+    },
+    /// A wave under a Gaussian window about the center, on the middle gray.
+    Gabor {
+        /// The wave.
+        wave: Wave,
+        /// The standard deviation of the window, as a share of the width.
+        sigma: f64,
+    },
+    /// Straight light lines, one through the center.
+    Lines {
+        /// From line to line, in samples.
+        spacing_px: f64,
+        /// The width of a line, in samples, below the spacing.
+        width_px: f64,
+        /// Their direction, degrees from upright, turned clockwise.
+        #[serde(default)]
+        angle_deg: f64,
+    },
+    /// Light lines, upright and level, on a square lattice with a crossing at the center.
+    Grid {
+        /// From line to line, in samples.
+        spacing_px: f64,
+        /// The width of a line, in samples, below the spacing.
+        width_px: f64,
+    },
+    /// A wave whose frequency grows from left to right, in equal steps of its logarithm.
+    Sweep {
+        /// Cycles over the width that it has at the left edge.
+        first_cycles: f64,
+        /// Cycles over the width that it has at the right edge.
+        last_cycles: f64,
+        /// (Most − least) / (most + least).
+        #[serde(default = "full")]
+        contrast: f64,
+    },
+    /// Rings about the center whose frequency grows in proportion to the radius.
+    ZonePlate {
+        /// Cycles over the width that it has at the left and right edges.
+        edge_cycles: f64,
+        /// (Most − least) / (most + least).
+        #[serde(default = "full")]
+        contrast: f64,
+    },
+    /// Gray that grows from black at the left to white at the right.
+    Ramp {
+        /// In so many steps; 0 for none.
+        #[serde(default)]
+        steps: usize,
+        /// White over the darkest, of a ramp in equal ratios; left out, in equal differences from black.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        ratio: Option<f64>,
+    },
+    /// Light words about the center, in `DejaVu` Sans.
+    Letters {
+        /// The words, a line.
+        text: String,
+        /// The height of a capital letter, in samples.
+        height_px: f64,
+    },
+    /// Independent grays, evenly spread about the middle gray.
+    Noise {
+        /// The side of a square of one gray, in samples.
+        #[serde(default = "one")]
+        cell_px: usize,
+        /// (Most − least) / (most + least).
+        #[serde(default = "full")]
+        contrast: f64,
+        /// The same seed, the same grays.
+        seed: u64,
+    },
+}
+
+fn full() -> f64 {
+    1.0
+}
+
+fn one() -> usize {
+    1
+}
+
+impl Pattern {
+    /// Whether its parts are so many samples large, whatever the size of the target.
+    pub fn counts_samples(&self) -> bool {
+        match self {
+            Self::Checkerboard { .. }
+            | Self::RadialLines { .. }
+            | Self::PointArray { .. }
+            | Self::DeadLeaves { .. }
+            | Self::Lines { .. }
+            | Self::Grid { .. }
+            | Self::Letters { .. }
+            | Self::Noise { .. } => true,
+            Self::Uniform
+            | Self::SlantedBar { .. }
+            | Self::SiemensStar { .. }
+            | Self::ColorChart
+            | Self::Harmonics { .. }
+            | Self::Gabor { .. }
+            | Self::Sweep { .. }
+            | Self::ZonePlate { .. }
+            | Self::Ramp { .. } => false,
+        }
+    }
+}
+
+/// A wave over a target.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub struct Wave {
+    /// Cycles over the width of the target.
+    pub cycles: f64,
+    /// (Most − least) / (most + least).
+    #[serde(default = "full")]
+    pub contrast: f64,
+    /// Its phase at the center, degrees: 0 is light there.
+    #[serde(default)]
+    pub phase_deg: f64,
+    /// The direction of its stripes, degrees from upright, turned clockwise.
+    #[serde(default)]
+    pub angle_deg: f64,
 }
 
 /// The shape of a target's spectrum.
@@ -108,7 +234,7 @@ pub struct Target {
     pub light: TargetLight,
     /// The luminance of its white, cd/m².
     pub luminance_cd_m2: f64,
-    /// What its dark reflects, as a share of its white; a chart and dead leaves do without.
+    /// What its dark reflects, as a share of its white; patterns of grays do without.
     pub dark: f64,
     /// Points a sample and direction at which the pattern is looked up: 1 gives hard steps, as in the paper.
     pub supersampling: usize,
@@ -155,7 +281,7 @@ impl Target {
     pub fn scene(&self, grid: &WavelengthGrid) -> Result<Scene, SceneError> {
         self.check()?;
         let white = self.white_radiance(grid)?;
-        let radiance = match self.pattern {
+        let radiance = match &self.pattern {
             Pattern::ColorChart => self.chart(grid, &white)?,
             _ => {
                 let reflected = self.reflectance();
@@ -203,6 +329,15 @@ impl Target {
                 let leaves = Leaves::new(size, radii_px, [min_reflectance, max_reflectance], seed);
                 leaves::reflectance(leaves, size, self.supersampling)
             }
+            Pattern::Lines { .. } | Pattern::Grid { .. } | Pattern::Letters { .. } => {
+                levels::reflectance(self).mapv(|share| self.dark + (1.0 - self.dark) * share)
+            }
+            Pattern::Harmonics { .. }
+            | Pattern::Gabor { .. }
+            | Pattern::Sweep { .. }
+            | Pattern::ZonePlate { .. }
+            | Pattern::Ramp { .. }
+            | Pattern::Noise { .. } => levels::reflectance(self),
             _ => pattern::light_share(self).mapv(|share| self.dark + (1.0 - self.dark) * share),
         }
     }
@@ -218,6 +353,15 @@ impl Target {
             Pattern::SiemensStar { .. } => "Siemens star",
             Pattern::ColorChart => "color chart",
             Pattern::DeadLeaves { .. } => "dead leaves",
+            Pattern::Harmonics { .. } => "harmonics",
+            Pattern::Gabor { .. } => "Gabor patch",
+            Pattern::Lines { .. } => "lines",
+            Pattern::Grid { .. } => "grid",
+            Pattern::Sweep { .. } => "frequency sweep",
+            Pattern::ZonePlate { .. } => "zone plate",
+            Pattern::Ramp { .. } => "ramp",
+            Pattern::Letters { .. } => "letters",
+            Pattern::Noise { .. } => "noise",
         }
     }
 
@@ -256,7 +400,7 @@ impl Target {
             | Pattern::PointArray { spacing_px: n }
             | Pattern::SiemensStar { n_cycles: n } => (n > 0, true),
             Pattern::SlantedBar { slope } => (true, slope.is_finite()),
-            Pattern::Uniform | Pattern::ColorChart | Pattern::DeadLeaves { .. } => (true, true),
+            _ => (true, true),
         };
         if !(counts && finite) {
             return setting(
@@ -265,7 +409,7 @@ impl Target {
                 "a count above 0, a finite slope",
             );
         }
-        Ok(())
+        levels::check(&self.pattern)
     }
 
     /// Returns the radiance of the white in each band.
@@ -343,7 +487,7 @@ mod tests {
     #[test]
     fn white_has_the_luminance_asked_for() {
         for pattern in [Pattern::Uniform, Pattern::SiemensStar { n_cycles: 16 }] {
-            let target = Target { luminance_cd_m2: 250.0, ..of(pattern) };
+            let target = Target { luminance_cd_m2: 250.0, ..of(pattern.clone()) };
             let scene = target.scene(&WavelengthGrid::uniform(380.0, 780.0, 5.0).unwrap()).unwrap();
             scene.validate().unwrap();
             let expected = if pattern == Pattern::Uniform { 250.0 } else { 125.0 };

@@ -29,7 +29,7 @@ pub(super) fn light_share(target: &Target) -> Array2<f64> {
 }
 
 /// Returns the points of a sample, (row, column), evenly spread over its square.
-fn sample_points(n: usize, row: usize, column: usize) -> impl Iterator<Item = (f64, f64)> {
+pub(super) fn sample_points(n: usize, row: usize, column: usize) -> impl Iterator<Item = (f64, f64)> {
     let at = move |i: usize| (i as f64 + 0.5) / n as f64 - 0.5;
     (0..n * n).map(move |i| (row as f64 + at(i / n), column as f64 + at(i % n)))
 }
@@ -47,11 +47,7 @@ fn is_light(target: &Target, row: f64, column: f64) -> bool {
             let turns = y.atan2(x) / (2.0 * PI) * n_cycles as f64;
             turns.rem_euclid(1.0) < 0.5
         }
-        Pattern::Uniform
-        | Pattern::RadialLines { .. }
-        | Pattern::PointArray { .. }
-        | Pattern::ColorChart
-        | Pattern::DeadLeaves { .. } => true,
+        _ => true,
     }
 }
 

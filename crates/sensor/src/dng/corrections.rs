@@ -176,9 +176,12 @@ impl<'a> Parameters<'a> {
         Ok(area)
     }
 
-    /// Returns factors for each row or column of an area.
-    fn lines(&mut self) -> Result<Vec<f32>, String> {
-        let n = self.count(4)?;
+    /// Returns factors for each row or column of an area: one a step from the first to the last.
+    fn lines(&mut self, length: usize, pitch: usize) -> Result<Vec<f32>, String> {
+        let (n, expected) = (self.count(4)?, length.div_ceil(pitch));
+        if n != expected {
+            return Err(format!("has a {} of {n} numbers, expected {expected} for its area", self.name));
+        }
         self.singles(n)
     }
 }
@@ -343,10 +346,22 @@ impl Correction {
                 Self::OfArea(area, Map::Polynomial(factors))
             }
             9 => Self::OfArea(p.area()?, Map::Gain(GainMap::read(p)?)),
-            10 => Self::OfArea(p.area()?, Map::AddToRows(p.lines()?)),
-            11 => Self::OfArea(p.area()?, Map::AddToColumns(p.lines()?)),
-            12 => Self::OfArea(p.area()?, Map::ScaleRows(p.lines()?)),
-            _ => Self::OfArea(p.area()?, Map::ScaleColumns(p.lines()?)),
+            _ => {
+                let area = p.area()?;
+                let is_of_rows = number.is_multiple_of(2);
+                let lines = if is_of_rows {
+                    p.lines(area.bottom - area.top, area.row_pitch)?
+                } else {
+                    p.lines(area.right - area.left, area.column_pitch)?
+                };
+                let map = match number {
+                    10 => Map::AddToRows(lines),
+                    11 => Map::AddToColumns(lines),
+                    12 => Map::ScaleRows(lines),
+                    _ => Map::ScaleColumns(lines),
+                };
+                Self::OfArea(area, map)
+            }
         })
     }
 }

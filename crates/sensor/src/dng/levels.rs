@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::{
     area::Area,
-    samples::Samples,
+    samples::{Codes, Samples},
     tags::{
         BLACK_LEVEL, BLACK_LEVEL_DELTA_H, BLACK_LEVEL_DELTA_V, BLACK_LEVEL_REPEAT_DIM, LINEARIZATION_TABLE, WHITE_LEVEL,
     },
@@ -51,7 +51,9 @@ impl FileLevels {
             &[all] if all.is_finite() => vec![all; n_black],
             _ => frame.finite(BLACK_LEVEL, n_black)?.unwrap_or(vec![0.0; n_black]),
         };
-        let top = f64::from((1_u32 << stored.bits) - 1);
+        let is_float = matches!(stored.codes, Codes::Floats(_));
+        let table = table.filter(|_| !is_float);
+        let top = stored.top();
         let top = table.as_ref().map_or(top, |table| table.iter().copied().max().map_or(top, f64::from));
         let white = match frame.numbers(WHITE_LEVEL)?.as_slice() {
             [] => vec![top; n],
@@ -107,13 +109,15 @@ impl FileLevels {
 
     /// Returns the planes that are shown, as they are stored where their levels are the same everywhere, and these levels.
     pub(super) fn planes(&self, stored: &Samples, area: &Area, saturation_e: f64) -> (Vec<RawPlane>, Levels) {
-        let top = f64::from((1_u32 << stored.bits) - 1);
+        let top = stored.top();
         let n = stored.n_planes;
-        let code = |row: usize, column: usize, plane: usize| {
-            stored.codes[((area.top + row) * stored.columns + area.left + column) * n + plane]
-        };
         let size = (area.rows, area.columns);
-        if self.are_even() {
+        if let Codes::Whole(codes) = &stored.codes
+            && self.are_even()
+        {
+            let code = |row: usize, column: usize, plane: usize| {
+                codes[((area.top + row) * stored.columns + area.left + column) * n + plane]
+            };
             let plane = |plane: usize| RawPlane::Dn(Array2::from_shape_fn(size, |(r, c)| code(r, c, plane)));
             let levels = Levels::of_file((self.black[0], self.white[0], top), saturation_e, self.table.clone());
             return ((0..n).map(plane).collect(), levels);
@@ -126,7 +130,7 @@ impl FileLevels {
             let rows = values.as_slice_mut().expect("a new array is contiguous").par_chunks_mut(area.columns);
             rows.enumerate().for_each(|(row, values): (usize, &mut [f32])| {
                 for (column, value) in values.iter_mut().enumerate() {
-                    let straight = self.straight(code(row, column, plane));
+                    let straight = self.straight(stored.at(area.top + row, area.left + column, plane));
                     *value = (scale * (straight - self.black_at(down + row, right + column, plane))) as f32;
                 }
             });
@@ -136,9 +140,9 @@ impl FileLevels {
         ((0..n).map(evened).collect(), levels)
     }
 
-    fn straight(&self, code: u16) -> f64 {
+    fn straight(&self, code: f32) -> f64 {
         match &self.table {
-            Some(table) => f64::from(table[usize::from(code).min(table.len() - 1)]),
+            Some(table) => f64::from(table[(code as usize).min(table.len() - 1)]),
             None => f64::from(code),
         }
     }

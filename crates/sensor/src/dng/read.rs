@@ -13,7 +13,7 @@ use super::{
     file_camera,
     file_profile::{ChannelCorrections, DngProfile},
     levels::FileLevels,
-    samples::{self, Samples},
+    samples::{self, Codes, Samples},
     tags::{
         BASELINE_EXPOSURE, CFA_LAYOUT, CFA_PATTERN, CFA_PLANE_COLOR, CFA_REPEAT_PATTERN_DIM, COLOR_FILTER_ARRAY,
         DEFAULT_SCALE, DNG_VERSION, EXIF_DIRECTORY, EXPOSURE_TIME, F_NUMBER, FOCAL_LENGTH, IMAGE_DESCRIPTION,
@@ -91,7 +91,7 @@ pub struct DngShot {
 }
 
 impl DngFile {
-    /// Reads a file: Bayer and other mosaics, single planes and stacked ones, of 8 to 16 bits, plain or as lossless JPEG.
+    /// Reads a file: Bayer and other mosaics, single planes and stacked ones, of 8 to 16 bits or floats, plain, deflated or as lossless JPEG.
     ///
     /// # Errors
     /// When the file cannot be read, is no DNG, or has samples of another kind.
@@ -108,7 +108,7 @@ impl DngFile {
         let length = fs::metadata(path).map_err(|e| wrong(e.to_string()))?.len();
         memory::check(length, length).map_err(|e| wrong(e.to_string()))?;
         let bytes = fs::read(path).map_err(|e| wrong(e.to_string()))?;
-        Self::from_bytes_with(&bytes, opcodes).map_err(|reason| match other_raw_format(&bytes) {
+        Self::from_bytes_with(&bytes, opcodes).map_err(|reason| match raw_format_of(&bytes).or_else(|| raw_format_by_name(path)) {
             Some(format) => wrong(format!(
                 "is {format}, which is not read, expected a DNG file; Adobe's DNG Converter and `dnglab convert` make one of it"
             )),
@@ -276,20 +276,21 @@ impl Lists {
             return;
         }
         let (rows, columns, n) = (stored.rows, stored.columns, stored.n_planes);
-        let top = f32::from(u16::MAX);
-        let plane = |plane: usize| {
-            Array2::from_shape_fn((rows, columns), |(r, c)| {
-                f32::from(stored.codes[(r * columns + c) * n + plane]) / top
-            })
-        };
+        // Floats are light of 1 already.
+        let top = if matches!(stored.codes, Codes::Whole(_)) { f32::from(u16::MAX) } else { 1.0 };
+        let plane = |plane: usize| Array2::from_shape_fn((rows, columns), |(r, c)| stored.at(r, c, plane) / top);
         let planes = (0..n).map(plane).collect();
         let place = Place { rows, columns, top: 0, left: 0 };
         let is_same = same_filter(tile, (area.active_top, area.active_left));
         let changed = self.first.apply(planes, place, (&[], 1.0), &is_same);
-        let highest = f32::from(((1_u32 << stored.bits) - 1) as u16);
+        let highest = stored.top() as f32;
         for (plane, values) in changed.iter().enumerate() {
             for ((r, c), value) in values.indexed_iter() {
-                stored.codes[(r * columns + c) * n + plane] = (value * top).round().clamp(0.0, highest) as u16;
+                let place = (r * columns + c) * n + plane;
+                match &mut stored.codes {
+                    Codes::Whole(codes) => codes[place] = (value * top).round().clamp(0.0, highest) as u16,
+                    Codes::Floats(floats) => floats[place] = *value,
+                }
             }
         }
     }
@@ -318,7 +319,7 @@ fn same_filter(tile: Option<&Tile>, (top, left): (usize, usize)) -> impl Fn([usi
 }
 
 /// Returns the name of a raw format that is no DNG, by the first bytes of a file and the maker that it names.
-fn other_raw_format(bytes: &[u8]) -> Option<&'static str> {
+pub fn raw_format_of(bytes: &[u8]) -> Option<&'static str> {
     let begins = |at: usize, with: &[u8]| bytes.get(at..at + with.len()) == Some(with);
     let by_bytes = [
         (8, &b"CR"[..], "a Canon CR2 file"),
@@ -341,6 +342,27 @@ fn other_raw_format(bytes: &[u8]) -> Option<&'static str> {
     let is_raw = !first.has(DNG_VERSION) && first.has(SUB_DIRECTORIES);
     let by_maker = [("NIKON", "a Nikon NEF file"), ("SONY", "a Sony ARW file"), ("PENTAX", "a Pentax PEF file")];
     by_maker.into_iter().find(|(maker, _)| is_raw && make.starts_with(maker)).map(|(_, name)| name)
+}
+
+/// Returns the name of a raw format that is no DNG, by the extension of a file's name.
+pub fn raw_format_by_name(path: &Path) -> Option<&'static str> {
+    let extension = path.extension()?.to_string_lossy().to_ascii_lowercase();
+    Some(match extension.as_str() {
+        "nef" | "nrw" => "a Nikon NEF file",
+        "arw" | "sr2" | "srf" => "a Sony ARW file",
+        "pef" => "a Pentax PEF file",
+        "cr2" => "a Canon CR2 file",
+        "cr3" => "a Canon CR3 file",
+        "raf" => "a Fujifilm RAF file",
+        "rw2" => "a Panasonic RW2 file",
+        "orf" => "an Olympus ORF file",
+        "x3f" => "a Sigma X3F file",
+        "3fr" | "fff" => "a Hasselblad 3FR file",
+        "iiq" => "a Phase One IIQ file",
+        "srw" => "a Samsung SRW file",
+        "dcr" | "kdc" => "a Kodak DCR file",
+        _ => return None,
+    })
 }
 
 /// Returns the directory of the largest raw frame: the first or one below it.

@@ -276,6 +276,68 @@ fn a_tile_may_be_fewer_and_longer_rows_of_jpeg() {
     assert_eq!(codes_of(&file.raw), codes);
 }
 
+/// Returns a file whose only strip is this, deflated.
+fn deflated(bytes: &[u8], predictor: u16, change: impl FnOnce(&mut Directory)) -> Vec<u8> {
+    let mut encoder = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::default());
+    std::io::Write::write_all(&mut encoder, bytes).unwrap();
+    let block = encoder.finish().unwrap();
+    let mut d = PLAIN.directory();
+    d.set(COMPRESSION, Value::Short(vec![8]));
+    d.set(PREDICTOR, Value::Short(vec![predictor]));
+    d.set(ROWS_PER_STRIP, Value::Long(vec![PLAIN.rows as u32]));
+    d.set(STRIP_OFFSETS, Value::Long(vec![8]));
+    d.set(STRIP_BYTE_COUNTS, Value::Long(vec![block.len() as u32]));
+    change(&mut d);
+    d.into_file_behind(&block).unwrap()
+}
+
+#[test]
+fn deflated_codes_and_floats_are_read() {
+    let codes = PLAIN.codes();
+    let columns = PLAIN.columns;
+    // Differences of whole numbers along each row.
+    let differences = codes
+        .chunks_exact(columns)
+        .flat_map(|row| (0..columns).map(move |i| if i == 0 { row[0] } else { row[i].wrapping_sub(row[i - 1]) }));
+    let bytes: Vec<u8> = differences.flat_map(u16::to_le_bytes).collect();
+    let file = deflated(&bytes, 2, |d| d.set(BITS_PER_SAMPLE, Value::Short(vec![16])));
+    assert_eq!(codes_of(&DngFile::from_bytes(&file).unwrap().raw), codes);
+    // Floats beyond 1, of which 1 is white where the file does not say.
+    let light: Vec<f32> = codes.iter().map(|&code| f32::from(code) / 10_000.0).collect();
+    let parted: Vec<u8> = light
+        .chunks_exact(columns)
+        .flat_map(|row| {
+            let mut bytes: Vec<u8> =
+                (0..4).flat_map(|weight| row.iter().map(move |v| v.to_be_bytes()[weight])).collect();
+            (1..bytes.len()).rev().for_each(|at| bytes[at] = bytes[at].wrapping_sub(bytes[at - 1]));
+            bytes
+        })
+        .collect();
+    let floats = |d: &mut Directory, bits: u16| {
+        d.set(BITS_PER_SAMPLE, Value::Short(vec![bits]));
+        d.set(SAMPLE_FORMAT, Value::Short(vec![3]));
+        d.set(WHITE_LEVEL, Value::Long(vec![1]));
+        d.set(BLACK_LEVEL, Value::Short(vec![0]));
+    };
+    let file = DngFile::from_bytes(&deflated(&parted, 3, |d| floats(d, 32))).unwrap();
+    for (found, wanted) in file.raw.linear()[0].iter().zip(&light) {
+        assert!((found - wanted).abs() <= 1e-6, "{found} {wanted}");
+    }
+    assert_eq!(file.bits, 32);
+    // The same without differences, and as floats of 16 bits: 1.5 × 2⁻² is 0 01101 1000000000.
+    let plain: Vec<u8> = light.iter().flat_map(|v| v.to_le_bytes()).collect();
+    let file = DngFile::from_bytes(&deflated(&plain, 1, |d| floats(d, 32))).unwrap();
+    assert!((file.raw.linear()[0][(1, 2)] - light[columns + 2]).abs() < 1e-6);
+    let half: Vec<u8> = light.iter().flat_map(|_| 0b0011_0110_0000_0000_u16.to_le_bytes()).collect();
+    let file = DngFile::from_bytes(&deflated(&half, 1, |d| floats(d, 16))).unwrap();
+    assert!(file.raw.linear()[0].iter().all(|v| *v == 0.375));
+    // Too few samples, and a predictor of whole numbers for floats.
+    let short = DngFile::from_bytes(&deflated(&plain[..40], 1, |d| floats(d, 32))).unwrap_err();
+    assert!(short.contains("bytes in a strip"), "{short}");
+    let other = DngFile::from_bytes(&deflated(&plain, 2, |d| floats(d, 32))).unwrap_err();
+    assert!(other.contains("predictor 2"), "{other}");
+}
+
 #[test]
 fn active_area_and_crop_move_the_mosaic() {
     let file = PLAIN.file(|d| {
@@ -691,7 +753,10 @@ fn files_that_are_no_such_frames_are_refused_in_a_sentence() {
     };
     refused("compression 34892", &|d| d.set(COMPRESSION, Value::Short(vec![34_892])));
     refused("[32] bits", &|d| d.set(BITS_PER_SAMPLE, Value::Short(vec![32])));
-    refused("no whole numbers", &|d| d.set(SAMPLE_FORMAT, Value::Short(vec![3])));
+    refused("no whole numbers", &|d| d.set(SAMPLE_FORMAT, Value::Short(vec![2])));
+    refused("floats of [14] bits", &|d| d.set(SAMPLE_FORMAT, Value::Short(vec![3])));
+    refused("deflated samples of 14 bits", &|d| d.set(COMPRESSION, Value::Short(vec![8])));
+    refused("JPEG XL", &|d| d.set(COMPRESSION, Value::Short(vec![52_546])));
     refused("planes one after the other", &|d| d.set(PLANAR_CONFIGURATION, Value::Short(vec![2])));
     refused("no raw frame", &|d| d.set(PHOTOMETRIC_INTERPRETATION, Value::Short(vec![2])));
     refused("mosaic of the size", &|d| d.set(CFA_REPEAT_PATTERN_DIM, Value::Short(vec![2, 99])));

@@ -1,40 +1,79 @@
-//! The samples of a raw frame in a DNG file: strips or tiles, plain or as lossless JPEG.
+//! The samples of a raw frame in a DNG file: strips or tiles, plain, as lossless JPEG or deflated, whole numbers or floats.
+
+use std::{borrow::Cow, io::Read};
 
 use dioptric_files::memory;
+use flate2::read::ZlibDecoder;
 use rayon::prelude::*;
 
 use super::{
     lossless_jpeg,
+    predictor::Predictor,
     tags::{
         BITS_PER_SAMPLE, COLUMN_INTERLEAVE_FACTOR, COMPRESSION, IMAGE_LENGTH, IMAGE_WIDTH, PLANAR_CONFIGURATION,
-        ROW_INTERLEAVE_FACTOR, ROWS_PER_STRIP, SAMPLE_FORMAT, SAMPLES_PER_PIXEL, STRIP_BYTE_COUNTS, STRIP_OFFSETS,
-        SUB_TILE_BLOCK_SIZE, TILE_BYTE_COUNTS, TILE_LENGTH, TILE_OFFSETS, TILE_WIDTH,
+        PREDICTOR, ROW_INTERLEAVE_FACTOR, ROWS_PER_STRIP, SAMPLE_FORMAT, SAMPLES_PER_PIXEL, STRIP_BYTE_COUNTS,
+        STRIP_OFFSETS, SUB_TILE_BLOCK_SIZE, TILE_BYTE_COUNTS, TILE_LENGTH, TILE_OFFSETS, TILE_WIDTH,
     },
     tiff_reader::{Fields, TiffReader},
 };
 
 /// What a code takes while a frame is read, bytes: itself, its level and the sample of a plane.
 const CODE_BYTES: u64 = 8;
+/// A deflated byte is no more than so many.
+const MOST_DEFLATED: usize = 1032;
 
 /// Values of the tag `Compression`.
 const PLAIN: usize = 1;
 const LOSSLESS_JPEG: usize = 7;
+/// Deflated: the number that Adobe uses, and the older one.
+const DEFLATED: [usize; 2] = [8, 32_946];
+/// Values of the tag `SampleFormat`.
+const WHOLE: usize = 1;
+const FLOAT: usize = 3;
 
-/// The codes of a frame as they stand in the file.
-#[derive(Clone, Debug, PartialEq, Eq)]
+/// The samples of a frame as they stand in the file.
+#[derive(Clone, Debug, PartialEq)]
 pub(super) struct Samples {
     pub(super) rows: usize,
     pub(super) columns: usize,
     /// Samples of a pixel, side by side.
     pub(super) n_planes: usize,
     pub(super) bits: u32,
-    pub(super) codes: Vec<u16>,
+    pub(super) codes: Codes,
+}
+
+/// Samples of all planes, side by side.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Codes {
+    Whole(Vec<u16>),
+    Floats(Vec<f32>),
+}
+
+impl Samples {
+    /// Returns one sample.
+    pub(super) fn at(&self, row: usize, column: usize, plane: usize) -> f32 {
+        let place = (row * self.columns + column) * self.n_planes + plane;
+        match &self.codes {
+            Codes::Whole(codes) => f32::from(codes[place]),
+            Codes::Floats(values) => values[place],
+        }
+    }
+
+    /// Returns the highest code; 1 of floats, which may go beyond.
+    pub(super) fn top(&self) -> f64 {
+        match &self.codes {
+            Codes::Whole(_) => f64::from((1_u32 << self.bits) - 1),
+            Codes::Floats(_) => 1.0,
+        }
+    }
 }
 
 /// How the codes of a frame are stored.
 struct Storage<'a> {
     file: TiffReader<'a>,
     compression: usize,
+    predictor: Predictor,
+    is_float: bool,
     bits: u32,
     n_planes: usize,
     rows: usize,
@@ -54,7 +93,12 @@ struct Storage<'a> {
 pub(super) fn read(file: TiffReader<'_>, fields: &Fields<'_>) -> Result<Samples, String> {
     let storage = Storage::new(file, fields)?;
     let Storage { rows, columns, n_planes, bits, .. } = storage;
-    Ok(Samples { rows, columns, n_planes, bits, codes: storage.codes()? })
+    let codes = if storage.is_float {
+        Codes::Floats(storage.samples(0.0, unpack_floats)?)
+    } else {
+        Codes::Whole(storage.samples(0, unpack)?)
+    };
+    Ok(Samples { rows, columns, n_planes, bits, codes })
 }
 
 impl<'a> Storage<'a> {
@@ -67,12 +111,22 @@ impl<'a> Storage<'a> {
         if rows == 0 || columns == 0 || !(1..=4).contains(&n_planes) {
             return Err(format!("has {columns} × {rows} pixels of {n_planes} samples, expected some pixels of 1 to 4"));
         }
+        let formats = fields.whole(SAMPLE_FORMAT)?;
+        let is_float = formats.first() == Some(&FLOAT);
         let depth = match bits.first() {
-            Some(&depth) if (8..=16).contains(&depth) && bits.iter().all(|bits| *bits == depth) => depth as u32,
+            Some(&depth) if !is_float && (8..=16).contains(&depth) && bits.iter().all(|bits| *bits == depth) => {
+                depth as u32
+            }
+            Some(&depth) if is_float && [16, 24, 32].contains(&depth) && bits.iter().all(|bits| *bits == depth) => {
+                depth as u32
+            }
+            _ if is_float => {
+                return Err(format!("has floats of {bits:?} bits, expected 16, 24 or 32, the same for all planes"));
+            }
             _ => return Err(format!("has {bits:?} bits a sample, expected from 8 to 16, the same for all planes")),
         };
         for (tag, expected, what) in [
-            (SAMPLE_FORMAT, 1, "samples that are no whole numbers"),
+            (SAMPLE_FORMAT, if is_float { FLOAT } else { WHOLE }, "samples that are no whole numbers and no floats"),
             (PLANAR_CONFIGURATION, 1, "planes one after the other"),
             (ROW_INTERLEAVE_FACTOR, 1, "interleaved rows"),
             (COLUMN_INTERLEAVE_FACTOR, 1, "interleaved columns"),
@@ -82,11 +136,23 @@ impl<'a> Storage<'a> {
                 return Err(format!("has {what} (field {tag} is {other}), which is not read"));
             }
         }
-        if ![PLAIN, LOSSLESS_JPEG].contains(&compression) {
+        let is_deflated = DEFLATED.contains(&compression);
+        if ![PLAIN, LOSSLESS_JPEG].contains(&compression) && !is_deflated || (is_float && compression == LOSSLESS_JPEG)
+        {
+            let name = match compression {
+                34_892 => " (lossy JPEG)",
+                52_546 => " (JPEG XL)",
+                _ => "",
+            };
             return Err(format!(
-                "has compression {compression}, expected none (1) or lossless JPEG (7); a DNG converter makes such a file"
+                "has compression {compression}{name}, expected none (1), lossless JPEG (7) or deflate (8); a DNG converter makes such a file"
             ));
         }
+        if is_deflated && ![8, 16, 24, 32].contains(&depth) {
+            return Err(format!("has deflated samples of {depth} bits, expected 8, 16, 24 or 32"));
+        }
+        let predictor =
+            if is_deflated { Predictor::of(fields.one_or(PREDICTOR, 1)?, is_float)? } else { Predictor::None };
         let is_tiled = fields.has(TILE_WIDTH);
         let (tile_columns, tile_rows, places, counts) = if is_tiled {
             let (width, length) = (fields.one_or(TILE_WIDTH, 0)?, fields.one_or(TILE_LENGTH, 0)?);
@@ -111,13 +177,34 @@ impl<'a> Storage<'a> {
         };
         let blocks = places.iter().zip(&counts).take(n_blocks).map(block).collect::<Result<_, _>>()?;
         let bits = depth;
-        Ok(Self { file, compression, bits, n_planes, rows, columns, tile_rows, tile_columns, is_tiled, blocks })
+        Ok(Self {
+            file,
+            compression,
+            predictor,
+            is_float,
+            bits,
+            n_planes,
+            rows,
+            columns,
+            tile_rows,
+            tile_columns,
+            is_tiled,
+            blocks,
+        })
     }
 
-    fn codes(&self) -> Result<Vec<u16>, String> {
+    /// Reads all samples; `unpack` takes a row of a block's bytes apart.
+    fn samples<T: Copy + Send + Sync + From<u16>>(
+        &self,
+        none: T,
+        unpack: impl Fn(TiffReader<'_>, u32, &[u8], &mut [T]) + Sync,
+    ) -> Result<Vec<T>, String> {
         let line = self.columns * self.n_planes;
-        let bits_a_sample = if self.compression == PLAIN { self.bits as usize } else { 1 };
-        let n_samples = self.rows.checked_mul(line).filter(|n| n / 8 * bits_a_sample <= self.file.n_bytes());
+        let n_samples = self.rows.checked_mul(line).filter(|n| match self.compression {
+            PLAIN => n / 8 * self.bits as usize <= self.file.n_bytes(),
+            LOSSLESS_JPEG => n / 8 <= self.file.n_bytes(),
+            _ => n / MOST_DEFLATED <= self.file.n_bytes(),
+        });
         let Some(n_samples) = n_samples else {
             return Err(format!(
                 "states {} × {} pixels, more than its {} bytes can hold",
@@ -126,7 +213,7 @@ impl<'a> Storage<'a> {
                 self.file.n_bytes()
             ));
         };
-        let mut codes = vec![0; n_samples];
+        let mut codes = vec![none; n_samples];
         let n_across = self.columns.div_ceil(self.tile_columns);
         // One row of tiles after the other; the first reason counts, whatever the threads.
         let reasons: Vec<Result<(), String>> = codes
@@ -135,7 +222,7 @@ impl<'a> Storage<'a> {
             .map(|(rows, blocks)| {
                 let n_rows = rows.len() / line;
                 for (number, block) in blocks.iter().enumerate() {
-                    self.read_block(block, number * self.tile_columns, rows, n_rows)?;
+                    self.read_block(block, number * self.tile_columns, (&mut *rows, n_rows), &unpack)?;
                 }
                 Ok(())
             })
@@ -145,7 +232,13 @@ impl<'a> Storage<'a> {
     }
 
     /// Reads a strip or tile whose first column is given into the rows that it covers.
-    fn read_block(&self, block: &[u8], first: usize, rows: &mut [u16], n_rows: usize) -> Result<(), String> {
+    fn read_block<T: Copy + From<u16>>(
+        &self,
+        block: &[u8],
+        first: usize,
+        (rows, n_rows): (&mut [T], usize),
+        unpack: &impl Fn(TiffReader<'_>, u32, &[u8], &mut [T]),
+    ) -> Result<(), String> {
         let line = self.columns * self.n_planes;
         let stored_line = self.tile_columns * self.n_planes;
         let stored_rows = if self.is_tiled { self.tile_rows } else { n_rows };
@@ -157,38 +250,85 @@ impl<'a> Storage<'a> {
             let decoded =
                 lossless_jpeg::decode(block, n_stored).map_err(|reason| format!("has samples that {reason}"))?;
             // However many rows and components these are: the samples of a tile follow one another.
-            lines
-                .zip(decoded.samples.chunks_exact(stored_line))
-                .for_each(|(row, stored)| row.copy_from_slice(&stored[..n]));
+            lines.zip(decoded.samples.chunks_exact(stored_line)).for_each(|(row, stored)| {
+                row.iter_mut().zip(stored).for_each(|(sample, &code)| *sample = T::from(code));
+            });
             return Ok(());
         }
         let n_bytes = stored_line.checked_mul(self.bits as usize).ok_or("has tiles without end")?.div_ceil(8);
+        let block = self.inflated(block, n_bytes, stored_rows)?;
         if n_bytes.checked_mul(n_rows).is_none_or(|all| all > block.len()) {
             return Err(format!("has {} bytes in a strip or tile, expected {n_rows} rows of {n_bytes}", block.len()));
         }
-        lines.zip(block.chunks_exact(n_bytes)).for_each(|(row, stored)| self.unpack(stored, row));
+        lines.zip(block.chunks_exact(n_bytes)).for_each(|(row, stored)| unpack(self.file, self.bits, stored, row));
         Ok(())
     }
 
-    /// Unpacks a row: bytes, shorts, or bits of which the first are highest (DNG 1.4, `BitsPerSample`).
-    fn unpack(&self, stored: &[u8], row: &mut [u16]) {
-        match self.bits {
-            8 => row.iter_mut().zip(stored).for_each(|(code, &byte)| *code = u16::from(byte)),
-            16 => row.iter_mut().zip(stored.chunks_exact(2)).for_each(|(code, pair)| {
-                let pair = [pair[0], pair[1]];
-                *code = if self.file.is_big_endian() { u16::from_be_bytes(pair) } else { u16::from_le_bytes(pair) };
-            }),
-            bits => {
-                let (mut held, mut n_held, mut bytes) = (0_u32, 0, stored.iter());
-                for code in row {
-                    while n_held < bits {
-                        held = held << 8 | u32::from(bytes.next().copied().unwrap_or(0));
-                        n_held += 8;
-                    }
-                    n_held -= bits;
-                    *code = (held >> n_held & ((1 << bits) - 1)) as u16;
+    /// Returns the bytes of a block of so many rows of bytes as they would stand in a plain one.
+    fn inflated<'b>(&self, block: &'b [u8], n_bytes: usize, n_rows: usize) -> Result<Cow<'b, [u8]>, String> {
+        if !DEFLATED.contains(&self.compression) {
+            return Ok(Cow::Borrowed(block));
+        }
+        let wanted = n_bytes.checked_mul(n_rows).ok_or("has tiles without end")?;
+        let mut bytes = Vec::new();
+        let limit = (wanted as u64).min((block.len() as u64).saturating_mul(MOST_DEFLATED as u64));
+        ZlibDecoder::new(block)
+            .take(limit)
+            .read_to_end(&mut bytes)
+            .map_err(|error| format!("has deflated samples that cannot be read: {error}"))?;
+        for row in bytes.chunks_exact_mut(n_bytes) {
+            self.predictor.undo(row, self.bits as usize / 8, self.n_planes, self.file.is_big_endian());
+        }
+        Ok(Cow::Owned(bytes))
+    }
+}
+
+/// Unpacks a row of whole numbers: bytes, shorts, or bits of which the first are highest (DNG 1.4, `BitsPerSample`).
+fn unpack(file: TiffReader<'_>, bits: u32, stored: &[u8], row: &mut [u16]) {
+    match bits {
+        8 => row.iter_mut().zip(stored).for_each(|(code, &byte)| *code = u16::from(byte)),
+        16 => row.iter_mut().zip(stored.chunks_exact(2)).for_each(|(code, pair)| {
+            let pair = [pair[0], pair[1]];
+            *code = if file.is_big_endian() { u16::from_be_bytes(pair) } else { u16::from_le_bytes(pair) };
+        }),
+        bits => {
+            let (mut held, mut n_held, mut bytes) = (0_u32, 0, stored.iter());
+            for code in row {
+                while n_held < bits {
+                    held = held << 8 | u32::from(bytes.next().copied().unwrap_or(0));
+                    n_held += 8;
                 }
+                n_held -= bits;
+                *code = (held >> n_held & ((1 << bits) - 1)) as u16;
             }
         }
+    }
+}
+
+/// Unpacks a row of floats: IEEE 754 of 16 and 32 bits, and of 24 with an exponent of 7 (DNG 1.4, chapter 2); what is not finite is 0.
+fn unpack_floats(file: TiffReader<'_>, bits: u32, stored: &[u8], row: &mut [f32]) {
+    let n = bits as usize / 8;
+    for (value, bytes) in row.iter_mut().zip(stored.chunks_exact(n)) {
+        let digits = |sum: u32, byte: &u8| sum << 8 | u32::from(*byte);
+        let word = if file.is_big_endian() { bytes.iter().fold(0, digits) } else { bytes.iter().rev().fold(0, digits) };
+        let float = match bits {
+            16 => small_float(word, 5, 10),
+            24 => small_float(word, 7, 16),
+            _ => f32::from_bits(word),
+        };
+        *value = if float.is_finite() { float } else { 0.0 };
+    }
+}
+
+/// Returns a float of a sign, so many bits of exponent and so many of fraction.
+fn small_float(word: u32, exponent_bits: u32, fraction_bits: u32) -> f32 {
+    let exponent = (word >> fraction_bits & ((1 << exponent_bits) - 1)) as i32;
+    let fraction = (word & ((1 << fraction_bits) - 1)) as f32 / (1_u32 << fraction_bits) as f32;
+    let bias = (1 << (exponent_bits - 1)) - 1;
+    let sign = if word >> (exponent_bits + fraction_bits) & 1 == 1 { -1.0 } else { 1.0 };
+    match exponent {
+        0 => sign * fraction * 2.0_f32.powi(1 - bias),
+        all if all == (1 << exponent_bits) - 1 => f32::NAN,
+        exponent => sign * (1.0 + fraction) * 2.0_f32.powi(exponent - bias),
     }
 }

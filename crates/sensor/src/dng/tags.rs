@@ -63,6 +63,7 @@ pub(super) const TILE_WIDTH: u16 = 322;
 pub(super) const TILE_LENGTH: u16 = 323;
 pub(super) const TILE_OFFSETS: u16 = 324;
 pub(super) const TILE_BYTE_COUNTS: u16 = 325;
+pub(super) const PREDICTOR: u16 = 317;
 pub(super) const SAMPLE_FORMAT: u16 = 339;
 pub(super) const BLACK_LEVEL_REPEAT_DIM: u16 = 50713;
 pub(super) const BLACK_LEVEL_DELTA_H: u16 = 50715;

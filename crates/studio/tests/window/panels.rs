@@ -7,7 +7,7 @@ use dioptric_pipeline::{
     LensSpec, LightPaths, Photodiodes, RenderEffort, SceneSource, SceneSpec, StopSpec, SurfaceChange, WavelengthSpec,
     WorldSpec, with_exposure_s,
 };
-use dioptric_scene::Pattern;
+use dioptric_scene::{Pattern, Wave};
 use dioptric_sensor::{Brightness, ColorCorrection, LensShading, ToneCurve};
 use dioptric_spectrum::Illuminant;
 use dioptric_studio::{
@@ -128,6 +128,27 @@ const PANELS: &[(&str, &[&str])] = &[
     ("darkest leaf", &["Pattern.DeadLeaves.min_reflectance"]),
     ("lightest leaf", &["Pattern.DeadLeaves.max_reflectance"]),
     ("leaf seed", &["Pattern.DeadLeaves.seed"]),
+    ("waves", &["Pattern.Harmonics", "Pattern.Harmonics.waves"]),
+    ("wave cycles", &["Wave.cycles"]),
+    (
+        "pattern contrast",
+        &["Wave.contrast", "Pattern.Sweep.contrast", "Pattern.ZonePlate.contrast", "Pattern.Noise.contrast"],
+    ),
+    ("phase", &["Wave.phase_deg"]),
+    ("wave turned", &["Wave.angle_deg", "Pattern.Gabor.wave"]),
+    ("window", &["Pattern.Gabor", "Pattern.Gabor.sigma"]),
+    ("turned", &["Pattern.Lines", "Pattern.Lines.angle_deg"]),
+    ("lines apart", &["Pattern.Lines.spacing_px", "Pattern.Grid", "Pattern.Grid.spacing_px"]),
+    ("line width", &["Pattern.Lines.width_px", "Pattern.Grid.width_px"]),
+    ("first cycles", &["Pattern.Sweep", "Pattern.Sweep.first_cycles"]),
+    ("last cycles", &["Pattern.Sweep.last_cycles"]),
+    ("edge cycles", &["Pattern.ZonePlate", "Pattern.ZonePlate.edge_cycles"]),
+    ("steps", &["Pattern.Ramp", "Pattern.Ramp.steps"]),
+    ("ratio", &["Pattern.Ramp.ratio"]),
+    ("words", &["Pattern.Letters", "Pattern.Letters.text"]),
+    ("capitals", &["Pattern.Letters.height_px"]),
+    ("cell", &["Pattern.Noise", "Pattern.Noise.cell_px"]),
+    ("noise seed", &["Pattern.Noise.seed"]),
     ("path", &["SceneSource.File", "SceneSource.World", "WorldSpec.file"]),
     ("field of view", &["SceneSpec.field_of_view_deg"]),
     ("depth", &["SceneSpec.depth_m"]),
@@ -167,6 +188,7 @@ const PANELS: &[(&str, &[&str])] = &[
 const TEXT: &[(&str, &str)] = &[
     ("Camera.border", "a detail of blurs at the rim, written in the text of the camera file"),
     ("Camera.chip_seed", "which chip of a make it is, written in the text of the camera file"),
+    ("Panorama", "which way a panorama is looked at, written in the text of the camera file"),
     ("Metering.EachFilter", "a share for each filter, written in the text of the camera file"),
     ("WorldSpec.view", "places and directions in the world's own units, written in the text of the camera file"),
     ("WorldSpec.sky", "as above"),
@@ -224,10 +246,11 @@ fn cameras() -> Vec<Camera> {
     };
     let target = |pattern: Pattern| {
         with(&move |camera| {
-            camera.scene.source = SceneSource::Target { pattern, columns: 60, rows: 40 };
+            camera.scene.source = SceneSource::Target { pattern: pattern.clone(), columns: 60, rows: 40 };
             (camera.scene.depth_m, camera.scene.field_of_view_deg) = (Some(2.0), Some(36.0));
         })
     };
+    let wave = Wave { cycles: 5.0, contrast: 0.5, phase_deg: 10.0, angle_deg: 10.0 };
     vec![
         with(&everything),
         with(&otherwise),
@@ -255,6 +278,15 @@ fn cameras() -> Vec<Camera> {
             max_reflectance: 0.75,
             seed: 1,
         }),
+        target(Pattern::Harmonics { waves: vec![wave] }),
+        target(Pattern::Gabor { wave, sigma: 0.2 }),
+        target(Pattern::Lines { spacing_px: 10.0, width_px: 2.0, angle_deg: 10.0 }),
+        target(Pattern::Grid { spacing_px: 10.0, width_px: 2.0 }),
+        target(Pattern::Sweep { first_cycles: 2.0, last_cycles: 10.0, contrast: 0.5 }),
+        target(Pattern::ZonePlate { edge_cycles: 10.0, contrast: 0.5 }),
+        target(Pattern::Ramp { steps: 5, ratio: Some(10.0) }),
+        target(Pattern::Letters { text: "A".to_owned(), height_px: 10.0 }),
+        target(Pattern::Noise { cell_px: 2, contrast: 0.5, seed: 1 }),
     ]
 }
 

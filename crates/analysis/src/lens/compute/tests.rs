@@ -307,8 +307,8 @@ fn afocal_lens_is_analyzed_by_angles() {
     let telescope = Lens::new("telescope", "test", vec![front, back], 0).unwrap();
     let request = AnalysisRequest { wavelengths_nm: vec![550.0], ..request(vec![0.0, 1.0]) };
     let analysis = request.compute(&telescope).unwrap();
-    assert!(analysis.notes.iter().any(|note| note.contains("1 µm is 0.01 mrad")), "{:?}", analysis.notes);
+    assert!(analysis.notes.iter().any(|note| note.contains("1 µm is 1 µrad")), "{:?}", analysis.notes);
     let height_mm = analysis.spots[1].height_mm.unwrap();
-    assert!((height_mm.abs() - 500.0 * 1_f64.to_radians().tan()).abs() < 1e-6, "{height_mm}");
+    assert!((height_mm.abs() - 5000.0 * 1_f64.to_radians().tan()).abs() < 1e-6, "{height_mm}");
     assert!(analysis.spots.iter().all(|spot| spot.rms_um.unwrap() < 1e-3));
 }

@@ -1,4 +1,4 @@
-//! The arrays of a MATLAB file of version 5 to 7: "MAT-File Format", The `MathWorks`, chapter 1.
+//! The arrays of a MATLAB file of version 5 to 7: "MAT-File Format", The `MathWorks`, chapter 1; and those of HDF5.
 //!
 //! Little- and big-endian, compressed or not. Memory: the file, what its wanted variables are inflated to, which deflate bounds
 //! by 1032 times their part of the file, and at most a million arrays of structures.
@@ -7,15 +7,15 @@ use std::{fs::File, io::Read, path::Path};
 
 use flate2::read::ZlibDecoder;
 
-use super::super::unusable::{check_memory, unreadable};
+use super::{
+    super::unusable::{check_memory, unreadable},
+    elements::{LIMIT_ARRAYS, LIMIT_DEPTH, Listed},
+    hdf5::Hdf5,
+};
 use crate::SceneError;
 
 /// Deflate cannot shrink more than 1032 times; a header that says otherwise lies.
 const LIMIT_RATIO: u64 = 1040;
-/// Structures within each other.
-const LIMIT_DEPTH: usize = 32;
-/// Arrays of all structures of a variable.
-const LIMIT_ARRAYS: usize = 1_000_000;
 /// What is inflated of a variable to learn its name.
 const PEEK_BYTES: usize = 512;
 
@@ -27,19 +27,12 @@ const COMPRESSED: u32 = 15;
 #[derive(Debug)]
 pub(super) struct MatFile {
     is_big_endian: bool,
+    /// Whether the last index of its arrays is the fastest: those of HDF5 that MATLAB did not write.
+    pub(super) is_row_major: bool,
     /// Each variable with the content of its element.
     variables: Vec<(String, Vec<u8>)>,
     /// All variables of the file.
     pub(super) listed: Vec<Listed>,
-}
-
-/// What is known of a variable without its content.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct Listed {
-    pub(super) name: String,
-    pub(super) sides: Vec<usize>,
-    /// Whether it is an array of real numbers.
-    pub(super) is_numeric: bool,
 }
 
 /// An array: its sides, and what it holds.
@@ -80,24 +73,37 @@ impl MatFile {
         check_memory(path, length, length)?;
         let mut bytes = Vec::new();
         file.read_to_end(&mut bytes).map_err(|error| unreadable(path, error))?;
+        if is_hdf5(&bytes) {
+            return Self::of_hdf5(path, bytes, wanted);
+        }
         // A broken file is named by what reads it. Single floats are made of the inflated numbers while those are there.
         let inflated = wanted_bytes(&bytes, wanted).unwrap_or(0);
         check_memory(path, length.saturating_add(inflated.saturating_mul(2)), length)?;
         Self::parse(&bytes, wanted).map_err(|reason| unreadable(path, reason))
     }
 
-    fn parse(bytes: &[u8], wanted: &dyn Fn(&Listed) -> bool) -> Result<Self, String> {
-        if bytes.starts_with(b"MATLAB 7.3") || bytes.starts_with(b"\x89HDF") {
-            return Err(
-                "it is a MATLAB file of version 7.3 (HDF5), expected version 5 to 7: save it with '-v7' in MATLAB, or \
-                        convert it by scripts/mat73_to_mat7.py"
-                    .to_owned(),
-            );
+    fn of_hdf5(path: &Path, bytes: Vec<u8>, wanted: &dyn Fn(&Listed) -> bool) -> Result<Self, SceneError> {
+        let wrong = |reason: String| unreadable(path, reason);
+        let length = bytes.len() as u64;
+        let file = Hdf5::open(bytes).map_err(wrong)?;
+        let entries = file.entries().map_err(wrong)?;
+        let chosen: Vec<_> = entries.iter().filter(|entry| wanted(&entry.listed)).collect();
+        // Numbers as they are read, and as bytes.
+        let n_bytes = chosen.iter().map(|entry| entry.n_bytes).fold(0, u64::saturating_add);
+        check_memory(path, length.saturating_add(n_bytes.saturating_mul(2)), length)?;
+        let mut variables = vec![];
+        for entry in chosen {
+            variables.push((entry.listed.name.clone(), file.element(entry).map_err(wrong)?));
         }
+        let listed = entries.into_iter().map(|entry| entry.listed).collect();
+        Ok(Self { is_big_endian: false, is_row_major: !file.is_matlab, variables, listed })
+    }
+
+    fn parse(bytes: &[u8], wanted: &dyn Fn(&Listed) -> bool) -> Result<Self, String> {
         let is_big_endian = match bytes.get(126..128) {
             Some(b"IM") => false,
             Some(b"MI") => true,
-            _ => return Err("it is no MATLAB file of version 5 to 7".to_owned()),
+            _ => return Err("it is no MATLAB file of version 5 to 7.3".to_owned()),
         };
         let mut rest = Elements { bytes: &bytes[128..], is_big_endian };
         let (mut variables, mut listed): (Vec<(String, Vec<u8>)>, _) = (Vec::new(), Vec::new());
@@ -115,7 +121,7 @@ impl MatFile {
             variables.extend(content.map(|content| (own.name.clone(), content)));
             listed.push(own);
         }
-        Ok(Self { is_big_endian, variables, listed })
+        Ok(Self { is_big_endian, is_row_major: false, variables, listed })
     }
 
     /// Returns a variable, or `None` where the file has none of this name.
@@ -191,6 +197,11 @@ impl Numbers<'_> {
             _ => u64::from_le_bytes(little) as f64,
         }
     }
+}
+
+/// Whether a file is HDF5, which a MATLAB file of version 7.3 is behind its first 512 bytes.
+fn is_hdf5(bytes: &[u8]) -> bool {
+    bytes.starts_with(b"MATLAB 7.3") || bytes.starts_with(b"\x89HDF")
 }
 
 /// Returns what the variables of a file whose names are wanted are inflated to, bytes.

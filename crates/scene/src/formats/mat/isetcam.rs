@@ -17,7 +17,8 @@ use super::{
         stated::note_of,
         unusable::unreadable,
     },
-    container::{Content, Listed, MatArray, MatFile},
+    container::{Content, MatArray, MatFile},
+    elements::Listed,
 };
 use crate::{SceneError, SceneLight};
 
@@ -25,7 +26,7 @@ use crate::{SceneError, SceneLight};
 const WANTED: [&str; 10] =
     ["scene", "mcCOEF", "basis", "imgMean", "photons", "wave", "wavelength", "illuminant", "fov", "depthMap"];
 /// Names of the list of wavelengths beside a cube, nm.
-const WAVES: [&str; 9] =
+pub(in super::super) const WAVES: [&str; 9] =
     ["wave", "wavelength", "wavelengths", "wavelengths_nm", "waves", "lambda", "bands", "wl", "wlens"];
 /// The most that reflectances are, and the least that photons of any lit scene are.
 const MOST_REFLECTANCE: f64 = 10.0;
@@ -90,7 +91,7 @@ pub(in super::super) struct IsetScene {
     pub(in super::super) notes: Vec<String>,
 }
 
-/// Reads a MATLAB file of version 5 to 7: an `ISETCam` scene, or a cube of numbers.
+/// Reads a MATLAB or HDF5 file: an `ISETCam` scene, or a cube of numbers.
 ///
 /// A scene is a structure `scene` (`data.photons`, `spectrum.wave`, and as far as they are there `wAngular`, `depthMap`, `distance`,
 /// `illuminant`), or variables: `mcCOEF` and `basis` (the product of coefficients and basis functions, to which `imgMean` is
@@ -103,7 +104,7 @@ pub(in super::super) struct IsetScene {
 pub(in super::super) fn read_mat(path: &Path, reading: &FileReading) -> Result<MatScene, SceneError> {
     let told = reading.variable.as_deref();
     let is_cube = |own: &Listed| own.is_numeric && own.sides.len() == 3;
-    let is_list = |own: &Listed| WAVES.contains(&own.name.as_str()) && own.is_numeric;
+    let is_list = |own: &Listed| WAVES.contains(&last_part(&own.name)) && own.is_numeric;
     let wanted = |own: &Listed| {
         let name = own.name.as_str();
         WANTED.contains(&name) || name == "dist" || told == Some(name) || is_cube(own) || is_list(own)
@@ -126,7 +127,11 @@ pub(in super::super) fn read_mat(path: &Path, reading: &FileReading) -> Result<M
             return Ok(MatScene::Iset(scene));
         }
     }
-    let cubes: Vec<&str> = file.listed.iter().filter(|own| is_cube(own)).map(|own| own.name.as_str()).collect();
+    let mut cubes: Vec<&str> = file.listed.iter().filter(|own| is_cube(own)).map(|own| own.name.as_str()).collect();
+    if cubes.len() > 1 {
+        // A picture of the cube, for people to look at.
+        cubes.retain(|own| !last_part(own).eq_ignore_ascii_case("rgb"));
+    }
     let name = match told {
         Some(told) if has(told) => told,
         Some(told) => {
@@ -145,14 +150,22 @@ pub(in super::super) fn read_mat(path: &Path, reading: &FileReading) -> Result<M
     cube_of(path, &file, name, reading).map_err(wrong).map(MatScene::Cube)
 }
 
+/// Returns the name of an array without the groups that it is in.
+fn last_part(path: &str) -> &str {
+    path.rsplit('/').next().unwrap_or(path)
+}
+
 /// Returns a variable as a cube of plain numbers.
 fn cube_of(path: &Path, file: &MatFile, name: &str, reading: &FileReading) -> Result<NumberCube, String> {
     let array = file.array(name)?.ok_or_else(|| format!("it has no variable '{name}'"))?;
     let numbers = array.numbers().map_err(|what| format!("its '{name}' is {what}, expected numbers"))?;
     let mut waves = None;
-    for list in WAVES.iter().filter(|list| **list != name) {
-        if let Some(numbers) = file.array(list)?.and_then(|array| array.list()).filter(|list| !list.is_empty()) {
-            waves = Some(((*list).to_owned(), numbers));
+    for list in WAVES {
+        let Some(own) = file.listed.iter().find(|own| last_part(&own.name) == list && own.name != name) else {
+            continue;
+        };
+        if let Some(numbers) = file.array(&own.name)?.and_then(|array| array.list()).filter(|list| !list.is_empty()) {
+            waves = Some((own.name.clone(), numbers));
             break;
         }
     }
@@ -165,7 +178,9 @@ fn cube_of(path: &Path, file: &MatFile, name: &str, reading: &FileReading) -> Re
         });
     let own = waves.as_ref().map(|(_, list)| list.clone()).or(known);
     let n_bands = reading.wavelengths_nm.as_ref().or(own.as_ref()).map(Vec::len);
-    let planes = axes::planes(&array.sides, reading.axes.as_deref(), n_bands, false, |index| numbers.at(index) as f32)?;
+    let planes = axes::planes(&array.sides, reading.axes.as_deref(), n_bands, file.is_row_major, |index| {
+        numbers.at(index) as f32
+    })?;
     let used = |own: &str| own == name || waves.as_ref().is_some_and(|(list, _)| list == own);
     let unused: Vec<String> = file.listed.iter().map(|own| own.name.clone()).filter(|own| !used(own)).collect();
     let mut notes: Vec<String> = note_of(path, "variable", &unused).into_iter().collect();

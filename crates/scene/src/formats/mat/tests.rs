@@ -49,7 +49,8 @@ const SINGLE: f64 = 1e9;
 
 #[test]
 fn a_scene_structure_is_read() {
-    for name in ["iset_scene.mat", "iset_plain.mat"] {
+    // The last is of version 7.3, HDF5.
+    for name in ["iset_scene.mat", "iset_plain.mat", "iset_scene_v73.mat"] {
         let scene = read(name);
         check_photons(&scene, SINGLE);
         assert_eq!((scene.horizontal_fov_deg, scene.distance_m), (Some(30.0), Some(1.2)));
@@ -98,6 +99,36 @@ fn distances_become_depths_of_the_view() {
     let raw = read_scene(&fixture("iset_raw.mat"), &ReadOptions::default()).unwrap();
     assert_eq!(raw.require_depth().unwrap().range_m(), (3.0, 3.0));
     assert_eq!(raw.name, "iset_raw.mat");
+}
+
+#[test]
+fn a_written_scene_comes_back() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("again.mat");
+    let scene = read_scene(&fixture("iset_scene.mat"), &ReadOptions::default()).unwrap();
+    write_iset_scene(&path, &scene).unwrap();
+    let again = read_scene(&path, &ReadOptions::default()).unwrap();
+    assert_eq!(again.radiance.grid(), scene.radiance.grid());
+    for (found, expected) in again.radiance.planes().iter().zip(scene.radiance.planes()) {
+        // Photons and energy in single precision.
+        found.iter().zip(expected).for_each(|(a, b)| assert_relative_eq!(a, b, max_relative = 3e-7));
+    }
+    for (found, expected) in again.require_depth().unwrap().z_m().iter().zip(scene.require_depth().unwrap().z_m()) {
+        assert_relative_eq!(found, expected, max_relative = 3e-7);
+    }
+    let (found, expected) = (again.require_view().unwrap(), scene.require_view().unwrap());
+    assert_relative_eq!(found.focal_px, expected.focal_px, max_relative = 1e-12);
+    let white = |scene: &crate::Scene| {
+        let light = scene.light.clone().unwrap();
+        light.illuminant.white_radiance(scene.radiance.grid(), light.illuminance_lux.unwrap())
+    };
+    white(&again).iter().zip(white(&scene)).for_each(|(a, b)| assert_relative_eq!(*a, b, max_relative = 1e-9));
+    assert_eq!(again.notes.len(), 1, "{:?}", again.notes);
+    // What the format cannot hold is refused, and no file is left.
+    let off_axis = scene.cropped(0..4, 0..3).unwrap();
+    let path = folder.path().join("part.mat");
+    assert!(write_iset_scene(&path, &off_axis).unwrap_err().to_string().contains("axis"));
+    assert!(!path.exists());
 }
 
 /// Writes an element: its tag, its content and what fills it up to a multiple of 8 bytes, big-endian.
@@ -151,7 +182,8 @@ fn other_files_are_refused_in_a_sentence() {
     let good = fs::read(fixture("iset_plain.mat")).unwrap();
     check_refused(b"", "no MATLAB file");
     check_refused(&[b' '; 500], "no MATLAB file");
-    check_refused(&fs::read(fixture("iset_scene_v73.mat")).unwrap(), "version 7.3");
+    let new = fs::read(fixture("iset_scene_v73.mat")).unwrap();
+    check_refused(&new[..new.len() / 2], "HDF5 that cannot be read");
     check_refused(&good[..good.len() / 2], "truncated");
     check_refused(&good[..128], "no scene");
     // Twice the bands that the photons have.

@@ -11,6 +11,7 @@ mod scene;
 mod sensor;
 mod simulation;
 mod surfaces;
+mod target;
 mod world;
 
 use std::cell::Cell;

@@ -2,14 +2,18 @@
 
 use std::path::{Path, PathBuf};
 
-use dioptric_pipeline::{Camera, FillDepth, FlatSize, SceneSource, SceneSpec, WorldSpec, light_word, parse_illuminant};
+use dioptric_pipeline::{
+    Camera, FileReading, FillDepth, FlatSize, SceneSource, SceneSpec, WorldSpec, light_word, parse_illuminant,
+};
 use dioptric_scene::Pattern;
 use dioptric_spectrum::Illuminant;
 use egui::{CollapsingHeader, Ui};
 
 use super::{
-    super::fields::{NumberField, choice, count, meaning, optional, text, tick, variant},
-    Desk, path, world,
+    super::fields::{NumberField, choice, count, meaning, optional, text, tick},
+    Desk, path,
+    target::target,
+    world,
 };
 use crate::engine::Field;
 
@@ -156,70 +160,6 @@ fn size(ui: &mut Ui, columns: &mut usize, rows: &mut usize) {
     count(ui, "scene height", "Rows of samples of the scene", 1..=8192, rows);
 }
 
-fn target(ui: &mut Ui, pattern: &mut Pattern) {
-    let all = [
-        (Pattern::Uniform, "uniform"),
-        (Pattern::Checkerboard { check_px: 40 }, "checkerboard"),
-        (Pattern::SlantedBar { slope: 0.0875 }, "slanted edge"),
-        (Pattern::RadialLines { n_lines: 12 }, "radial lines"),
-        (Pattern::PointArray { spacing_px: 60 }, "points"),
-        (Pattern::SiemensStar { n_cycles: 36 }, "Siemens star"),
-        (Pattern::ColorChart, "color chart"),
-        (
-            Pattern::DeadLeaves {
-                min_radius_px: 1.0,
-                max_radius_px: 100.0,
-                min_reflectance: 0.25,
-                max_reflectance: 0.75,
-                seed: 1,
-            },
-            "dead leaves",
-        ),
-    ];
-    variant(ui, "pattern", "What is drawn on the target", pattern, &all);
-    let whole = |ui: &mut Ui, title: &str, words: &str, value: &mut usize| {
-        count(ui, title, words, 1..=4096, value);
-    };
-    match pattern {
-        Pattern::Uniform | Pattern::ColorChart => {}
-        Pattern::Checkerboard { check_px } => whole(ui, "check", "Side of a square, samples", check_px),
-        Pattern::SlantedBar { slope } => {
-            let words = "Rows a column along the edge: 0.0875 is 5° from upright";
-            NumberField::even("slope", "", -1.0..=1.0, -0.3..=0.3, words).show(ui, slope);
-        }
-        Pattern::RadialLines { n_lines } => whole(ui, "lines", "Whole lines; 8 give 16 rays", n_lines),
-        Pattern::PointArray { spacing_px } => whole(ui, "points apart", "From point to point, samples", spacing_px),
-        Pattern::SiemensStar { n_cycles } => whole(ui, "cycles", "Pairs of sectors once around", n_cycles),
-        Pattern::DeadLeaves { min_radius_px, max_radius_px, min_reflectance, max_reflectance, seed } => {
-            // A field that is set beyond the other end of its range takes that along.
-            let words = "Radius of the smallest discs, samples";
-            if NumberField::by_factors("smallest leaf", "", 0.1..=5e5, 0.3..=30.0, words).show(ui, min_radius_px)
-                && *min_radius_px >= *max_radius_px
-            {
-                *max_radius_px = 2.0 * *min_radius_px;
-            }
-            let words = "Radius of the largest discs, samples";
-            if NumberField::by_factors("largest leaf", "", 0.2..=1e6, 10.0..=1000.0, words).show(ui, max_radius_px)
-                && *min_radius_px >= *max_radius_px
-            {
-                *min_radius_px = 0.5 * *max_radius_px;
-            }
-            let words = "What the darkest discs reflect, as a share of white";
-            if NumberField::even("darkest leaf", "", 0.0..=1.0, 0.0..=1.0, words).show(ui, min_reflectance) {
-                *max_reflectance = max_reflectance.max(*min_reflectance);
-            }
-            let words = "What the lightest discs reflect, as a share of white";
-            if NumberField::even("lightest leaf", "", 0.0..=1.0, 0.0..=1.0, words).show(ui, max_reflectance) {
-                *min_reflectance = min_reflectance.min(*max_reflectance);
-            }
-            let mut number = *seed as usize;
-            if count(ui, "leaf seed", "The same seed, the same discs", 0..=1_000_000, &mut number) {
-                *seed = number as u64;
-            }
-        }
-    }
-}
-
 fn kind_of(source: &SceneSource) -> Kind {
     match source {
         SceneSource::StillLife { .. } => Kind::StillLife,
@@ -243,6 +183,7 @@ fn change_kind(camera: &mut Camera, kind: Kind) {
     };
     if kind != Kind::File {
         (scene.light, scene.white_level, scene.fill_depth, scene.hidden) = (None, None, None, None);
+        scene.reading = FileReading::default();
     }
     scene.source = match kind {
         Kind::StillLife => SceneSource::StillLife { columns, rows },

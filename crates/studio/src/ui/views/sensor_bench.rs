@@ -48,7 +48,8 @@ fn transfer(ui: &mut Ui, noise: &NoiseData, width: f32) {
         let points: PlotPoints<'_> = noise.points.iter().map(|point| [point.mean_dn, point.variance_dn2]).collect();
         plot.points(Points::new("photon transfer", points).color(LINES[0]).radius(3.0).shape(MarkerShape::Circle));
         if let Some(dark) = noise.points.first() {
-            let top_dn = dark.mean_dn + noise.gain_dn_per_e * noise.saturation_e;
+            let brightest = noise.points.iter().map(|point| point.electrons).fold(0.0, f64::max);
+            let top_dn = dark.mean_dn + noise.gain_dn_per_e * noise.saturation_e.unwrap_or(brightest);
             let line = |mean_dn: f64| [mean_dn, dark.variance_dn2 + noise.gain_dn_per_e * (mean_dn - dark.mean_dn)];
             let points: PlotPoints<'_> = [dark.mean_dn, top_dn].map(line).into_iter().collect();
             plot.line(Line::new("shot noise alone", points).color(LINES[1]));
@@ -71,16 +72,20 @@ fn signal_to_noise(ui: &mut Ui, noise: &NoiseData, width: f32) {
 }
 
 fn summary(noise: &NoiseData) -> String {
-    format!(
-        "{}: gain {} DN/e⁻, dark noise {} e⁻, saturation {} e⁻, dynamic range {:.1} dB ({:.1} stops), largest signal over noise {:.1} dB",
+    let electrons =
+        |value: Option<f64>| value.map_or_else(|| "not measured".to_owned(), |e| format!("{} e⁻", three(e)));
+    let decibels = |value: Option<f64>| value.map_or_else(|| "not measured".to_owned(), |db| format!("{db:.1} dB"));
+    let numbers = format!(
+        "{}: gain {} DN/e⁻, dark noise {}, saturation {}, dynamic range {}{}, largest signal over noise {}",
         noise.source,
         three(noise.gain_dn_per_e),
-        three(noise.dark_noise_e),
-        three(noise.saturation_e),
-        noise.dynamic_range_db,
-        noise.dynamic_range_stops,
-        noise.max_snr_db,
-    )
+        electrons(noise.dark_noise_e),
+        electrons(noise.saturation_e),
+        decibels(noise.dynamic_range_db),
+        noise.dynamic_range_stops.map_or_else(String::new, |stops| format!(" ({stops:.1} stops)")),
+        decibels(noise.max_snr_db),
+    );
+    std::iter::once(numbers).chain(noise.notes.iter().cloned()).collect::<Vec<_>>().join("\n")
 }
 
 fn edge_view(ui: &mut Ui, edge: Option<&Result<EdgeResponse, String>>) {

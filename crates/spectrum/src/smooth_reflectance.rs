@@ -6,19 +6,23 @@
 
 use std::sync::OnceLock;
 
-use dioptric_spectrum::{Illuminant, Observer, Spectrum, WavelengthGrid, Xyz};
 use rayon::prelude::*;
 
-/// The smooth reflectance of a color.
+use crate::{Illuminant, Observer, WavelengthGrid, Xyz};
+
+/// The smooth reflectance of a color: one lift for photographs and textures.
+///
+/// It was fitted from 380 to 780 nm; beyond, the parabola goes on, which says nothing of what a thing reflects there.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct SmoothReflectance {
+pub struct SmoothReflectance {
     /// Of the parabola in (λ − 550 nm) / 200 nm, the constant first.
     c: [f32; 3],
     scale: f32,
 }
 
 impl SmoothReflectance {
-    pub(crate) fn at<const N: usize>(&self, wavelengths_nm: &[f32; N]) -> [f32; N] {
+    /// Returns the reflectance at wavelengths, nm.
+    pub fn at<const N: usize>(&self, wavelengths_nm: &[f32; N]) -> [f32; N] {
         let [c0, c1, c2] = self.c;
         wavelengths_nm.map(|wavelength_nm| {
             let s = (wavelength_nm - 550.0) * (1.0 / 200.0);
@@ -29,7 +33,9 @@ impl SmoothReflectance {
     }
 
     /// Returns the reflectance of a linear sRGB color, clamped to [0, 1]; grays are flat.
-    pub(crate) fn of_rgb(rgb: [f32; 3]) -> Self {
+    ///
+    /// Of the whole cube of colors it comes back under D65 within 0.02, and within 0.004 on average.
+    pub fn of_rgb(rgb: [f32; 3]) -> Self {
         let rgb = rgb.map(|v| if v.is_nan() { 0.0 } else { v.clamp(0.0, 1.0) });
         let [r, g, b] = rgb;
         if r == g && g == b {
@@ -37,15 +43,6 @@ impl SmoothReflectance {
         }
         Table::get().look_up(rgb)
     }
-}
-
-/// D65 whose mean, weighted by the photopic sensitivity, is 1.
-pub(crate) fn d65_of_unit_mean() -> Spectrum {
-    let d65 = Illuminant::D65.spectrum();
-    let fine = WavelengthGrid::uniform(360.0, 830.0, 1.0).expect("a valid range");
-    let luminance = |spectrum: &Spectrum| Observer::Cie1931.xyz(&fine, &spectrum.sample_held(&fine)).luminance_cd_m2();
-    let even = luminance(&Spectrum::constant(1.0));
-    d65.scaled(even / luminance(&d65))
 }
 
 /// Coefficients over the colors: by which channel is largest, its value, and the other two in proportion to it.
@@ -208,7 +205,6 @@ impl Fit {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::SpectralCurve;
 
     fn seen(smooth: &SmoothReflectance) -> [f64; 3] {
         let fit = Fit::new();
@@ -246,15 +242,5 @@ mod tests {
         }
         let almost = SmoothReflectance::of_rgb([1.0, 1.0, 0.999]).at(&[450.0, 600.0]);
         assert!(almost.iter().all(|&v| v > 0.97), "{almost:?}");
-    }
-
-    #[test]
-    fn unit_light_is_as_bright_as_an_even_one() {
-        let light = SpectralCurve::from_rgb_light([1.0; 3]);
-        let grid = WavelengthGrid::uniform(380.0, 780.0, 1.0).unwrap();
-        let values: Vec<f64> = grid.centers_nm().iter().map(|&w| f64::from(light.at(&[w as f32])[0])).collect();
-        let luminance = Observer::Cie1931.xyz(&grid, &values).luminance_cd_m2();
-        // 683 lm/W times the area under the sensitivity, 106.857 nm.
-        assert!((luminance / (683.002 * 106.857) - 1.0).abs() < 1e-3, "{luminance}");
     }
 }

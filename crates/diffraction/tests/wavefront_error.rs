@@ -1,0 +1,101 @@
+//! Lenses that are an ideal lens with a wavefront error, against what the error says.
+#![expect(clippy::unwrap_used, reason = "a helper of tests fails by panicking")]
+
+use std::f64::consts::TAU;
+
+use dioptric_diffraction::{
+    PupilGrid, WaveQuality, WaveWindow, Wavefront, WavefrontReference, WindowCenter, wave_psf, zernike::noll,
+};
+use dioptric_optics::{
+    DiffractiveSurface, Glass, Interface, Lens, ObjectPoint, PhaseProfile, Shape, Surface, WavefrontBand,
+    WavefrontError, ZernikeTerms,
+    glam::{DVec2, DVec3},
+    quadrature::gauss_legendre_on,
+};
+
+const NM: f64 = 550.0;
+const RADIUS_MM: f64 = 1.5;
+const FAR: ObjectPoint = ObjectPoint::Infinite(DVec3::Z);
+
+/// An ideal lens right behind a stop with this error, µm in Noll's terms.
+fn lens(focal_mm: f64, coefficients_um: Vec<f64>) -> Lens {
+    let surface = |shape, semi_aperture_mm| Interface {
+        surface: Surface { curvature_per_mm: 0.0, shape, semi_aperture_mm },
+        medium_after: Glass::Air,
+        thickness_after_mm: 0.0,
+    };
+    let ideal = Shape::ThinLens { power_per_mm: 1.0 / focal_mm };
+    let error = WavefrontError {
+        radius_mm: RADIUS_MM,
+        terms: ZernikeTerms::Noll,
+        bands: vec![WavefrontBand { wavelength_nm: NM, coefficients_um }],
+        chromatic_eye_nm: None,
+    };
+    let profile = PhaseProfile::Wavefront(error);
+    Lens::new("error", "test", vec![surface(Shape::Sphere, RADIUS_MM), surface(ideal, 10.0)], 0)
+        .unwrap()
+        .with_diffractive(vec![DiffractiveSurface { surface: 0, order: 1, profile, blaze: None }])
+        .unwrap()
+}
+
+fn one_term(j: usize, um: f64) -> Vec<f64> {
+    let mut coefficients_um = vec![0.0; j];
+    coefficients_um[j - 1] = um;
+    coefficients_um
+}
+
+#[test]
+fn traced_wavefronts_have_the_terms_that_were_stated() {
+    for j in 4..=15 {
+        let mono = lens(240.0, one_term(j, 0.02)).at(NM).unwrap();
+        let traced = Wavefront::trace(&mono, &FAR, 240.0, PupilGrid::STANDARD, WavefrontReference::Chief).unwrap();
+        let found = traced.zernike_waves(15);
+        // An error that is a path at the stop is one on the sphere to some times the square of the aperture, 4e-5 at f/80.
+        let expected = 0.02 / (1e-3 * NM);
+        assert!((found[j - 1] / expected - 1.0).abs() < 2e-3, "Z{j}: {} {expected}", found[j - 1]);
+        let others = found.iter().enumerate().skip(3).filter(|(i, _)| i + 1 != j);
+        assert!(others.into_iter().all(|(_, other)| other.abs() < 2e-3 * expected), "Z{j}: {found:?}");
+    }
+}
+
+/// The sum of waves from the places of a pupil to a point of the film, about the focus.
+fn direct(focal_mm: f64, coefficients_um: &[f64], at_mm: DVec2) -> f64 {
+    let wave_number_per_mm = TAU / (1e-6 * NM);
+    let (radii, n_azimuths) = (gauss_legendre_on(24, 0.0, 1.0), 96);
+    let focus = DVec3::Z * focal_mm;
+    let mut sum = DVec2::ZERO;
+    for (rho, weight) in &radii {
+        for i in 0..n_azimuths {
+            let place = DVec2::from_angle(TAU * f64::from(i) / f64::from(n_azimuths)) * *rho;
+            let ahead_um: f64 = coefficients_um.iter().enumerate().map(|(i, um)| um * noll(i + 1, place)).sum();
+            let from = (RADIUS_MM * place).extend(0.0);
+            let longer_mm = (focus + at_mm.extend(0.0)).distance(from) - focus.distance(from) - 1e-3 * ahead_um;
+            sum += DVec2::from_angle((wave_number_per_mm * longer_mm).rem_euclid(TAU)) * (rho * weight);
+        }
+    }
+    (2.0 * sum / f64::from(n_azimuths)).length_squared()
+}
+
+#[test]
+fn point_spreads_are_those_of_a_direct_sum() {
+    let (focal_mm, n, pitch_um) = (60.0, 21, 4.0);
+    let window = WaveWindow { pitch_um, rows: n, columns: n, center: WindowCenter::At(DVec2::ZERO) };
+    let quality = WaveQuality { nodes: None, points_per_pixel: Some(1) };
+    let peak_of = |coefficients_um: Vec<f64>| {
+        let mono = lens(focal_mm, coefficients_um).at(NM).unwrap();
+        wave_psf(&mono, &FAR, focal_mm, &window, quality).unwrap()
+    };
+    let unaberrated = peak_of(vec![]).samples[(n / 2, n / 2)];
+    let cases = (2..=11).map(|j| one_term(j, 0.15)).chain([vec![0.0, 0.0, 0.0, 0.2, -0.1, 0.05, 0.1, 0.0, 0.08]]);
+    for coefficients_um in cases {
+        let psf = peak_of(coefficients_um.clone());
+        let film = psf.in_film_frame();
+        let mut worst: f64 = 0.0;
+        for ((row, column), energy) in film.indexed_iter() {
+            let from_middle = |i: usize| 1e-3 * pitch_um * (i as f64 - (n / 2) as f64);
+            let at_mm = DVec2::new(from_middle(column), from_middle(row));
+            worst = worst.max((energy / unaberrated - direct(focal_mm, &coefficients_um, at_mm)).abs());
+        }
+        assert!(worst < 1e-3, "{coefficients_um:?}: {worst:e}");
+    }
+}

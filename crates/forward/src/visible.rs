@@ -1,0 +1,379 @@
+//! What of each layer is seen past the edges of nearer surfaces, by rays through the pupil.
+
+use std::collections::BTreeMap;
+
+use dioptric_spectrum::{Cancel, Cancelled};
+use rayon::prelude::*;
+
+use crate::{
+    Film,
+    blocks::BLOCK,
+    coverage::Gathered,
+    layers::tent,
+    node_kernels::{LayerKernels, NodeKernel},
+    raster::Raster,
+    rectangle::Rectangle,
+    sight::{Met, NearEdges, Ray, Sight},
+    tile::film_pixels,
+    tiling::LayerTiles,
+};
+
+/// The parts of layers that pixels beside edges of depth see.
+///
+/// Nearer surfaces leave of what a pixel gathers of a layer what lies behind the open part of its pupil. That depends on the geometry alone, so it is
+/// found once, where bundles pass edges, on points as far apart as the blur of the near sides allows.
+pub(crate) struct Visible {
+    sight: Sight,
+    /// By row and column of each block of pixels, as counted from the film's middle.
+    blocks: BTreeMap<(i64, i64), BlockParts>,
+}
+
+/// The parts that are seen at points over a block.
+struct BlockParts {
+    /// Pixels from point to point.
+    step: usize,
+    /// Of layers of which not all is seen everywhere: parts in 255ths, row by row.
+    by_layer: Vec<(u16, Vec<u8>)>,
+    met: Vec<Met>,
+}
+
+/// What is seen of a layer over a block.
+enum Parts<'a> {
+    All,
+    /// The layer has little there, which no ray met.
+    Unknown,
+    At(&'a [u8]),
+}
+
+/// A pixel that sees a layer through a part of its pupil.
+pub(crate) struct PartlySeen {
+    /// Of the pixel among those of its tile, and its row and column.
+    index: usize,
+    pixel: (i64, i64),
+    /// What of its coverage is seen, and how far that is told by rays.
+    part: f32,
+    told: f32,
+    /// What it gathers, seen or not.
+    light: f32,
+}
+
+/// A layer as a tile gathers it.
+pub(crate) struct Looked<'a> {
+    pub(crate) layer: usize,
+    pub(crate) raster: &'a Raster,
+    /// The samples that it is gathered from, row by row: radiance times coverage, and coverage, which is empty where it is 1.
+    pub(crate) from: Rectangle,
+    pub(crate) light: &'a [f32],
+    pub(crate) alpha: &'a [f32],
+    /// The kernel in the middle of the tile.
+    pub(crate) window: Rectangle,
+    pub(crate) kernel: &'a [f32],
+}
+
+/// Blur radii between which rays begin to tell parts of the pupil apart, pixels: what a point in focus becomes is aberrations and pixels.
+const TELLS_APART_PX: (f32, f32) = (1.0, 3.0);
+/// Rays along the radius of a bundle.
+const ALONG_RADIUS: usize = 5;
+/// Points over the blur radius of a near side.
+const POINTS_OF_RADIUS: f32 = 6.0;
+/// A part of the pupil that counts as all or nothing of it.
+const NEGLIGIBLE_PART: f32 = 1e-3;
+/// Part of the rays that must meet a layer to tell what is seen of it; of less, all rays tell.
+const FEW_RAYS: f32 = 0.02;
+/// The share of a pixel's light that a sample has whose own rays are drawn, and how many times as bright as the mean of the pixels it is.
+const BRIGHT: (f32, f32) = (0.04, 2.0);
+/// Rays to a bright sample, each way.
+const TO_SAMPLE: usize = 2;
+
+impl Visible {
+    /// Draws rays, by the kernels of the layers, from the pixels of a film.
+    pub(crate) fn through(
+        mut sight: Sight,
+        (tiles, kernels): (&[LayerTiles], &[LayerKernels]),
+        film: &Film,
+        cancel: &Cancel,
+    ) -> Result<Self, Cancelled> {
+        let pixels = film_pixels(film);
+        let block_of = |pixel: i64| pixel.div_euclid(BLOCK);
+        let last = |first: i64, n: usize| first + n as i64 - 1;
+        let rows = block_of(pixels.first_row)..=block_of(last(pixels.first_row, pixels.rows));
+        let columns = block_of(pixels.first_column)..=block_of(last(pixels.first_column, pixels.columns));
+        let blocks: Vec<(i64, i64)> = rows.flat_map(|row| columns.clone().map(move |column| (row, column))).collect();
+        let side = BLOCK as usize;
+        let parts = blocks.into_par_iter().map(|block| {
+            cancel.check()?;
+            let at = Rectangle { first_row: block.0 * BLOCK, first_column: block.1 * BLOCK, rows: side, columns: side };
+            let Some(at) = at.intersection(&pixels) else { return Ok(None) };
+            let bundle = |met: &[Met]| Bundle::of(met, &at, (tiles, kernels));
+            Ok(BlockParts::of(&sight, &at, &bundle).map(|parts| (block, parts)))
+        });
+        let parts: Vec<Option<((i64, i64), BlockParts)>> = parts.collect::<Result<_, Cancelled>>()?;
+        let blocks = parts.into_iter().flatten().collect();
+        sight.forget_second();
+        Ok(Self { sight, blocks })
+    }
+
+    pub(crate) fn size_bytes(&self) -> usize {
+        let parts = self.blocks.values().flat_map(|block| &block.by_layer).map(|(_, parts)| parts.len());
+        self.sight.size_bytes() + parts.sum::<usize>()
+    }
+
+    /// Returns the pixels of a tile that see a layer through a part of their pupils, `open` being the part that layers well before it leave.
+    pub(crate) fn partly_seen(
+        &self,
+        layer: usize,
+        open: &dyn Fn(usize, usize) -> f32,
+        gathered: &Gathered,
+    ) -> Vec<PartlySeen> {
+        let told = |radius_px: f32| (radius_px.abs() - TELLS_APART_PX.0) / (TELLS_APART_PX.1 - TELLS_APART_PX.0);
+        let told_of_layer = told(self.sight.radius_px()[layer]);
+        let Rectangle { first_row, first_column, rows, columns } = gathered.at;
+        let mut partly = vec![];
+        for row in 0..rows {
+            let mut column = 0;
+            while column < columns {
+                let pixel = (first_row + row as i64, first_column + column as i64);
+                let to_next = (BLOCK - pixel.1.rem_euclid(BLOCK)) as usize;
+                let end = (column + to_next).min(columns);
+                let Some(block) = self.blocks.get(&(pixel.0.div_euclid(BLOCK), pixel.1.div_euclid(BLOCK))) else {
+                    column = end;
+                    continue;
+                };
+                let parts = block.of_layer(layer);
+                for column in column..end {
+                    let (index, pixel) = (row * columns + column, (pixel.0, first_column + column as i64));
+                    if gathered.alpha[index] <= 0.0 {
+                        continue;
+                    }
+                    let open = open(row, column);
+                    let most_px = self.sight.near_edges(pixel).most_px;
+                    if open >= 1.0 - NEGLIGIBLE_PART || most_px <= 0.0 {
+                        continue;
+                    }
+                    // In focus, layer or edge, all of the pupil sees the same.
+                    let told = told_of_layer.min(told(most_px)).clamp(0.0, 1.0);
+                    let told = if open <= NEGLIGIBLE_PART { 0.0 } else { told };
+                    let by_rays = match parts {
+                        Parts::All => 1.0,
+                        Parts::Unknown => open,
+                        Parts::At(parts) => block.part(parts, pixel),
+                    };
+                    let part = open + told * (by_rays - open);
+                    partly.push(PartlySeen { index, pixel, part, told, light: gathered.light[index] });
+                }
+                column = end;
+            }
+        }
+        partly
+    }
+
+    /// Takes away what pixels do not see of a layer, and returns from what light on samples stand out, by kernels that are so large at most.
+    pub(crate) fn weigh(&self, partly: &[PartlySeen], kernel_most: f32, gathered: &mut Gathered) -> f32 {
+        for seen in partly {
+            gathered.light[seen.index] *= seen.part;
+            gathered.alpha[seen.index] *= seen.part;
+        }
+        let told = partly.iter().filter(|seen| seen.told > 0.0);
+        let (sum, n) = told.fold((0.0, 0.0), |(sum, n), seen| (sum + seen.light, n + 1.0));
+        // Where there is less light than in the mean, less stands out.
+        if sum > 0.0 { BRIGHT.1.max(0.5 * BRIGHT.0 / kernel_most) * sum / n } else { f32::INFINITY }
+    }
+
+    /// Corrects the light of samples from so much on: each by its own rays.
+    pub(crate) fn add_bright(&self, looked: &Looked<'_>, least: f32, partly: &[PartlySeen], gathered: &mut Gathered) {
+        let Looked { layer, raster, from, light, alpha, window, kernel } = looked;
+        let step_px = raster.level.step_px() as f32;
+        let shift_px = 0.5 * (1.0 - step_px.min(1.0));
+        let own_px = self.sight.radius_px()[*layer];
+        let at = gathered.at;
+        let mut by_pixel: Vec<Option<&PartlySeen>> = vec![None; at.len()];
+        partly.iter().filter(|seen| seen.told > 0.0).for_each(|seen| by_pixel[seen.index] = Some(seen));
+        // Of each row the first such pixel, and the one after the last.
+        let spans = by_pixel.chunks_exact(at.columns).map(|line| {
+            let first = line.iter().position(Option::is_some).unwrap_or(at.columns);
+            first..line.iter().rposition(Option::is_some).map_or(first, |last| last + 1)
+        });
+        let spans: Vec<_> = spans.collect();
+        let first = self.sight.place_px((at.first_row, at.first_column));
+        for (index, &light) in light.iter().enumerate().filter(|(_, light)| **light > least) {
+            let (sample, alpha) = ((index / from.columns, index % from.columns), alpha.get(index).unwrap_or(&1.0));
+            let place = (
+                raster.down_px(from.first_row + sample.0 as i64) as f32,
+                raster.across_px(from.first_column + sample.1 as i64) as f32,
+            );
+            // The pixels x with the sample at x − d, for d in the window.
+            let pixels = |px: f32, (first, n): (i64, usize), (first_px, n_pixels): (f32, usize)| {
+                let from = (px + shift_px + (first as f32 - 0.5) * step_px - first_px).ceil().max(0.0) as usize;
+                let to = (px + shift_px + (first as f32 + n as f32 - 0.5) * step_px - first_px).ceil().max(0.0);
+                from..(to as usize).min(n_pixels)
+            };
+            let rows = pixels(place.0, (window.first_row, window.rows), (first.0, at.rows));
+            let columns = pixels(place.1, (window.first_column, window.columns), (first.1, at.columns));
+            for row in rows {
+                let within = columns.start.max(spans[row].start)..columns.end.min(spans[row].end);
+                for seen in by_pixel[row * at.columns..].get(within).unwrap_or_default().iter().flatten() {
+                    let (down, across) = self.sight.place_px(seen.pixel);
+                    let beside = (place.0 - down, place.1 - across);
+                    let in_window = |beside: f32, first: i64, n: usize| {
+                        let sample = ((-beside - shift_px) / step_px).round() as i64 - first;
+                        usize::try_from(sample).ok().filter(|sample| *sample < n)
+                    };
+                    let row = in_window(beside.0, window.first_row, window.rows);
+                    let column = in_window(beside.1, window.first_column, window.columns);
+                    let (Some(row), Some(column)) = (row, column) else { continue };
+                    let weight = kernel[row * window.columns + column];
+                    if weight * light <= BRIGHT.0 * seen.light {
+                        continue;
+                    }
+                    let block = (seen.pixel.0.div_euclid(BLOCK), seen.pixel.1.div_euclid(BLOCK));
+                    let Some(BlockParts { met, .. }) = self.blocks.get(&block) else { continue };
+                    let open = self.open_to((*layer, own_px, met), (down, across), (beside, step_px));
+                    let more = seen.told * weight * (open - seen.part);
+                    gathered.light[seen.index] += more * light;
+                    gathered.alpha[seen.index] += more * alpha;
+                }
+            }
+        }
+        for seen in partly {
+            let (light, alpha) = (&mut gathered.light[seen.index], &mut gathered.alpha[seen.index]);
+            (*light, *alpha) = (light.max(0.0), alpha.max(0.0));
+        }
+    }
+
+    /// Returns the part of the rays from a point to a sample beside it that reaches a layer of a blur radius.
+    fn open_to(
+        &self,
+        (layer, own_px, met): (usize, f32, &[Met]),
+        from: (f32, f32),
+        ((down, across), width_px): ((f32, f32), f32),
+    ) -> f32 {
+        let reach = (0..TO_SAMPLE * TO_SAMPLE).filter(|ray| {
+            let within = |number: usize| width_px * ((number as f32 + 0.5) / TO_SAMPLE as f32 - 0.5);
+            let (down, across) = (down + within(ray / TO_SAMPLE), across + within(ray % TO_SAMPLE));
+            // What aberrations and pixels put beyond the disc came through its rim.
+            let scale = (own_px.abs() / down.hypot(across).max(1e-6)).min(1.0) / own_px;
+            self.sight.reaches(layer, met, from, (scale * down, scale * across))
+        });
+        reach.count() as f32 / (TO_SAMPLE * TO_SAMPLE) as f32
+    }
+}
+
+/// Rays through a pupil: where each goes in a layer of a blur radius of 1 pixel, and its weight.
+struct Bundle {
+    rays: Vec<([f32; 2], f32)>,
+}
+
+impl Bundle {
+    /// Returns that of the middle of a rectangle of pixels, by the kernel of the widest of the first surface's layers that it meets and that is gathered there.
+    fn of(met: &[Met], at: &Rectangle, (tiles, kernels): (&[LayerTiles], &[LayerKernels])) -> Option<Self> {
+        let mut firsts: Vec<&Met> = met.iter().filter(|met| met.is_of_first).collect();
+        firsts.sort_by(|a, b| b.ratio.abs().total_cmp(&a.ratio.abs()));
+        let middle = (at.first_row + at.rows as i64 / 2, at.first_column + at.columns as i64 / 2);
+        // Where nothing of a layer is in reach it has no tile.
+        let with_tile = |met: &&Met| tiles[met.layer].at(middle).map(|(tile, level)| (**met, tile, level));
+        let (widest, tile, level) = firsts.iter().find_map(with_tile)?;
+        let corners = tile.corners().map(|node| kernels[widest.layer].at((node, level)));
+        let kernel = NodeKernel::sum_of(&corners.each_ref().map(|corner| (corner, 0.25)));
+        let step_px = level.step_px() as f32;
+        let side = ((widest.ratio.abs() / step_px) as usize / ALONG_RADIUS).max(1);
+        let Rectangle { first_row, first_column, rows, columns } = kernel.at;
+        let n_across = columns.div_ceil(side);
+        // Of each square of samples the light, and where it comes from.
+        let mut squares = vec![[0.0_f32; 3]; rows.div_ceil(side) * n_across];
+        for (index, &light) in kernel.samples.iter().enumerate() {
+            let (row, column) = (index / columns, index % columns);
+            let square = &mut squares[row / side * n_across + column / side];
+            square[0] += light;
+            square[1] += light * (first_row + row as i64) as f32;
+            square[2] += light * (first_column + column as i64) as f32;
+        }
+        // A film point x gathers the sample at x − d.
+        let scale = -step_px / widest.ratio;
+        let lit = squares.into_iter().enumerate().filter(|(_, [light, ..])| *light > 1e-5);
+        let rays = lit.map(|(square, [light, down, across])| {
+            // Not in rows and columns, which an edge along them would hide all at once (Roberts's R2 sequence).
+            let beside =
+                [0.754_877_7, 0.569_840_3].map(|step: f32| side as f32 * ((square as f32 * step).fract() - 0.5));
+            let to = [down / light + beside[0], across / light + beside[1]].map(|to| scale * to);
+            let beyond = to[0].hypot(to[1]).max(1.0);
+            (to.map(|to| to / beyond), light)
+        });
+        Some(Self { rays: rays.collect() })
+    }
+}
+
+impl BlockParts {
+    /// Returns what is seen of a layer.
+    fn of_layer(&self, layer: usize) -> Parts<'_> {
+        match self.by_layer.binary_search_by_key(&(layer as u16), |(layer, _)| *layer) {
+            Ok(found) => Parts::At(&self.by_layer[found].1),
+            Err(_) if self.met.iter().any(|met| met.layer == layer) => Parts::All,
+            Err(_) => Parts::Unknown,
+        }
+    }
+
+    /// Returns the part at a pixel, between points.
+    fn part(&self, parts: &[u8], (row, column): (i64, i64)) -> f32 {
+        let (step, points) = (self.step, BLOCK as usize / self.step + 1);
+        let split = |pixel: i64| {
+            let within = pixel.rem_euclid(BLOCK) as usize;
+            (within / step, (within % step) as f32 / step as f32)
+        };
+        let ((row, down), (column, across)) = (split(row), split(column));
+        let at = |row: usize, column: usize| f32::from(parts[row * points + column]);
+        let along = |row: usize| at(row, column) + across * (at(row, column + 1) - at(row, column));
+        (along(row) + down * (along(row + 1) - along(row))) / 255.0
+    }
+
+    /// Draws the bundles of points over a block that pass edges out of focus; `None` where no bundle passes an edge.
+    fn of(sight: &Sight, at: &Rectangle, bundle: &dyn Fn(&[Met]) -> Option<Bundle>) -> Option<Self> {
+        let pixels = (0..at.rows as i64).flat_map(|row| (0..at.columns as i64).map(move |column| (row, column)));
+        let edges = pixels.map(|(row, column)| sight.near_edges((at.first_row + row, at.first_column + column)));
+        let edges = edges
+            .filter(|edges| edges.most_px > 0.0)
+            .reduce(|a, b| NearEdges { least_px: a.least_px.min(b.least_px), most_px: a.most_px.max(b.most_px) })?;
+        if edges.most_px <= TELLS_APART_PX.0 {
+            return Some(Self { step: 1, by_layer: vec![], met: vec![] });
+        }
+        let least_px = edges.least_px;
+        let step = (1_usize << ((least_px / POINTS_OF_RADIUS).max(1.0).log2() as usize)).min(BLOCK as usize);
+        let met = sight.met_by(at);
+        let bundle = bundle(&met)?;
+        let points = BLOCK as usize / step + 1;
+        let mut by_layer: Vec<(u16, Vec<u8>)> =
+            met.iter().map(|met| (met.layer as u16, Vec::with_capacity(points * points))).collect();
+        let mut sums = vec![[0.0; 3]; met.len()];
+        let corner = (at.first_row.div_euclid(BLOCK) * BLOCK, at.first_column.div_euclid(BLOCK) * BLOCK);
+        for (row, column) in (0..points).flat_map(|row| (0..points).map(move |column| (row, column))) {
+            let pixel = (corner.0 + (row * step) as i64, corner.1 + (column * step) as i64);
+            bundle.seen_from(sight, sight.place_px(pixel), &met, &mut sums);
+            for ((_, parts), [seen, all, open]) in by_layer.iter_mut().zip(&sums) {
+                parts.push((255.0 * (seen + FEW_RAYS * open) / (all + FEW_RAYS)).round().min(255.0) as u8);
+            }
+        }
+        by_layer.retain(|(_, parts)| parts.iter().any(|part| *part < 255));
+        Some(Self { step, by_layer, met })
+    }
+}
+
+impl Bundle {
+    /// Follows the rays from a place layer by layer: of each layer, the part of the rays that see it, of those that would without what lies before, and of all that are open.
+    fn seen_from(&self, sight: &Sight, place: (f32, f32), met: &[Met], sums: &mut [[f32; 3]]) {
+        sums.fill([0.0; 3]);
+        let total: f32 = self.rays.iter().map(|(_, weight)| weight).sum();
+        for ([down, across], weight) in &self.rays {
+            let weight = weight / total;
+            let mut ray = Ray::default();
+            for (&Met { layer, ratio, .. }, sums) in met.iter().zip(sums.iter_mut()) {
+                let (first, second) = sight.coordinates_at((place.0 + ratio * down, place.1 + ratio * across));
+                ray.pass(layer, first);
+                let share = weight * (tent(first, layer as f32) + tent(second, layer as f32));
+                sums[1] += share;
+                if ray.reaches(layer) {
+                    sums[0] += share;
+                    sums[2] += weight;
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,318 @@
+//! Which colors the codes of a picture stand for, as its file states them: an ICC profile, the chunks of PNG, or the Exif data of cameras.
+
+use std::{fs::File, io::BufReader, path::Path};
+
+use image::{ImageDecoder, ImageFormat, ImageReader};
+use moxcms::{
+    Chromaticity, CicpColorPrimaries, ColorPrimaries, ColorProfile, DataColorSpace, Matrix3d, ProfileText,
+    ToneReprCurve, TransferCharacteristics, XyY,
+};
+
+/// How far curve and matrix of a profile may be from those of sRGB to be taken as these: four digits of a profile's fractions.
+const SAME: f64 = 2e-3;
+/// The highest code.
+const TOP: f64 = 65535.0;
+
+/// Colors that the codes of a picture stand for, where they are not those of sRGB.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StatedColors {
+    /// What they are, by the file's own words.
+    pub name: String,
+    /// The light, 0 to 1, of each code of 16 bits of red, green and blue; none where samples are linear.
+    curves: Option<Box<[Vec<f64>; 3]>>,
+    /// The matrix from linear light of the file's primaries to linear sRGB (IEC 61966-2-1), white to white (Bradford).
+    pub to_srgb: [[f64; 3]; 3],
+}
+
+impl StatedColors {
+    /// Returns what a file states; `None` where it says sRGB, or nothing.
+    ///
+    /// Of PNG the chunk that counts is, as its third edition has it, the first of cICP, iCCP, sRGB, and gAMA with cHRM; of the other formats the
+    /// ICC profile, or Adobe RGB by the Exif data of a camera (DCF 2.0).
+    ///
+    /// # Errors
+    /// When the colors cannot be converted to linear light: the reason, which a sentence can go on with after the file's name.
+    pub fn of(path: &Path) -> Result<Option<Self>, String> {
+        let reader = ImageReader::open(path).ok().and_then(|reader| reader.with_guessed_format().ok());
+        let Some(reader) = reader else { return Ok(None) };
+        let format = reader.format();
+        if format == Some(ImageFormat::Png) {
+            return of_png(path);
+        }
+        if format == Some(ImageFormat::Jpeg) && colors_of_jpeg(path) == Some(4) {
+            return Err("holds inks (CMYK), expected gray or red, green and blue; convert it to sRGB".to_owned());
+        }
+        // Whoever reads the picture says what is wrong with it.
+        let Ok(mut decoder) = reader.into_decoder() else { return Ok(None) };
+        let own = decoder.icc_profile().ok().flatten();
+        let own = if format == Some(ImageFormat::Tiff) { own.or_else(|| profile_of_tiff(path)) } else { own };
+        let profile = own.filter(|profile| !profile.is_empty());
+        match profile {
+            Some(profile) => Self::of_icc(&profile),
+            None => {
+                let exif = decoder.exif_metadata().ok().flatten();
+                let is_adobe = exif.as_deref().is_some_and(is_adobe_rgb);
+                is_adobe
+                    .then(|| {
+                        Self::of_profile(&ColorProfile::new_adobe_rgb(), "Adobe RGB, as its Exif data says".to_owned())
+                    })
+                    .transpose()
+                    .map(Option::flatten)
+            }
+        }
+    }
+
+    /// Returns colors of samples that are linear: the matrix to linear sRGB is given.
+    pub fn linear(name: String, to_srgb: [[f64; 3]; 3]) -> Self {
+        Self { name, curves: None, to_srgb }
+    }
+
+    /// Returns the light of a code of 16 bits in a channel, 0 red, 1 green, 2 blue.
+    pub fn light(&self, channel: usize, code: u16) -> f64 {
+        self.curves.as_ref().map_or(f64::from(code) / TOP, |curves| curves[channel][usize::from(code)])
+    }
+
+    /// Returns the code whose light in the green channel is nearest.
+    pub fn code(&self, light: f64) -> u16 {
+        let Some(curves) = &self.curves else { return (TOP * light.clamp(0.0, 1.0)).round() as u16 };
+        let next = curves[1].partition_point(|own| *own < light).min(usize::from(u16::MAX));
+        let below = next.saturating_sub(1);
+        (if light - curves[1][below] < curves[1][next] - light { below } else { next }) as u16
+    }
+
+    fn of_icc(bytes: &[u8]) -> Result<Option<Self>, String> {
+        let profile = ColorProfile::new_from_slice(bytes)
+            .map_err(|error| format!("has an ICC profile that cannot be read: {error}"))?;
+        let name = profile.description.as_ref().and_then(text_of).filter(|name| !name.trim().is_empty());
+        let name = name.map_or_else(
+            || "an ICC profile without a name".to_owned(),
+            |name| format!("ICC profile '{}'", name.trim()),
+        );
+        Self::of_profile(&profile, name)
+    }
+
+    fn of_profile(profile: &ColorProfile, name: String) -> Result<Option<Self>, String> {
+        let is_hdr = |curve: TransferCharacteristics| {
+            matches!(curve, TransferCharacteristics::Smpte2084 | TransferCharacteristics::Hlg)
+        };
+        if profile.cicp.is_some_and(|cicp| is_hdr(cicp.transfer_characteristics)) {
+            return Err(hdr(&name));
+        }
+        let (curves, matrix) = match profile.color_space {
+            DataColorSpace::Gray => (profile.gray_trc.as_ref().map(|gray| [gray; 3]), Matrix3d::IDENTITY),
+            DataColorSpace::Rgb if profile.is_matrix_shaper() => {
+                let curves = [&profile.red_trc, &profile.green_trc, &profile.blue_trc];
+                let all: Vec<&ToneReprCurve> = curves.into_iter().flatten().collect();
+                (all.try_into().ok(), profile.transform_matrix(&ColorProfile::new_srgb()))
+            }
+            _ => (None, Matrix3d::IDENTITY),
+        };
+        let Some(curves) = curves else {
+            let kind = format!("{:?}", profile.color_space).to_uppercase();
+            return Err(format!(
+                "has {name} of {kind} colors without a matrix and curves, expected one of gray or of three primaries; convert it to sRGB"
+            ));
+        };
+        let tables = curves.map(table);
+        let [Ok(r), Ok(g), Ok(b)] = tables else { return Err(format!("has {name} with a curve that cannot be read")) };
+        Self::made(name, [r, g, b], matrix)
+    }
+
+    /// Returns colors of these curves, unless they are those of sRGB.
+    fn made(name: String, curves: [Vec<f64>; 3], matrix: Matrix3d) -> Result<Option<Self>, String> {
+        let is_finite = matrix.v.iter().flatten().chain(curves.iter().flatten()).all(|v| v.is_finite());
+        if !is_finite {
+            return Err(format!("has {name} that leads to no colors"));
+        }
+        let is_unit = (0..3).all(|i| (0..3).all(|j| (matrix.v[i][j] - f64::from(u8::from(i == j))).abs() < SAME));
+        let is_srgb = curves.iter().all(|curve| {
+            curve
+                .iter()
+                .enumerate()
+                .step_by(257)
+                .all(|(code, light)| (light - srgb_light(code as f64 / TOP)).abs() < SAME)
+        });
+        Ok((!(is_unit && is_srgb)).then(|| Self { name, curves: Some(Box::new(curves)), to_srgb: matrix.v }))
+    }
+}
+
+/// Returns the light of a code of 0–1 (IEC 61966-2-1).
+fn srgb_light(code: f64) -> f64 {
+    if code <= 0.04045 { code / 12.92 } else { ((code + 0.055) / 1.055).powf(2.4) }
+}
+
+fn hdr(name: &str) -> String {
+    format!(
+        "has {name} for high dynamic range (PQ or HLG), expected colors of a usual display; convert it to linear EXR or to sRGB"
+    )
+}
+
+fn text_of(text: &ProfileText) -> Option<String> {
+    match text {
+        ProfileText::PlainString(text) => Some(text.clone()),
+        ProfileText::Localizable(texts) => texts.first().map(|text| text.value.clone()),
+        ProfileText::Description(text) => Some(text.ascii_string.clone()),
+    }
+}
+
+/// Returns the light of every code of 16 bits by a profile's curve.
+fn table(curve: &ToneReprCurve) -> Result<Vec<f64>, moxcms::CmsError> {
+    let curve = curve.make_linear_evaluator()?;
+    Ok((0..=u16::MAX).map(|code| f64::from(curve.evaluate_value(f32::from(code) / f32::from(u16::MAX)))).collect())
+}
+
+/// Returns what the chunks of a PNG file state.
+fn of_png(path: &Path) -> Result<Option<StatedColors>, String> {
+    let Ok(file) = File::open(path) else { return Ok(None) };
+    let Ok(reader) = png::Decoder::new(BufReader::new(file)).read_info() else { return Ok(None) };
+    let info = reader.info();
+    if let Some(points) = &info.coding_independent_code_points {
+        return of_code_points(points);
+    }
+    if let Some(profile) = &info.icc_profile {
+        return StatedColors::of_icc(profile);
+    }
+    if info.srgb.is_some() || (info.gama_chunk.is_none() && info.chrm_chunk.is_none()) {
+        return Ok(None);
+    }
+    let (curve, mut name) = match info.gama_chunk.map(|gamma| f64::from(gamma.into_value())) {
+        Some(gamma) if gamma > 0.0 => {
+            let curve = (0..=u16::MAX).map(|code| (f64::from(code) / TOP).powf(1.0 / gamma)).collect();
+            (curve, format!("a gamma of {gamma:.5} (gAMA)"))
+        }
+        Some(gamma) => return Err(format!("has a gamma of {gamma} (gAMA), expected a number above 0")),
+        None => (
+            (0..=u16::MAX).map(|code| srgb_light(f64::from(code) / TOP)).collect::<Vec<f64>>(),
+            "sRGB's curve".to_owned(),
+        ),
+    };
+    let matrix = match &info.chrm_chunk {
+        Some(own) => {
+            let point =
+                |(x, y): (png::ScaledFloat, png::ScaledFloat)| Chromaticity::new(x.into_value(), y.into_value());
+            let (white_x, white_y) = (own.white.0.into_value(), own.white.1.into_value());
+            name += &format!(
+                " and primaries of x, y {:.4}, {:.4}; {:.4}, {:.4}; {:.4}, {:.4} (cHRM)",
+                own.red.0.into_value(),
+                own.red.1.into_value(),
+                own.green.0.into_value(),
+                own.green.1.into_value(),
+                own.blue.0.into_value(),
+                own.blue.1.into_value()
+            );
+            let primaries = ColorPrimaries { red: point(own.red), green: point(own.green), blue: point(own.blue) };
+            matrix_of(XyY::new(f64::from(white_x), f64::from(white_y), 1.0), primaries)
+        }
+        None => Matrix3d::IDENTITY,
+    };
+    StatedColors::made(name, [curve.clone(), curve.clone(), curve], matrix)
+}
+
+/// Returns the matrix from linear light of primaries and a white to linear sRGB.
+fn matrix_of(white: XyY, primaries: ColorPrimaries) -> Matrix3d {
+    let mut profile = ColorProfile::new_srgb();
+    profile.update_rgb_colorimetry(white, primaries);
+    profile.transform_matrix(&ColorProfile::new_srgb())
+}
+
+/// Returns what numbers of Rec. ITU-T H.273 state.
+fn of_code_points(points: &png::CodingIndependentCodePoints) -> Result<Option<StatedColors>, String> {
+    let name = format!("cICP {}, {}", points.color_primaries, points.transfer_function);
+    let unknown = || format!("has {name}, which names no primaries or no curve");
+    let primaries = CicpColorPrimaries::try_from(points.color_primaries).map_err(|_| unknown())?;
+    let transfer = TransferCharacteristics::try_from(points.transfer_function).map_err(|_| unknown())?;
+    if matches!(transfer, TransferCharacteristics::Smpte2084 | TransferCharacteristics::Hlg) {
+        return Err(hdr(&name));
+    }
+    if points.matrix_coefficients != 0 || !points.is_video_full_range_image {
+        return Err(format!(
+            "has {name} of video levels or of luma and chroma, expected full levels of red, green and blue"
+        ));
+    }
+    let white = match primaries {
+        CicpColorPrimaries::Bt470M | CicpColorPrimaries::GenericFilm => (0.310, 0.316),
+        CicpColorPrimaries::Xyz => (1.0 / 3.0, 1.0 / 3.0),
+        CicpColorPrimaries::Smpte431 => (0.314, 0.351),
+        _ => (0.3127, 0.3290),
+    };
+    let primaries = ColorPrimaries::try_from(primaries).map_err(|_| unknown())?;
+    let curve = ToneReprCurve::make_cicp_linear_evaluator(transfer).map_err(|_| unknown())?;
+    let light = |code: u16| f64::from(curve.evaluate_value(f32::from(code) / f32::from(u16::MAX)));
+    let curve: Vec<f64> = (0..=u16::MAX).map(light).collect();
+    StatedColors::made(
+        name,
+        [curve.clone(), curve.clone(), curve],
+        matrix_of(XyY::new(white.0, white.1, 1.0), primaries),
+    )
+}
+
+/// The fields of a TIFF file or of Exif data, which are one.
+struct TiffFields<'a> {
+    bytes: &'a [u8],
+    is_big_endian: bool,
+}
+
+impl<'a> TiffFields<'a> {
+    fn new(bytes: &'a [u8]) -> Option<Self> {
+        let is_big_endian = bytes.starts_with(b"MM\0*");
+        (is_big_endian || bytes.starts_with(b"II*\0")).then_some(Self { bytes, is_big_endian })
+    }
+
+    fn number(&self, at: usize, n: usize) -> Option<usize> {
+        let bytes = self.bytes.get(at..at.checked_add(n)?)?;
+        let digits = |sum: usize, byte: &u8| sum << 8 | usize::from(*byte);
+        Some(if self.is_big_endian { bytes.iter().fold(0, digits) } else { bytes.iter().rev().fold(0, digits) })
+    }
+
+    fn first_directory(&self) -> Option<usize> {
+        self.number(4, 4)
+    }
+
+    /// Returns the place of the count of a field, behind which its value or the place of that lies.
+    fn field(&self, directory: usize, tag: usize) -> Option<usize> {
+        let n = self.number(directory, 2)?;
+        (0..n).map(|i| directory + 2 + 12 * i).find(|at| self.number(*at, 2) == Some(tag)).map(|at| at + 4)
+    }
+}
+
+/// Returns the profile of a TIFF file, whose field is of bytes, or of bytes of no kind.
+fn profile_of_tiff(path: &Path) -> Option<Vec<u8>> {
+    const ICC_PROFILE: usize = 34_675;
+    let bytes = std::fs::read(path).ok()?;
+    let fields = TiffFields::new(&bytes)?;
+    let count = fields.field(fields.first_directory()?, ICC_PROFILE)?;
+    let (n, place) = (fields.number(count, 4)?, fields.number(count + 4, 4)?);
+    bytes.get(place..place.checked_add(n)?).map(<[u8]>::to_vec)
+}
+
+/// Returns how many colors a JPEG file has, by the head of its frame (ITU-T T.81, B.2.2).
+fn colors_of_jpeg(path: &Path) -> Option<usize> {
+    let bytes = std::fs::read(path).ok()?;
+    let mut at = 2;
+    loop {
+        let [0xFF, marker, high, low] = *bytes.get(at..at + 4)? else { return None };
+        // Heads of frames are C0 to CF but for tables of codes and arithmetic (C4, C8, CC).
+        if (0xC0..=0xCF).contains(&marker) && ![0xC4, 0xC8, 0xCC].contains(&marker) {
+            return bytes.get(at + 9).map(|n| usize::from(*n));
+        }
+        at += 2 + (usize::from(high) << 8 | usize::from(low));
+    }
+}
+
+/// Returns whether Exif data say Adobe RGB: no sRGB (`ColorSpace` 65535), and interoperability R03 (DCF 2.0, 2010, 4.2).
+fn is_adobe_rgb(exif: &[u8]) -> bool {
+    const EXIF_DIRECTORY: usize = 0x8769;
+    const INTEROPERABILITY_DIRECTORY: usize = 0xA005;
+    const COLOR_SPACE: usize = 0xA001;
+    const INTEROPERABILITY_INDEX: usize = 1;
+    let found = || -> Option<bool> {
+        let fields = TiffFields::new(exif)?;
+        let below = |directory: usize, tag: usize| fields.number(fields.field(directory, tag)? + 4, 4);
+        let exif_directory = below(fields.first_directory()?, EXIF_DIRECTORY)?;
+        let is_other = fields.number(fields.field(exif_directory, COLOR_SPACE)? + 4, 2)? == 0xFFFF;
+        let interoperability = below(exif_directory, INTEROPERABILITY_DIRECTORY)?;
+        let at = fields.field(interoperability, INTEROPERABILITY_INDEX)? + 4;
+        Some(is_other && exif.get(at..at + 3)? == b"R03")
+    };
+    found().unwrap_or(false)
+}

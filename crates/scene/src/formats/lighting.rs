@@ -1,0 +1,228 @@
+//! The light of what a reader found: reflectances under a light, colors as a display shows them or as things reflect them.
+
+use std::path::Path;
+
+use dioptric_spectrum::{Display, Illuminant, Quantity, SpectralImage, Spectrum, WavelengthGrid};
+use ndarray::Array2;
+
+use super::{
+    contents::{Contents, Image},
+    no_data::mend,
+    picture::{lifted, lifted_codes, linear_srgb, note_beyond},
+    read_options::ReadOptions,
+    reading::FileQuantity,
+    smooth_lift::{Colors, SmoothLift},
+    stated::name_of,
+};
+use crate::{SceneError, SceneLight, resampled};
+
+/// The illuminance on reflectances, and on a white of ordinary pictures, lx.
+const USUAL_LUX: f64 = 1000.0;
+/// Between these wavelengths colors tell what reflects them, nm.
+const LIFTED_NM: [f64; 2] = [380.0, 780.0];
+
+/// Returns the bands of a picture without a spectrum.
+fn picture_bands(options: &ReadOptions) -> Result<WavelengthGrid, SceneError> {
+    Ok(match &options.grid {
+        Some(grid) => grid.clone(),
+        None => WavelengthGrid::uniform(400.0, 700.0, 10.0)?,
+    })
+}
+
+/// Returns the radiance on the bands wanted, and the light that is on it, where that is known.
+///
+/// A picture on a display is light of its own: its white is that of the display on these very bands, or, where another light is asked
+/// for, of that light.
+pub(super) fn lit(
+    path: &Path,
+    contents: Contents,
+    options: &ReadOptions,
+    notes: &mut Vec<String>,
+) -> Result<(SpectralImage, Option<SceneLight>), SceneError> {
+    let lux = |own: Option<f64>| options.illuminance_lux.or(own).unwrap_or(USUAL_LUX);
+    let image = match contents.image {
+        Image::Spectral(image) => image,
+        colors if options.reading.quantity == Some(FileQuantity::Reflectance) => {
+            return reflecting(path, colors, options, notes);
+        }
+        colors => {
+            let grid = picture_bands(options)?;
+            let own_lux = match &colors {
+                Image::Linear { white_cd_m2: Some(white), .. } => Some(std::f64::consts::PI * white),
+                _ => None,
+            };
+            let lux = lux(own_lux);
+            let (basis, light) = white_basis(&grid, options.light.as_ref(), lux)?;
+            let n_dark = (0..grid.len()).filter(|&band| basis.iter().all(|color| color[band] <= 0.0)).count();
+            if n_dark > 0 {
+                let name = name_of(path);
+                notes.push(format!(
+                    "{name}: in {n_dark} of {} bands a display sends no light, nor does the picture",
+                    grid.len()
+                ));
+            }
+            let image = match colors {
+                Image::Codes(picture, colors) => {
+                    let (image, beyond_share) = lifted_codes(path, picture, colors.as_ref(), &basis, &grid)?;
+                    notes.extend(note_beyond(path, beyond_share));
+                    image
+                }
+                Image::Linear { mut planes, .. } => {
+                    prepare_colors(path, &mut planes, options, notes)?;
+                    lifted(&planes, &basis, &grid)?
+                }
+                Image::Spectral(image) => image,
+            };
+            return Ok((image, Some(light)));
+        }
+    };
+    let image = match &options.grid {
+        Some(grid) if grid != image.grid() => resampled(&image, grid)?,
+        _ => image,
+    };
+    if image.quantity() != Quantity::Reflectance {
+        return Ok((image, contents.light));
+    }
+    let light = SceneLight::new(options.light.clone().unwrap_or(Illuminant::D65), lux(None));
+    notes.extend(beyond_table(&light.illuminant, image.grid()));
+    let white = light.illuminant.white_radiance(image.grid(), lux(None));
+    let grid = image.grid().clone();
+    let mut planes = image.into_planes();
+    for (plane, white) in planes.iter_mut().zip(white) {
+        plane.mapv_inplace(|v| (f64::from(v) * white) as f32);
+    }
+    Ok((SpectralImage::new(Quantity::Radiance, grid, planes)?, Some(light)))
+}
+
+/// Returns the radiance of a picture whose colors are those of things that reflect light, and the light that is on them.
+fn reflecting(
+    path: &Path,
+    colors: Image,
+    options: &ReadOptions,
+    notes: &mut Vec<String>,
+) -> Result<(SpectralImage, Option<SceneLight>), SceneError> {
+    let grid = picture_bands(options)?;
+    let light = SceneLight::new(
+        options.light.clone().unwrap_or(Illuminant::D65),
+        checked_lux(options.illuminance_lux.unwrap_or(USUAL_LUX))?,
+    );
+    light.illuminant.check()?;
+    notes.extend(beyond_table(&light.illuminant, &grid));
+    let (first, last) = grid.range_nm();
+    if first < LIFTED_NM[0] || last > LIFTED_NM[1] {
+        let name = name_of(path);
+        notes.push(format!(
+            "{name}: what its colors reflect beyond {} to {} nm is not known",
+            LIFTED_NM[0], LIFTED_NM[1]
+        ));
+    }
+    let lift = SmoothLift::new(&grid, &light.illuminant)?;
+    let white = light.illuminant.white_radiance(&grid, light.illuminance_lux.unwrap_or(USUAL_LUX));
+    let mut planes = match colors {
+        Image::Spectral(image) => return Ok((image, Some(light))),
+        Image::Codes(picture, None) => {
+            return Ok((lift.radiance(path, &Colors::of_codes(picture), &white, &grid)?, Some(light)));
+        }
+        Image::Codes(picture, colors) => linear_srgb(picture, colors.as_ref()),
+        Image::Linear { planes, .. } => planes,
+    };
+    prepare_colors(path, &mut planes, options, notes)?;
+    let is_beyond = |row: usize, column: usize| planes.iter().any(|plane| !(0.0..=1.0).contains(&plane[(row, column)]));
+    let (rows, columns) = planes[0].dim();
+    let n_beyond = (0..rows * columns).filter(|i| is_beyond(i / columns, i % columns)).count();
+    if n_beyond > 0 {
+        let what = "have colors below 0, which become 0, or above 1, which reflect more than white";
+        notes.push(format!("{}: {n_beyond} of {} samples {what}", name_of(path), rows * columns));
+    }
+    let image = lift.radiance(path, &Colors::Linear(&planes), &white, &grid)?;
+    Ok((image, Some(light)))
+}
+
+/// Mends linear colors and multiplies them, as the options say.
+fn prepare_colors(
+    path: &Path,
+    planes: &mut [Array2<f32>; 3],
+    options: &ReadOptions,
+    notes: &mut Vec<String>,
+) -> Result<(), SceneError> {
+    let choice = options.reading.no_data.unwrap_or_default();
+    let scale = options.reading.scale.unwrap_or(1.0) as f32;
+    let bands = WavelengthGrid::new(vec![450.0, 550.0, 650.0])?;
+    notes.extend(mend_colors(path, &bands, planes, choice)?.note(path, choice));
+    if scale != 1.0 {
+        planes.iter_mut().for_each(|plane| plane.mapv_inplace(|v| v * scale));
+    }
+    Ok(())
+}
+
+/// Mends colors, of which negative ones are beyond the gamut and stay.
+fn mend_colors(
+    path: &Path,
+    bands: &WavelengthGrid,
+    planes: &mut [Array2<f32>; 3],
+    choice: super::reading::NoData,
+) -> Result<super::no_data::Mended, SceneError> {
+    let kept: Vec<Array2<bool>> = planes.iter().map(|plane| plane.mapv(|v| v.is_finite() && v < 0.0)).collect();
+    let colors = planes.clone();
+    let finite = planes.iter_mut().zip(&kept);
+    finite.for_each(|(plane, kept)| {
+        ndarray::Zip::from(plane).and(kept).for_each(|v, kept| *v = if *kept { 0.0 } else { *v })
+    });
+    let mended = mend(path, bands, planes, choice)?;
+    for ((plane, kept), own) in planes.iter_mut().zip(&kept).zip(&colors) {
+        ndarray::Zip::from(plane).and(kept).and(own).for_each(|v, kept, own| *v = if *kept { *own } else { *v });
+    }
+    Ok(mended)
+}
+
+fn checked_lux(lux: f64) -> Result<f64, SceneError> {
+    if lux.is_finite() && lux > 0.0 {
+        return Ok(lux);
+    }
+    Err(SceneError::Setting {
+        what: "the illuminance on the picture's white",
+        value: format!("{lux} lx"),
+        expected: "a finite number above 0".to_owned(),
+    })
+}
+
+/// Returns the spectra of red, green and blue on a grid, and the light of which their sum is the white.
+fn white_basis(
+    grid: &WavelengthGrid,
+    wanted: Option<&Illuminant>,
+    lux: f64,
+) -> Result<([Vec<f64>; 3], SceneLight), SceneError> {
+    checked_lux(lux)?;
+    let display = Display::apple_studio();
+    let mut basis = display.srgb_basis(grid, lux / std::f64::consts::PI);
+    let white: Vec<f64> =
+        (0..grid.len()).map(|band| (basis[0][band] + basis[1][band] + basis[2][band]).max(0.0)).collect();
+    let Some(wanted) = wanted else {
+        // On the picture's own bands: a white from other samples of the display's spectrum would tint it.
+        let is_known = grid.len() > 1 && white.iter().any(|v| *v > 0.0);
+        let spectrum = if is_known {
+            Spectrum::new(grid.centers_nm().to_vec(), white)?
+        } else {
+            let fine = WavelengthGrid::uniform(380.0, 780.0, 1.0)?;
+            let [r, g, b] = display.srgb_basis(&fine, 1.0);
+            Spectrum::new(fine.centers_nm().to_vec(), (0..fine.len()).map(|i| (r[i] + g[i] + b[i]).max(0.0)).collect())?
+        };
+        return Ok((basis, SceneLight::new(Illuminant::Spectrum(spectrum), lux)));
+    };
+    wanted.check()?;
+    let target = wanted.white_radiance(grid, lux);
+    for color in &mut basis {
+        for ((v, white), target) in color.iter_mut().zip(&white).zip(&target) {
+            *v = if *white > 0.0 { *v * target / white } else { 0.0 };
+        }
+    }
+    Ok((basis, SceneLight::new(wanted.clone(), lux)))
+}
+
+/// Returns what is said of bands beyond a light's table.
+fn beyond_table(light: &Illuminant, grid: &WavelengthGrid) -> Option<String> {
+    let Illuminant::Spectrum(spectrum) = light else { return None };
+    let ((first, last), (from, to)) = (grid.range_nm(), spectrum.range_nm());
+    let is_beyond = first < from || last > to;
+    is_beyond.then(|| format!("the light is known from {from} to {to} nm; beyond, its end values are held"))
+}

@@ -1,0 +1,183 @@
+//! The variables of a MATLAB file of version 7.3, which is HDF5, and the arrays of any HDF5 file.
+//!
+//! Each becomes the element that a file of version 5 has for it, so that one reader knows them all. MATLAB writes its axes turned
+//! round, the first being the fastest; arrays of other programs have the last as the fastest. How MATLAB marks its variables was
+//! taken from files that it wrote: attributes `MATLAB_class` and `MATLAB_empty`, structures as groups, cells as references.
+
+use hdf5_pure::{AttrValue, DType, Dataset, File, Group};
+
+use super::elements::{self, LIMIT_ARRAYS, LIMIT_DEPTH, Listed};
+
+/// Arrays of a file.
+pub(super) struct Hdf5 {
+    file: File,
+    /// Whether MATLAB wrote it, or one of its kind.
+    pub(super) is_matlab: bool,
+}
+
+/// An array or a group, and what is known of it without its content.
+pub(super) struct Entry {
+    pub(super) listed: Listed,
+    path: String,
+    is_group: bool,
+    /// Bytes of its numbers.
+    pub(super) n_bytes: u64,
+}
+
+impl Hdf5 {
+    /// Opens a file that is in memory.
+    pub(super) fn open(bytes: Vec<u8>) -> Result<Self, String> {
+        let is_matlab = bytes.starts_with(b"MATLAB 7.3");
+        Ok(Self { file: File::from_bytes(bytes).map_err(broken)?, is_matlab })
+    }
+
+    /// Lists the variables of MATLAB, or the arrays of all groups, by their paths.
+    pub(super) fn entries(&self) -> Result<Vec<Entry>, String> {
+        let mut entries = vec![];
+        self.list(&self.file.root(), "", LIMIT_DEPTH, &mut entries)?;
+        Ok(entries)
+    }
+
+    fn list(&self, group: &Group, before: &str, depth: usize, entries: &mut Vec<Entry>) -> Result<(), String> {
+        if depth == 0 || entries.len() > LIMIT_ARRAYS {
+            return Err(too_many());
+        }
+        for name in group.datasets().map_err(broken)? {
+            let dataset = group.dataset(&name).map_err(broken)?;
+            let sides = self.sides_of(&dataset)?;
+            let is_numeric = class_of(&dataset).is_ok_and(|class| class.is_some());
+            let n_bytes = sides.iter().map(|side| *side as u64).fold(8, u64::saturating_mul);
+            let path = format!("{before}{name}");
+            let listed = Listed { name: path.clone(), sides, is_numeric };
+            entries.push(Entry { listed, path, is_group: false, n_bytes });
+        }
+        for name in group.groups().map_err(broken)? {
+            // What references lead to.
+            if name.starts_with('#') {
+                continue;
+            }
+            let path = format!("{before}{name}");
+            if self.is_matlab {
+                let listed = Listed { name: path.clone(), sides: vec![1, 1], is_numeric: false };
+                entries.push(Entry { listed, path, is_group: true, n_bytes: 0 });
+            } else {
+                let group = group.group(&name).map_err(broken)?;
+                self.list(&group, &format!("{path}/"), depth - 1, entries)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Returns the sides of an array, the fastest first where MATLAB wrote it.
+    fn sides_of(&self, dataset: &Dataset) -> Result<Vec<usize>, String> {
+        let shape = dataset.shape().map_err(broken)?;
+        let product = shape.iter().try_fold(1_u64, |product, side| product.checked_mul(*side));
+        if product.is_none_or(|product| product > u64::from(u32::MAX)) || shape.len() > LIMIT_DEPTH {
+            return Err(format!("an array has the sides {:?}", &shape[..shape.len().min(4)]));
+        }
+        let mut sides: Vec<usize> = shape.into_iter().map(|side| side as usize).collect();
+        if self.is_matlab {
+            sides.reverse();
+        }
+        // A number without sides is an array of one.
+        Ok(if sides.is_empty() { vec![1] } else { sides })
+    }
+
+    /// Returns an entry as an element of version 5.
+    pub(super) fn element(&self, entry: &Entry) -> Result<Vec<u8>, String> {
+        if entry.is_group {
+            let mut n_left = LIMIT_ARRAYS;
+            let group = self.file.group(&entry.path).map_err(broken)?;
+            self.structure(&entry.listed.name, &group, LIMIT_DEPTH, &mut n_left)
+        } else {
+            let dataset = self.file.dataset(&entry.path).map_err(broken)?;
+            self.array(&entry.listed.name, &dataset)
+        }
+    }
+
+    fn structure(&self, name: &str, group: &Group, depth: usize, n_left: &mut usize) -> Result<Vec<u8>, String> {
+        if depth == 0 || *n_left == 0 {
+            return Err(too_many());
+        }
+        *n_left -= 1;
+        let mut fields = vec![];
+        for own in group.datasets().map_err(broken)? {
+            let dataset = group.dataset(&own).map_err(broken)?;
+            fields.push((own, self.array("", &dataset)?));
+        }
+        for own in group.groups().map_err(broken)? {
+            let inner = group.group(&own).map_err(broken)?;
+            fields.push((own, self.structure("", &inner, depth - 1, n_left)?));
+        }
+        elements::structure(name, &fields).ok_or_else(too_large)
+    }
+
+    fn array(&self, name: &str, dataset: &Dataset) -> Result<Vec<u8>, String> {
+        let attributes = dataset.attrs().map_err(broken)?;
+        let is_empty = attributes.get("MATLAB_empty").and_then(AttrValue::to_i64s).is_some_and(|v| v != [0]);
+        let is_text = attributes.get("MATLAB_class").and_then(AttrValue::as_str) == Some("char");
+        if is_empty {
+            return elements::doubles(name, &[0, 0], &[]).ok_or_else(too_large);
+        }
+        let sides = self.sides_of(dataset)?;
+        let class = class_of(dataset)?.filter(|_| !is_text);
+        let Some(class) = class else {
+            let class = if is_text { 4 } else { elements::CELLS };
+            return elements::other(name, class, &sides).ok_or_else(too_large);
+        };
+        let numbers = numbers_of(dataset)?;
+        elements::stored(name, &sides, class, &numbers).ok_or_else(too_large)
+    }
+}
+
+/// Returns the class of numbers and the type that they are stored as; `None` where they are none.
+fn class_of(dataset: &Dataset) -> Result<Option<(u32, u32)>, String> {
+    Ok(Some(match dataset.dtype().map_err(broken)? {
+        DType::F64 => (elements::DOUBLES, 9),
+        DType::F32 => (elements::SINGLES, 7),
+        DType::I8 => (8, 1),
+        DType::U8 => (9, 2),
+        DType::I16 => (10, 3),
+        DType::U16 => (11, 4),
+        DType::I32 => (12, 5),
+        DType::U32 => (13, 6),
+        DType::I64 => (14, 12),
+        DType::U64 => (15, 13),
+        _ => return Ok(None),
+    }))
+}
+
+/// Returns the numbers of an array, little-endian.
+fn numbers_of(dataset: &Dataset) -> Result<Vec<u8>, String> {
+    fn bytes<T, const N: usize>(
+        values: Result<Vec<T>, hdf5_pure::Error>,
+        of: fn(T) -> [u8; N],
+    ) -> Result<Vec<u8>, String> {
+        Ok(values.map_err(broken)?.into_iter().flat_map(of).collect())
+    }
+    match dataset.dtype().map_err(broken)? {
+        DType::F64 => bytes(dataset.read_f64(), f64::to_le_bytes),
+        DType::F32 => bytes(dataset.read_f32(), f32::to_le_bytes),
+        DType::I8 => bytes(dataset.read_i8(), i8::to_le_bytes),
+        DType::U8 => dataset.read_u8().map_err(broken),
+        DType::I16 => bytes(dataset.read_i16(), i16::to_le_bytes),
+        DType::U16 => bytes(dataset.read_u16(), u16::to_le_bytes),
+        DType::I32 => bytes(dataset.read_i32(), i32::to_le_bytes),
+        DType::U32 => bytes(dataset.read_u32(), u32::to_le_bytes),
+        DType::I64 => bytes(dataset.read_i64(), i64::to_le_bytes),
+        DType::U64 => bytes(dataset.read_u64(), u64::to_le_bytes),
+        _ => Ok(vec![]),
+    }
+}
+
+fn broken(error: hdf5_pure::Error) -> String {
+    format!("it is HDF5 that cannot be read: {error}")
+}
+
+fn too_many() -> String {
+    format!("its groups hold more than {LIMIT_ARRAYS} arrays or {LIMIT_DEPTH} levels")
+}
+
+fn too_large() -> String {
+    "an array of it takes 4 GiB or more, expected smaller ones".to_owned()
+}

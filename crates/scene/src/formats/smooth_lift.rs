@@ -1,0 +1,266 @@
+//! Pictures as reflectances under a light: smooth spectra whose colors are those of the picture under D65.
+//!
+//! Each color is lifted by [`SmoothReflectance`], and what that misses is added as a mixture of the lifts of red, green and blue, so that
+//! under D65 the color comes back exactly. On few or uneven bands sums differ from integrals: on the bands of a picture the same mixture
+//! is added until they have, relative to white, the tristimulus values that the reflectance has under the light itself. Only what would be
+//! below 0 is clipped.
+
+use std::path::Path;
+
+use dioptric_pictures::DynamicImage;
+use dioptric_spectrum::{
+    Illuminant, Observer, Quantity, SmoothReflectance, SpectralImage, WavelengthGrid, Xyz, srgb_decode,
+};
+use glam::{DMat3, DVec3};
+use ndarray::Array2;
+use rayon::prelude::*;
+
+use super::unusable::check_made;
+use crate::SceneError;
+
+/// Bands tell colors where the tristimulus values of white are within this share of those of the light.
+const LIKE_THE_LIGHT: f64 = 0.3;
+
+/// How colors become reflectances on the bands of a grid.
+pub(super) struct SmoothLift {
+    fine_nm: Vec<f32>,
+    /// What a reflectance of 1 at each fine wavelength gives under D65, as linear sRGB, white being (1, 1, 1).
+    d65: Vec<DVec3>,
+    /// And under the light, as tristimulus values, white being (1, 1, 1).
+    light: Vec<DVec3>,
+    bands_nm: Vec<f32>,
+    /// What a reflectance of 1 in each band adds to them.
+    bands: Vec<DVec3>,
+    /// The lifts of red, green and blue on the bands, and their tristimulus values under the light.
+    primaries: [Vec<f64>; 3],
+    primaries_light: DMat3,
+    /// From linear sRGB under D65, and from tristimulus values of the bands, to their mixture; none where bands tell no colors.
+    mixture_of_rgb: DMat3,
+    mixture_of_bands: Option<DMat3>,
+}
+
+impl SmoothLift {
+    /// Prepares the lift of a picture under a light.
+    pub(super) fn new(grid: &WavelengthGrid, light: &Illuminant) -> Result<Self, SceneError> {
+        let fine = WavelengthGrid::uniform(380.0, 780.0, 5.0)?;
+        let seen = |grid: &WavelengthGrid, light: &Illuminant| -> Vec<DVec3> {
+            let [x, y, z] = Observer::Cie1931.weights(grid);
+            let white = light.white_radiance(grid, 1.0);
+            white.iter().enumerate().map(|(i, v)| *v * DVec3::new(x[i], y[i], z[i])).collect()
+        };
+        let relative = |values: &[DVec3], white: DVec3| -> Vec<DVec3> { values.iter().map(|v| *v / white).collect() };
+        let sum = |values: &[DVec3]| values.iter().copied().sum::<DVec3>();
+        let d65: Vec<DVec3> = seen(&fine, &Illuminant::D65)
+            .iter()
+            .map(|v| DVec3::from_array(Xyz(v.to_array()).to_linear_srgb()))
+            .collect();
+        let d65 = relative(&d65, sum(&d65));
+        let under_light = seen(&fine, light);
+        let white = sum(&under_light);
+        let of_bands = seen(grid, light);
+        let band_white = sum(&of_bands);
+        let share = band_white / white;
+        let tells_colors = grid.len() >= 3 && (share - DVec3::ONE).abs().max_element() < LIKE_THE_LIGHT;
+        let bands = if tells_colors { relative(&of_bands, band_white) } else { vec![DVec3::ZERO; grid.len()] };
+        let nm = |grid: &WavelengthGrid| grid.centers_nm().iter().map(|nm| *nm as f32).collect::<Vec<f32>>();
+        let (fine_nm, bands_nm) = (nm(&fine), nm(grid));
+        let light = relative(&under_light, white);
+        let lifts = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(SmoothReflectance::of_rgb);
+        let on = |nm: &[f32]| lifts.map(|lift| nm.iter().map(|nm| f64::from(lift.at(&[*nm])[0])).collect::<Vec<f64>>());
+        let seen_by = |spectra: &[Vec<f64>; 3], weights: &[DVec3]| {
+            let of = |spectrum: &Vec<f64>| spectrum.iter().zip(weights).map(|(v, w)| *v * *w).sum::<DVec3>();
+            DMat3::from_cols(of(&spectra[0]), of(&spectra[1]), of(&spectra[2]))
+        };
+        let (fine_primaries, primaries) = (on(&fine_nm), on(&bands_nm));
+        let on_bands = seen_by(&primaries, &bands);
+        let mixture_of_bands = (tells_colors && on_bands.determinant().abs() > 1e-3).then(|| on_bands.inverse());
+        Ok(Self {
+            mixture_of_rgb: seen_by(&fine_primaries, &d65).inverse(),
+            primaries_light: seen_by(&fine_primaries, &light),
+            fine_nm,
+            d65,
+            light,
+            bands_nm,
+            bands,
+            primaries,
+            mixture_of_bands,
+        })
+    }
+
+    /// Puts the reflectances of a linear color on the bands into `spectrum`.
+    ///
+    /// Parts below 0 are 0; a color above 1 is that of a brighter thing of the same hue.
+    fn lift(&self, rgb: [f32; 3], spectrum: &mut [f64]) {
+        let rgb = rgb.map(|v| v.max(0.0));
+        let most = rgb.iter().copied().fold(1.0, f32::max);
+        let smooth = SmoothReflectance::of_rgb(rgb.map(|v| v / most));
+        let (mut seen, mut wanted) = (DVec3::ZERO, DVec3::ZERO);
+        for ((nm, d65), light) in self.fine_nm.iter().zip(&self.d65).zip(&self.light) {
+            let value = f64::from(smooth.at(&[*nm])[0]);
+            seen += value * *d65;
+            wanted += value * *light;
+        }
+        let missed = DVec3::from_array(rgb.map(|v| f64::from(v / most))) - seen;
+        let mut mixture = self.mixture_of_rgb * missed;
+        wanted += self.primaries_light * mixture;
+        if let Some(mixture_of_bands) = &self.mixture_of_bands {
+            let mut on_bands = DVec3::ZERO;
+            for (nm, weights) in self.bands_nm.iter().zip(&self.bands) {
+                on_bands += f64::from(smooth.at(&[*nm])[0]) * *weights;
+            }
+            mixture = *mixture_of_bands * (wanted - on_bands);
+        }
+        for (band, value) in spectrum.iter_mut().enumerate() {
+            let own = f64::from(smooth.at(&[self.bands_nm[band]])[0]);
+            let more = self.primaries.each_ref().map(|primary| primary[band]);
+            *value = f64::from(most) * (own + mixture.dot(DVec3::from_array(more))).max(0.0);
+        }
+    }
+
+    /// Returns the radiance of colors under the light whose white has this radiance, a value a band.
+    pub(super) fn radiance(
+        &self,
+        path: &Path,
+        colors: &Colors<'_>,
+        white: &[f64],
+        grid: &WavelengthGrid,
+    ) -> Result<SpectralImage, SceneError> {
+        let (rows, columns) = colors.size();
+        check_made(path, (4 * grid.len() as u64 + 16).saturating_mul(rows as u64).saturating_mul(columns as u64))?;
+        let mut planes: Vec<Array2<f32>> = (0..grid.len()).map(|_| Array2::zeros((rows, columns))).collect();
+        let mut lines: Vec<Vec<&mut [f32]>> = (0..rows).map(|_| Vec::with_capacity(grid.len())).collect();
+        for plane in &mut planes {
+            let samples = plane.as_slice_mut().expect("a new plane is in standard order");
+            lines.iter_mut().zip(samples.chunks_mut(columns.max(1))).for_each(|(line, samples)| line.push(samples));
+        }
+        lines.into_par_iter().enumerate().for_each(|(row, mut bands)| {
+            let mut spectrum = vec![0.0; white.len()];
+            let mut last = None;
+            for column in 0..columns {
+                let rgb = colors.at(row, column);
+                // Flat parts of pictures are lifted once.
+                if last.replace(rgb) != Some(rgb) {
+                    self.lift(rgb, &mut spectrum);
+                }
+                for ((band, value), white) in bands.iter_mut().zip(&spectrum).zip(white) {
+                    band[column] = (value * white) as f32;
+                }
+            }
+        });
+        Ok(SpectralImage::new(Quantity::Radiance, grid.clone(), planes)?)
+    }
+}
+
+/// Linear colors of a picture.
+pub(super) enum Colors<'a> {
+    Linear(&'a [Array2<f32>; 3]),
+    /// Codes of sRGB, 16 bits, three a pixel, and the light of each code.
+    Codes {
+        picture: image::ImageBuffer<image::Rgb<u16>, Vec<u16>>,
+        light: Vec<f32>,
+    },
+}
+
+impl Colors<'_> {
+    /// The colors of a picture of codes.
+    pub(super) fn of_codes(picture: DynamicImage) -> Self {
+        let light = (0..=u16::MAX).map(|code| srgb_decode(f64::from(code) / 65535.0) as f32).collect();
+        Self::Codes { picture: picture.into_rgb16(), light }
+    }
+
+    fn size(&self) -> (usize, usize) {
+        match self {
+            Self::Linear(planes) => planes[0].dim(),
+            Self::Codes { picture, .. } => (picture.height() as usize, picture.width() as usize),
+        }
+    }
+
+    fn at(&self, row: usize, column: usize) -> [f32; 3] {
+        match self {
+            Self::Linear(planes) => [0, 1, 2].map(|k| planes[k][(row, column)]),
+            Self::Codes { picture, light } => {
+                picture.get_pixel(column as u32, row as u32).0.map(|code| light[usize::from(code)])
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use dioptric_spectrum::{Lab, color_checker_reflectances, delta_e_2000};
+
+    fn grids() -> Vec<WavelengthGrid> {
+        let uniform = |step: f64| WavelengthGrid::uniform(400.0, 700.0, step).unwrap();
+        let uneven = WavelengthGrid::new(vec![405.0, 440.0, 470.0, 525.0, 560.0, 610.0, 670.0]).unwrap();
+        vec![uniform(1.0), uniform(5.0), uniform(10.0), uniform(20.0), uneven]
+    }
+
+    fn lights() -> [Illuminant; 4] {
+        [Illuminant::D65, Illuminant::D50, Illuminant::A, Illuminant::parse("5500K").unwrap()]
+    }
+
+    /// The 24 patches in linear sRGB, those beyond its gamut moved into it.
+    fn patches() -> Vec<[f32; 3]> {
+        let grid = WavelengthGrid::uniform(380.0, 780.0, 5.0).unwrap();
+        let white = Illuminant::D65.white_radiance(&grid, std::f64::consts::PI);
+        let seen = |reflectance: &[f64]| {
+            let light: Vec<f64> = reflectance.iter().zip(&white).map(|(r, w)| r * w).collect();
+            Observer::Cie1931.xyz(&grid, &light).to_linear_srgb()
+        };
+        let chart = color_checker_reflectances();
+        chart.iter().map(|(_, r)| seen(&r.sample_held(&grid)).map(|v| v.clamp(0.0, 1.0) as f32)).collect()
+    }
+
+    fn lab(xyz: [f64; 3], white: [f64; 3]) -> Lab {
+        Xyz([0, 1, 2].map(|k| xyz[k])).to_lab(Xyz(white))
+    }
+
+    /// Under each light and on each grid white is the light's own, and patches are what their reflectance under D65 to the code, and the
+    /// same reflectance at every 1 nm, are.
+    #[test]
+    fn patches_keep_their_colors_on_any_bands() {
+        let fine = WavelengthGrid::uniform(380.0, 780.0, 1.0).unwrap();
+        for light in lights() {
+            for grid in grids() {
+                let lift = SmoothLift::new(&grid, &light).unwrap();
+                let exact = SmoothLift::new(&fine, &light).unwrap();
+                let seen = |lift: &SmoothLift, grid: &WavelengthGrid, rgb: [f32; 3]| {
+                    let white = light.white_radiance(grid, std::f64::consts::PI);
+                    let mut spectrum = vec![0.0; grid.len()];
+                    lift.lift(rgb, &mut spectrum);
+                    let lit: Vec<f64> = spectrum.iter().zip(&white).map(|(r, w)| r * w).collect();
+                    lab(Observer::Cie1931.xyz(grid, &lit).0, Observer::Cie1931.xyz(grid, &white).0)
+                };
+                let (white, true_white) = (seen(&lift, &grid, [1.0; 3]), lab([1.0; 3], [1.0; 3]));
+                assert!(delta_e_2000(white, true_white) < 1e-6);
+                for rgb in patches() {
+                    let found = seen(&lift, &grid, rgb);
+                    let off = delta_e_2000(found, seen(&exact, &fine, rgb));
+                    // The bar is 1; sums of the bands are made equal, so that only clipping is left.
+                    assert!(off < 0.3, "{rgb:?} under {light:?} on {} bands: {off}", grid.len());
+                    if light == Illuminant::D65 {
+                        let shown = lab(Xyz::from_linear_srgb(rgb.map(f64::from)).0, Xyz::from_linear_srgb([1.0; 3]).0);
+                        let off = delta_e_2000(found, shown);
+                        assert!(off < 0.5, "{rgb:?} on {} bands: {off} from the picture", grid.len());
+                    }
+                }
+            }
+        }
+    }
+
+    /// Two bands cannot tell colors: they have the reflectances there.
+    #[test]
+    fn few_bands_have_the_reflectance_at_them() {
+        let (few, many) = ([500.0, 600.0], WavelengthGrid::uniform(400.0, 700.0, 1.0).unwrap());
+        let lift = SmoothLift::new(&WavelengthGrid::new(few.to_vec()).unwrap(), &Illuminant::D65).unwrap();
+        let fine = SmoothLift::new(&many, &Illuminant::D65).unwrap();
+        let (mut on_few, mut on_many) = (vec![0.0; 2], vec![0.0; many.len()]);
+        lift.lift([0.5, 0.2, 0.1], &mut on_few);
+        fine.lift([0.5, 0.2, 0.1], &mut on_many);
+        for (nm, value) in few.iter().zip(on_few) {
+            // What the fine grid's own sums need is a thousandth.
+            assert!((value - on_many[*nm as usize - 400]).abs() < 3e-3, "{value} at {nm} nm");
+        }
+    }
+}

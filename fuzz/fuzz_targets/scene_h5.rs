@@ -1,0 +1,9 @@
+//! Reads HDF5 files.
+
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+
+fuzz_target!(|data: &[u8]| dioptric_fuzz::read(data, "h5", |path| {
+    dioptric_scene::read_scene(path, &dioptric_scene::ReadOptions::default()).is_ok()
+}));
