@@ -4,6 +4,7 @@
 //! that both could have found is shared between them by the balance heuristic (Veach 1997, ch. 9). Paths end by Russian
 //! roulette. A packet of wavelengths shares the path until it meets a surface that disperses it; there each goes on alone.
 
+use dioptric_spectrum::lanes;
 use dioptric_world::{Ray, Receiver, World};
 use serde::{Deserialize, Serialize};
 
@@ -87,7 +88,7 @@ impl Integrator<'_> {
             let Some(hit) = self.world.intersect(&ray, f32::INFINITY) else {
                 let share = scattered.map_or(1.0, |(from, pdf)| share(pdf, self.world.sky_pdf(from, ray.direction)));
                 let sky = self.world.sky(ray.direction, wavelengths_nm);
-                self.add(&mut sum, n_scatterings, &throughput, &sky.map(|l| l * share));
+                self.add(&mut sum, n_scatterings, &throughput, &lanes(|i| sky[i] * share));
                 return sum;
             };
             // Dispersion takes the packet apart: every wavelength meets this surface again by itself.
@@ -102,14 +103,14 @@ impl Integrator<'_> {
             }
             // A medium that it fills has taken its share on the way.
             let throughput = match self.world.transmittance(&hit, &ray, wavelengths_nm) {
-                Some(left) => std::array::from_fn(|i| throughput[i] * left[i]),
+                Some(left) => lanes(|i| throughput[i] * left[i]),
                 None => throughput,
             };
             // The surface may shine.
             let glow = self.world.emission(&hit, -ray.direction, wavelengths_nm);
             if glow.iter().any(|&l| l > 0.0) {
                 let share = scattered.map_or(1.0, |(from, pdf)| share(pdf, self.world.light_pdf(from, &hit)));
-                self.add(&mut sum, n_scatterings, &throughput, &glow.map(|l| l * share));
+                self.add(&mut sum, n_scatterings, &throughput, &lanes(|i| glow[i] * share));
             }
             if is_last {
                 return sum;
@@ -125,14 +126,14 @@ impl Integrator<'_> {
                 let is_lit = light.pdf > 0.0 && factor.iter().zip(&light.radiance).any(|(f, l)| f * l > 0.0);
                 if is_lit && !self.world.is_occluded(&hit.ray_towards(light.direction), light.distance_m) {
                     let share = if light.is_delta { 1.0 } else { share(light.pdf, bsdf.pdf(light.direction)) };
-                    let found = std::array::from_fn(|i| factor[i] * light.radiance[i] * (share / light.pdf));
+                    let found = lanes(|i| factor[i] * light.radiance[i] * (share / light.pdf));
                     self.add(&mut sum, n_scatterings + 1, &throughput, &found);
                 }
             }
             // Go on in a direction that the surface scatters from.
             let Some(next) = bsdf.sample(u_lobe, u_direction) else { return sum };
             path.ray = hit.ray_towards(next.incident);
-            path.throughput = std::array::from_fn(|i| throughput[i] * next.weight[i]);
+            path.throughput = lanes(|i| throughput[i] * next.weight[i]);
             path.scattered = if next.is_delta { None } else { Some((at, next.pdf)) };
             path.n_scatterings += 1;
             let greatest = path.throughput.iter().copied().fold(0.0, f32::max);
@@ -145,7 +146,7 @@ impl Integrator<'_> {
                 if random.pair(pair + ROULETTE)[0] >= chance {
                     return sum;
                 }
-                path.throughput = path.throughput.map(|share| share / chance);
+                path.throughput.iter_mut().for_each(|share| *share /= chance);
             }
         }
     }

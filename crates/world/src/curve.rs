@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, OnceLock};
 
-use dioptric_spectrum::{Illuminant, Observer, SmoothReflectance, Spectrum, WavelengthGrid};
+use dioptric_spectrum::{Illuminant, Observer, SmoothReflectance, Spectrum, WavelengthGrid, lanes};
 
 /// A function of wavelength that is quick to look up and cheap to copy.
 ///
@@ -98,7 +98,7 @@ impl SpectralCurve {
         }
         let share = SmoothReflectance::of_rgb(rgb.map(|v| v / largest)).at(wavelengths_nm);
         let white = d65().at(wavelengths_nm);
-        std::array::from_fn(|lane| largest * share[lane] * white[lane])
+        lanes(|lane| largest * share[lane] * white[lane])
     }
 
     fn of(kind: Kind) -> Self {
@@ -111,14 +111,17 @@ impl SpectralCurve {
     pub fn at<const N: usize>(&self, wavelengths_nm: &[f32; N]) -> [f32; N] {
         match &self.kind {
             Kind::Constant => [self.scale; N],
-            Kind::Knots { knots, beyond } => wavelengths_nm.map(|w| self.scale * between_knots(knots, *beyond, w)),
+            Kind::Knots { knots, beyond } => lanes(|i| self.scale * between_knots(knots, *beyond, wavelengths_nm[i])),
             Kind::Table { first_nm, values, beyond } => {
-                wavelengths_nm.map(|w| self.scale * in_table(w - first_nm, values, *beyond))
+                lanes(|i| self.scale * in_table(wavelengths_nm[i] - first_nm, values, *beyond))
             }
-            Kind::Smooth(smooth) => smooth.at(wavelengths_nm).map(|v| self.scale * v),
+            Kind::Smooth(smooth) => {
+                let share = smooth.at(wavelengths_nm);
+                lanes(|lane| self.scale * share[lane])
+            }
             Kind::SmoothLight(smooth) => {
                 let (share, white) = (smooth.at(wavelengths_nm), d65().at(wavelengths_nm));
-                std::array::from_fn(|lane| self.scale * share[lane] * white[lane])
+                lanes(|lane| self.scale * share[lane] * white[lane])
             }
         }
     }
@@ -182,6 +185,7 @@ fn between_knots(knots: &[(f32, f32)], beyond: Beyond, wavelength_nm: f32) -> f3
     v0 + (v1 - v0) * (wavelength_nm - w0) / (w1 - w0)
 }
 
+#[inline]
 fn in_table(along_nm: f32, values: &[f32], beyond: Beyond) -> f32 {
     let last = values.len() - 1;
     if beyond == Beyond::Zero && !(along_nm >= 0.0 && along_nm <= last as f32) {

@@ -12,7 +12,7 @@ use crate::{
     uv::TexturePoint,
 };
 use dioptric_optics::Glass;
-use dioptric_spectrum::Spectrum;
+use dioptric_spectrum::{Spectrum, lanes};
 
 /// How a surface scatters light.
 #[derive(Clone, Debug, PartialEq)]
@@ -354,10 +354,10 @@ impl Surfaces<'_> {
             }
             Material::Translucent { reflectance, transmittance } => {
                 let (r, t) = (share_of(*reflectance), share_of(*transmittance));
-                let down: [f32; N] = std::array::from_fn(|lane| (r[lane] + t[lane]).max(1.0).recip());
+                let down: [f32; N] = lanes(|lane| (r[lane] + t[lane]).max(1.0).recip());
                 Lobe::Diffuse {
-                    reflectance: std::array::from_fn(|lane| r[lane] * down[lane]),
-                    transmittance: std::array::from_fn(|lane| t[lane] * down[lane]),
+                    reflectance: lanes(|lane| r[lane] * down[lane]),
+                    transmittance: lanes(|lane| t[lane] * down[lane]),
                 }
             }
             Material::Mirror { reflectance, roughness } => {
@@ -416,7 +416,7 @@ impl Surfaces<'_> {
                 let base = (1.0 - metallic) * (1.0 - through);
                 let layered = Lobe::Layered {
                     diffuse: color.map(|c| c * base),
-                    mirrored: std::array::from_fn(|lane| mirrored[lane] + metallic * (color[lane] - mirrored[lane])),
+                    mirrored: lanes(|lane| mirrored[lane] + metallic * (color[lane] - mirrored[lane])),
                     edge: edge + metallic * (1.0 - edge),
                     lost,
                     rough,

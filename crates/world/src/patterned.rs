@@ -15,22 +15,42 @@ pub(crate) trait Frames {
 /// What shapes have beyond their own: the frames in which patterns are asked, things that they are parts of.
 #[derive(Debug, Default)]
 pub(crate) struct Patterned {
-    /// The place of each shape in its group and the inverse; none where no texture is a pattern.
-    places: Vec<(DAffine3, DAffine3)>,
+    /// The place of each shape in its group; none where no texture is a pattern.
+    places: Vec<ShapePlace>,
     things: HashMap<ShapeId, usize>,
+}
+
+/// The place of a shape in its group.
+#[derive(Debug)]
+struct ShapePlace {
+    place: DAffine3,
+    inverse: DAffine3,
+    /// How long a length of the group is in the frame of the shape, on average.
+    own_scale: f64,
+}
+
+impl ShapePlace {
+    fn new(place: DAffine3) -> Self {
+        let inverse = place.inverse();
+        Self { place, inverse, own_scale: scale_of(&inverse) }
+    }
+}
+
+fn scale_of(place: &DAffine3) -> f64 {
+    place.matrix3.determinant().abs().cbrt()
 }
 
 /// The frame of a shape in the world, by way of an instance if any.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct OwnFrame<'a> {
-    shape: Option<&'a (DAffine3, DAffine3)>,
+    shape: Option<&'a ShapePlace>,
     instance: Option<(&'a DAffine3, &'a DAffine3)>,
 }
 
 impl Patterned {
     pub(crate) fn of(textures: &[Texture], places: impl Iterator<Item = DAffine3>, things: &[Vec<ShapeId>]) -> Self {
         let has_patterns = textures.iter().any(|texture| matches!(texture, Texture::Pattern { .. }));
-        let places = places.filter(|_| has_patterns).map(|place| (place, place.inverse())).collect();
+        let places = places.filter(|_| has_patterns).map(ShapePlace::new).collect();
         let parts =
             |(thing, shapes): (usize, &Vec<ShapeId>)| shapes.iter().map(|&shape| (shape, thing)).collect::<Vec<_>>();
         let things = things.iter().enumerate().flat_map(parts).collect();
@@ -70,25 +90,24 @@ impl OwnFrame<'_> {
     fn own_point(&self, point: Vec3) -> DVec3 {
         let in_group =
             self.instance.map_or(point.as_dvec3(), |(_, inverse)| inverse.transform_point3(point.as_dvec3()));
-        self.shape.map_or(in_group, |(_, inverse)| inverse.transform_point3(in_group))
+        self.shape.map_or(in_group, |shape| shape.inverse.transform_point3(in_group))
     }
 
     /// Returns a normal of the world in the frame of the shape.
     fn own_normal(&self, normal: Vec3) -> DVec3 {
         let normal = normal.as_dvec3();
         let in_group = self.instance.map_or(normal, |(place, _)| place.matrix3.transpose() * normal);
-        self.shape.map_or(in_group, |(place, _)| place.matrix3.transpose() * in_group).normalize_or(DVec3::Z)
+        self.shape.map_or(in_group, |shape| shape.place.matrix3.transpose() * in_group).normalize_or(DVec3::Z)
     }
 
     /// Returns a normal of the shape's frame in the world, of length 1.
     pub(crate) fn world_normal(&self, own: DVec3) -> Vec3 {
-        let in_group = self.shape.map_or(own, |(place, _)| normal_matrix(place) * own);
+        let in_group = self.shape.map_or(own, |shape| normal_matrix(&shape.place) * own);
         self.instance.map_or(in_group, |(place, _)| normal_matrix(place) * in_group).normalize_or(DVec3::Z).as_vec3()
     }
 
     /// How long a length of the world is in the frame of the shape, on average.
     fn own_scale(&self) -> f64 {
-        let of = |inverse: &DAffine3| inverse.matrix3.determinant().abs().cbrt();
-        self.instance.map_or(1.0, |(_, inverse)| of(inverse)) * self.shape.map_or(1.0, |(_, inverse)| of(inverse))
+        self.instance.map_or(1.0, |(_, inverse)| scale_of(inverse)) * self.shape.map_or(1.0, |shape| shape.own_scale)
     }
 }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use dioptric_spectrum::SmoothReflectance;
+use dioptric_spectrum::{SmoothReflectance, lanes};
 use glam::{DVec3, Vec2};
 
 use crate::{
@@ -161,7 +161,7 @@ impl Textures<'_> {
                     let mut sum = [0.0; N];
                     for (part, counts) in parts {
                         let value = self.spectral(part, at, wavelengths_nm);
-                        sum = std::array::from_fn(|i| sum[i] + counts * value[i]);
+                        sum = lanes(|i| sum[i] + counts * value[i]);
                     }
                     sum
                 }
@@ -172,18 +172,18 @@ impl Textures<'_> {
             }
             Texture::Product([a, b]) => {
                 let [a, b] = [*a, *b].map(|t| self.spectral(t, at, wavelengths_nm));
-                std::array::from_fn(|i| a[i] * b[i])
+                lanes(|i| a[i] * b[i])
             }
             Texture::Blend { of: [a, b], amount } => {
                 let [a, b] = [*a, *b].map(|t| self.spectral(t, at, wavelengths_nm));
                 let amount = self.number(*amount, at).clamp(0.0, 1.0);
-                std::array::from_fn(|i| a[i] + amount * (b[i] - a[i]))
+                lanes(|i| a[i] + amount * (b[i] - a[i]))
             }
             Texture::Pattern { of, by } => {
                 let mut sum = [0.0; N];
                 for (share, part) in shares(of, by, at) {
                     let value = self.spectral(part, at, wavelengths_nm);
-                    sum.iter_mut().zip(value).for_each(|(sum, value)| *sum += share * value);
+                    sum = lanes(|i| sum[i] + share * value[i]);
                 }
                 sum
             }

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use dioptric_spectrum::lanes;
 use glam::{DAffine3, DVec3, Vec2, Vec3};
 
 use crate::{
@@ -182,7 +183,7 @@ impl World {
                     None => radiance,
                     Some(glow) => {
                         let share = Textures(&self.textures).spectral(glow, &self.point_of(hit), wavelengths_nm);
-                        std::array::from_fn(|lane| radiance[lane] * share[lane])
+                        lanes(|lane| radiance[lane] * share[lane])
                     }
                 }
             }
@@ -218,7 +219,7 @@ impl World {
             let point = at.point + light.distance_m * light.direction;
             let hit = Hit { shape: ShapeId(shape), ..self.geometry.shapes[shape as usize].hit_at(point, triangle) };
             let share = Textures(&self.textures).spectral(glow, &self.point_of(&hit), wavelengths_nm);
-            light.radiance = std::array::from_fn(|lane| light.radiance[lane] * share[lane]);
+            light.radiance = lanes(|lane| light.radiance[lane] * share[lane]);
         }
         Some(light)
     }

@@ -2,8 +2,10 @@
 
 use std::f32::consts::{FRAC_2_PI, PI};
 
-use super::{Bsdf, Lobe, fresnel, refract, substrate_base};
+use dioptric_spectrum::lanes;
 use glam::Vec3;
+
+use super::{Bsdf, Lobe, fresnel, refract, substrate_base};
 
 impl<const N: usize> Bsdf<N> {
     /// Returns the share of even light that is scattered back alike in all directions; what a rough matte surface and the base of
@@ -14,7 +16,7 @@ impl<const N: usize> Bsdf<N> {
         let mut sum = [0.0; N];
         for (factor, lobe) in self.lobes() {
             let reflectance = lobe.diffuse_reflectance(cos);
-            sum.iter_mut().zip(reflectance).for_each(|(sum, reflectance)| *sum += factor.share * reflectance);
+            sum = lanes(|lane| sum[lane] + factor.share * reflectance[lane]);
         }
         sum
     }
@@ -77,7 +79,7 @@ impl<const N: usize> Bsdf<N> {
             };
             gloss.push_with(*factor, gloss_of);
         }
-        (gloss.n_lobes > 0).then_some(gloss)
+        (!gloss.lobes.is_empty()).then_some(gloss)
     }
 
     /// Returns the directions that light is mirrored from or let through from without any spread, each with what its radiance is
@@ -88,20 +90,19 @@ impl<const N: usize> Bsdf<N> {
         let mut add = |share: f32, incident: Vec3, value: [f32; N]| {
             let incident = self.frame.to_world(incident).normalize();
             if self.local(incident).is_some() {
-                mirrors.push((incident, value.map(|v| share * v)));
+                mirrors.push((incident, lanes(|lane| share * value[lane])));
             }
         };
         for (factor, lobe) in self.lobes() {
             match lobe {
                 Lobe::Dielectric { index, reflectance, transmittance, rough: None } => {
                     let eta = index.map(|n| if o.z > 0.0 { n } else { 1.0 / n });
-                    let mirrored = eta.map(|eta| fresnel::dielectric(o.z.abs(), eta));
-                    let value = std::array::from_fn(|lane| reflectance[lane] * mirrored[lane]);
+                    let mirrored: [f32; N] = lanes(|lane| fresnel::dielectric(o.z.abs(), eta[lane]));
+                    let value = lanes(|lane| reflectance[lane] * mirrored[lane]);
                     add(factor.share, Vec3::new(-o.x, -o.y, o.z), value);
                     if let Some(through) = refract(o, Vec3::Z * o.z.signum(), eta[0]) {
-                        let value = std::array::from_fn(|lane| {
-                            transmittance[lane] * (1.0 - mirrored[lane]) / (eta[lane] * eta[lane])
-                        });
+                        let value =
+                            lanes(|lane| transmittance[lane] * (1.0 - mirrored[lane]) / (eta[lane] * eta[lane]));
                         add(factor.share, through, value);
                     }
                 }
@@ -140,20 +141,20 @@ impl<const N: usize> Lobe<N> {
     fn diffuse_reflectance(&self, cos: f32) -> [f32; N] {
         match self {
             Self::Diffuse { reflectance, .. } => *reflectance,
-            Self::Coated { diffuse, index, inside, .. } => std::array::from_fn(|lane| {
+            Self::Coated { diffuse, index, inside, .. } => lanes(|lane| {
                 let through = 1.0 - fresnel::dielectric(cos, index[lane]);
                 through * diffuse[lane] * (1.0 - inside[lane]) / (1.0 - diffuse[lane] * inside[lane])
             }),
             Self::RoughDiffuse { reflectance, constants: [a, b] } => {
                 let shape = a + b * rough_matte_mean(cos);
-                reflectance.map(|r| r * shape)
+                lanes(|lane| reflectance[lane] * shape)
             }
             Self::Layered { diffuse, lost, .. } => {
                 let below = 1.0 - fresnel::between(lost[0], lost[1], mean_schlick_tail(cos));
-                diffuse.map(|d| d * below)
+                lanes(|lane| diffuse[lane] * below)
             }
             Self::Substrate { diffuse, mirrored, .. } => {
-                std::array::from_fn(|lane| diffuse[lane] * (1.0 - mirrored[lane]) * base_seen(cos))
+                lanes(|lane| diffuse[lane] * (1.0 - mirrored[lane]) * base_seen(cos))
             }
             Self::Mirror { .. }
             | Self::Glossy { .. }

@@ -40,19 +40,19 @@ fn floor(v: f64) -> (i64, f64) {
 
 /// Smooth noise, 0–1, of unit scale.
 pub(super) fn smooth(at: DVec3) -> f64 {
-    let [(x, fx), (y, fy), (z, fz)] = at.to_array().map(floor);
+    let ((x, fx), (y, fy), (z, fz)) = (floor(at.x), floor(at.y), floor(at.z));
     let f = DVec3::new(fx, fy, fz);
     let s = f * f * (DVec3::splat(3.0) - 2.0 * f);
     let lerp = |a: f64, b: f64, t: f64| a + (b - a) * t;
     // The corners of the cell, as `unit` of them.
     let (x, y, z) = (
-        [x, x + 1].map(|x| times(x, X_FACTOR)),
-        [y, y + 1].map(|y| times(y, Y_FACTOR)),
-        [z, z + 1].map(|z| times(z, Z_FACTOR)),
+        [times(x, X_FACTOR), times(x + 1, X_FACTOR)],
+        [times(y, Y_FACTOR), times(y + 1, Y_FACTOR)],
+        [times(z, Z_FACTOR), times(z + 1, Z_FACTOR)],
     );
     let edge = |j: usize, k: usize| {
-        let [a, b] = x.map(|x| in_unit(mixed(x ^ y[j] ^ z[k])));
-        lerp(a, b, s.x)
+        let at = |i: usize| in_unit(mixed(x[i] ^ y[j] ^ z[k]));
+        lerp(at(0), at(1), s.x)
     };
     lerp(lerp(edge(0, 0), edge(1, 0), s.y), lerp(edge(0, 1), edge(1, 1), s.y), s.z)
 }
