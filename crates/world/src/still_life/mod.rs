@@ -4,6 +4,7 @@ mod floor_plan;
 mod marks;
 mod noise;
 mod paint;
+mod palette;
 mod pigment;
 mod room;
 
