@@ -2,14 +2,11 @@
 
 use std::sync::Arc;
 
-use dioptric_backward::{Pinhole, ViewDetail, gathered_view};
-use dioptric_spectrum::{Cancel, DepthMap, WavelengthGrid};
+use dioptric_backward::{GatheredView, Pinhole, ViewDetail, gathered_view};
+use dioptric_spectrum::{Cancel, WavelengthGrid};
 use dioptric_world::World;
 
-use crate::{
-    PaintingFolder, PipelineError,
-    paintings::{SeenView, ViewKey},
-};
+use crate::{PaintingFolder, PipelineError, paintings::ViewKey};
 
 /// What is gathered: a world, and who looks at it how.
 #[derive(Clone, Debug)]
@@ -33,11 +30,9 @@ impl GatheredPicture {
         folder: Option<&PaintingFolder>,
         progress: &(dyn Fn(f64) + Sync),
         cancel: &Cancel,
-    ) -> Result<SeenView, PipelineError> {
-        let gather = || {
-            let seen = gathered_view(&self.world, &self.view, &self.grid, (self.detail, self.seed), progress, cancel)?;
-            Ok(SeenView { radiance: seen.radiance, depth: DepthMap::new(seen.z_m)? })
-        };
+    ) -> Result<GatheredView, PipelineError> {
+        let gather =
+            || Ok(gathered_view(&self.world, &self.view, &self.grid, (self.detail, self.seed), progress, cancel)?);
         match folder {
             Some(folder) => folder.view(&self.key(), gather),
             None => gather(),

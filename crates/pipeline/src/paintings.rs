@@ -7,8 +7,9 @@ use std::{
     time::{SystemTime, UNIX_EPOCH},
 };
 
+use dioptric_backward::GatheredView;
 use dioptric_scene::{ExrParts, ExrSamples, read_spectral_exr, write_spectral_exr};
-use dioptric_spectrum::{DepthMap, Quantity, SpectralImage, WavelengthGrid};
+use dioptric_spectrum::{Quantity, SpectralImage, WavelengthGrid};
 use etcetera::{BaseStrategy, choose_base_strategy};
 
 use crate::PipelineError;
@@ -49,14 +50,6 @@ pub(crate) struct ViewKey {
     pub(crate) grid: WavelengthGrid,
 }
 
-/// What is seen of a world.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct SeenView {
-    pub(crate) radiance: SpectralImage,
-    /// At the centers of the samples; infinite where nothing is met.
-    pub(crate) depth: DepthMap,
-}
-
 impl PaintingFolder {
     /// Returns the user's folder of views, which all programs share: the one that the environment variable `DIOPTRIC_CACHE` names,
     /// else `dioptric` in the user's cache; `None` where there is none or, by an empty variable, none is wanted.
@@ -80,8 +73,8 @@ impl PaintingFolder {
     pub(crate) fn view(
         &self,
         key: &ViewKey,
-        make: impl FnOnce() -> Result<SeenView, PipelineError>,
-    ) -> Result<SeenView, PipelineError> {
+        make: impl FnOnce() -> Result<GatheredView, PipelineError>,
+    ) -> Result<GatheredView, PipelineError> {
         if !is_kept(key) {
             return make();
         }
@@ -112,7 +105,7 @@ impl PaintingFolder {
     }
 
     /// Writes a view, and removes the oldest of too many.
-    fn keep(&self, file: &Path, seen: &SeenView) {
+    fn keep(&self, file: &Path, seen: &GatheredView) {
         // Quick to read again.
         let samples = ExrSamples::Uncompressed;
         let parts = ExrParts { depth: Some(&seen.depth), samples, ..ExrParts::default() };
@@ -133,7 +126,7 @@ fn is_kept(key: &ViewKey) -> bool {
 }
 
 /// Returns the view of a file of this size and these bands, `None` where there is none.
-fn restored(file: &Path, key: &ViewKey) -> Option<SeenView> {
+fn restored(file: &Path, key: &ViewKey) -> Option<GatheredView> {
     if !file.exists() {
         return None;
     }
@@ -142,7 +135,8 @@ fn restored(file: &Path, key: &ViewKey) -> Option<SeenView> {
     let radiance = SpectralImage::new(Quantity::Radiance, key.grid.clone(), read.image.into_planes()).ok()?;
     let depth = read.depth?;
     let size = (key.rows, key.columns);
-    (depth.z_m().dim() == size && (radiance.rows(), radiance.columns()) == size).then_some(SeenView { radiance, depth })
+    (depth.z_m().dim() == size && (radiance.rows(), radiance.columns()) == size)
+        .then_some(GatheredView { radiance, depth })
 }
 
 /// Removes the oldest views of a folder until the rest takes at most so many bytes.
@@ -171,6 +165,7 @@ fn remove_oldest(folder: &Path, most_bytes: u64) {
 mod tests {
     use std::sync::atomic::{AtomicUsize, Ordering};
 
+    use dioptric_spectrum::DepthMap;
     use ndarray::Array2;
 
     use super::*;
@@ -185,7 +180,7 @@ mod tests {
             Array2::from_shape_fn((250, 400), |(r, c)| 1.1_f32.powi((r + 3 * band) as i32 % 50) + c as f32)
         };
         let z_m = Array2::from_shape_fn((250, 400), |(r, c)| if r < 9 { f32::INFINITY } else { 1.0 + c as f32 / 7.0 });
-        let seen = SeenView {
+        let seen = GatheredView {
             radiance: SpectralImage::new(Quantity::Radiance, grid, vec![plane(0), plane(1)]).unwrap(),
             depth: DepthMap::new(z_m).unwrap(),
         };

@@ -2,6 +2,7 @@
 
 use std::f32::consts::{FRAC_1_PI, PI};
 
+use dioptric_spectrum::lanes;
 use dioptric_world::{Bsdf, Hit, Ray, Receiver, World, glam::Vec3};
 
 use crate::{
@@ -21,13 +22,16 @@ pub(super) struct LightRays {
 }
 
 impl LightRays {
-    /// More of them where they are smoothed less.
-    fn on<const N: usize>(self, surface: &LitSurface<N>) -> Self {
-        const MORE: u32 = 4;
-        match surface.is_mirrored {
-            true => Self { n_lights: MORE * self.n_lights, n_bounces: MORE * self.n_bounces, ..self },
-            false => self,
-        }
+    /// More of them where light is smoothed less: where less than all samples beside are [`alike`](super::smooth::alike).
+    pub(super) fn where_alike(self, alike: f32) -> Self {
+        let times = match alike {
+            0.85.. => 1,
+            0.6.. => 2,
+            0.35.. => 4,
+            _ => 8,
+        };
+        let Self { n_lights, n_bounces, n_gloss } = self;
+        Self { n_lights: times * n_lights, n_bounces: times * n_bounces, n_gloss: times * n_gloss }
     }
 }
 
@@ -52,8 +56,6 @@ pub(super) struct LitSurface<const N: usize> {
     pub(super) mirrored: Vec<(Ray, [f32; N])>,
     /// What is sent on to the eye of what gloss sends out.
     pub(super) through: [f32; N],
-    /// Whether it is seen in a mirror, where neighbors lie too far apart to be smoothed much.
-    pub(super) is_mirrored: bool,
 }
 
 impl<const N: usize> LitSurface<N> {
@@ -73,11 +75,9 @@ pub(super) struct Gatherer<'a, const N: usize> {
     pub(super) most: f32,
 }
 
-/// Samples of the lattice along each side of a block whose rays are one net.
-const BLOCK: usize = 4;
+/// Samples of the lattice along each side of a block whose rays are one net, a power of 2.
+const BLOCK: usize = 1 << 12;
 /// Pairs of numbers that rays begin with; those of their paths follow.
-const LIGHT_PAIR: u32 = 0;
-const PLACE_PAIR: u32 = 1;
 const BOUNCE_PAIR: u32 = 2;
 const GLOSS_PAIR: u32 = 3;
 const GLOSS_LOBE_PAIR: u32 = 4;
@@ -86,12 +86,12 @@ const GLOSS_LOBE_PAIR: u32 = 4;
 const HARDLY: f32 = 1e-30;
 
 impl<const N: usize> Gatherer<'_, N> {
-    /// Returns the numbers of ray `index` of `n` at a sample: those of a block of samples are one Owen-scrambled net, of which each sample
-    /// has a net of its own.
+    /// Returns the numbers of ray `index` of `n` at a sample. Samples take the points of one Owen-scrambled sequence along a Z-curve, so that
+    /// those of each square of 2 × 2, 4 × 4, … samples are a net: what smoothing takes together fills each other's gaps (Ahmed & Wonka 2020).
     fn random(&self, (row, column): (usize, usize), (index, n): (u32, u32), purpose: u64) -> Sampler {
         let block = (row / BLOCK) as u32 * 0x1_0001 + (column / BLOCK) as u32;
-        let within = MORTON[row % BLOCK][column % BLOCK];
-        Sampler::new(self.seed ^ (purpose << 40), block, 0, within * n + index)
+        let within = 2 * spread((row % BLOCK) as u32) + spread((column % BLOCK) as u32);
+        Sampler::new(self.seed ^ (purpose << 40), block, n, within * n + index)
     }
 
     fn integrator(&self) -> Integrator<'_> {
@@ -100,7 +100,6 @@ impl<const N: usize> Gatherer<'_, N> {
 
     /// Gathers light straight from its sources, and what gloss sends on of all light.
     pub(super) fn direct(&self, surface: &LitSurface<N>, at: (usize, usize), rays: LightRays) -> Direct<N> {
-        let rays = rays.on(surface);
         let mut sum = Direct { irradiance: [0.0; N], gloss: [0.0; N] };
         let LitSurface { hit, bsdf, normal, gloss, is_diffuse, .. } = surface;
         if !is_diffuse && gloss.is_none() {
@@ -110,8 +109,14 @@ impl<const N: usize> Gatherer<'_, N> {
         let receiver = Receiver { point: hit.point, normal: bsdf.lit_side() };
         for index in 0..n_lights {
             let random = self.random(at, (index, n_lights), 1);
-            let ([u_light, _], u) = (random.pair(LIGHT_PAIR), random.pair(PLACE_PAIR));
-            let Some(light) = self.world.sample_light(receiver, u_light, u, self.wavelengths_nm) else { continue };
+            let [u_light, x, y, _] = random.camera().map(|u| u as f32);
+            let light = self.world.sample_light(
+                receiver,
+                u_light.min(BELOW_ONE),
+                [x, y].map(|u| u.min(BELOW_ONE)),
+                self.wavelengths_nm,
+            );
+            let Some(light) = light else { continue };
             let cos = normal.dot(light.direction);
             let flat = hit.geometric_normal.dot(light.direction) * hit.geometric_normal.dot(*normal);
             let even = match *is_diffuse && cos > 0.0 && flat > 0.0 {
@@ -159,7 +164,6 @@ impl<const N: usize> Gatherer<'_, N> {
     /// Gathers the irradiance that other surfaces scatter.
     pub(super) fn bounced(&self, surface: &LitSurface<N>, at: (usize, usize), rays: LightRays) -> [f32; N] {
         let LitSurface { hit, bsdf, normal, is_diffuse, .. } = surface;
-        let rays = rays.on(surface);
         let mut sum = [0.0; N];
         if !is_diffuse {
             return sum;
@@ -184,7 +188,7 @@ impl<const N: usize> Gatherer<'_, N> {
             };
             let found = self.integrator().follow(path, self.wavelengths_nm, &random);
             let share = PI * bsdf.diffuse_weight(direction) / rays.n_bounces as f32;
-            sum.iter_mut().zip(found).for_each(|(sum, found)| *sum += share * found.min(self.most));
+            (0..N).for_each(|lane| sum[lane] += share * found[lane].min(self.most));
         }
         sum
     }
@@ -193,11 +197,16 @@ impl<const N: usize> Gatherer<'_, N> {
     pub(super) fn lit_now(&self, surface: &LitSurface<N>, at: (usize, usize), rays: LightRays) -> [f32; N] {
         let (direct, bounced) = (self.direct(surface, at, rays), self.bounced(surface, at, rays));
         let reflectance = surface.bsdf.diffuse_reflectance();
-        std::array::from_fn(|lane| {
-            FRAC_1_PI * reflectance[lane] * (direct.irradiance[lane] + bounced[lane]) + direct.gloss[lane]
-        })
+        lanes(|lane| FRAC_1_PI * reflectance[lane] * (direct.irradiance[lane] + bounced[lane]) + direct.gloss[lane])
     }
 }
 
-/// The order of the samples of a block in the net of its rays: neighbors far apart.
-const MORTON: [[u32; BLOCK]; BLOCK] = [[0, 8, 2, 10], [12, 4, 14, 6], [3, 11, 1, 9], [15, 7, 13, 5]];
+/// The largest number below 1.
+const BELOW_ONE: f32 = 1.0 - 0.5 * f32::EPSILON;
+
+/// Returns the lower 16 bits with a 0 above each.
+fn spread(bits: u32) -> u32 {
+    [(8, 0x00ff_00ff), (4, 0x0f0f_0f0f), (2, 0x3333_3333), (1, 0x5555_5555)]
+        .into_iter()
+        .fold(bits, |bits, (by, mask)| (bits | bits << by) & mask)
+}

@@ -1,5 +1,6 @@
 //! What a ray of the camera shows: the surface whose light is gathered, and what glows or is mirrored on the way to it.
 
+use dioptric_spectrum::lanes;
 use dioptric_world::{
     Hit, Ray,
     glam::{DVec3, Vec3},
@@ -43,8 +44,6 @@ pub(super) struct First {
 const MOST_MIRRORS: usize = 12;
 /// What is mirrored of light less than this is not looked for.
 const LEAST_MIRRORED: f32 = 1e-3;
-/// Rays by which the light on what is mirrored is gathered.
-const FAR: LightRays = LightRays { n_lights: 1, n_bounces: 1, n_gloss: 1 };
 /// How many mirrors deep what is mirrored besides is looked for.
 const DEEP: usize = 3;
 
@@ -85,7 +84,7 @@ impl<const N: usize> Gatherer<'_, N> {
             let brightest = (0..mirrors.len()).max_by(|&a, &b| mean(&mirrors[a].1).total_cmp(&mean(&mirrors[b].1)));
             let next = brightest.filter(|_| goes_on).map(|index| mirrors.swap_remove(index));
             for (direction, value) in mirrors {
-                let value: [f32; N] = std::array::from_fn(|lane| value[lane] * look.through[lane]);
+                let value: [f32; N] = lanes(|lane| value[lane] * look.through[lane]);
                 if mean(&value) > LEAST_MIRRORED {
                     let ray = hit.ray_towards(direction);
                     let seen = self.glow(ray, DEEP);
@@ -100,8 +99,7 @@ impl<const N: usize> Gatherer<'_, N> {
                 if !goes_on || !mirrored.is_empty() {
                     (0..N).for_each(|lane| look.reflectance[lane] = reflectance[lane] * look.through[lane]);
                     let through = look.through;
-                    let is_mirrored = key != key_of(0, &hit);
-                    let surface = LitSurface { hit, bsdf, normal, gloss, is_diffuse, mirrored, through, is_mirrored };
+                    let surface = LitSurface { hit, bsdf, normal, gloss, is_diffuse, mirrored, through };
                     (look.is_lit, look.has_gloss) = (true, surface.has_gloss());
                     look.surface = Some(Box::new(surface));
                 }
@@ -134,32 +132,38 @@ impl<const N: usize> Gatherer<'_, N> {
 
     /// Returns what is mirrored to the eye besides what glows: light that falls on what the mirrors show, gathered by few rays, and
     /// what gloss sends out.
-    pub(super) fn sent_on(&self, surface: &LitSurface<N>, gloss: &[f32; N], at: (usize, usize)) -> [f32; N] {
-        let mut sum: [f32; N] = std::array::from_fn(|lane| surface.through[lane] * gloss[lane]);
+    pub(super) fn sent_on(
+        &self,
+        surface: &LitSurface<N>,
+        gloss: &[f32; N],
+        at: (usize, usize),
+        rays: LightRays,
+    ) -> [f32; N] {
+        let mut sum: [f32; N] = lanes(|lane| surface.through[lane] * gloss[lane]);
         for (ray, value) in &surface.mirrored {
-            let seen = self.lit_along(*ray, at, DEEP);
+            let seen = self.lit_along(*ray, at, (rays, DEEP));
             (0..N).for_each(|lane| sum[lane] += value[lane] * seen[lane]);
         }
         sum
     }
 
     /// Returns the radiance along a ray without what glows.
-    fn lit_along(&self, ray: Ray, at: (usize, usize), deep: usize) -> [f32; N] {
+    fn lit_along(&self, ray: Ray, at: (usize, usize), (rays, deep): (LightRays, usize)) -> [f32; N] {
         let Some(hit) = self.world.intersect(&ray, f32::INFINITY) else { return [0.0; N] };
         let bsdf = self.world.bsdf(&hit, -ray.direction, self.wavelengths_nm);
         let mut sum = [0.0; N];
         if deep > 0 {
             for (direction, value) in self.mirrors_of(&hit, -ray.direction) {
-                let seen = self.lit_along(hit.ray_towards(direction), at, deep - 1);
+                let seen = self.lit_along(hit.ray_towards(direction), at, (rays, deep - 1));
                 (0..N).for_each(|lane| sum[lane] += value[lane] * seen[lane]);
             }
         }
         let normal = seen_side(&hit, bsdf.normal(), ray.direction);
         let is_diffuse = bsdf.diffuse_reflectance().iter().any(|&r| r > 0.0);
         let (gloss, mirrored, through) = (bsdf.gloss(), Vec::new(), [1.0; N]);
-        let surface = LitSurface { hit, bsdf, normal, gloss, is_diffuse, mirrored, through, is_mirrored: false };
-        let lit = self.lit_now(&surface, at, FAR);
-        std::array::from_fn(|lane| sum[lane] + lit[lane])
+        let surface = LitSurface { hit, bsdf, normal, gloss, is_diffuse, mirrored, through };
+        let lit = self.lit_now(&surface, at, rays);
+        lanes(|lane| sum[lane] + lit[lane])
     }
 
     /// Returns the mirrors of a surface that is seen in another: of glass and coats seen so, those that send on much alone.

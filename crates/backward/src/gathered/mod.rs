@@ -14,7 +14,7 @@ mod look;
 mod paint;
 mod smooth;
 
-use dioptric_spectrum::{Cancel, SpectralImage, WavelengthGrid};
+use dioptric_spectrum::{Cancel, DepthMap, SpectralImage, WavelengthGrid};
 use dioptric_world::World;
 use ndarray::Array2;
 
@@ -32,12 +32,12 @@ pub enum ViewDetail {
 }
 
 /// What a pinhole sees.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct GatheredView {
     /// The radiance, at the centers of the bands.
     pub radiance: SpectralImage,
-    /// The depth along the axis at the middle of each pixel, m; infinite where nothing is met.
-    pub z_m: Array2<f32>,
+    /// The depth along the axis at the middle of each pixel; infinite where nothing is met.
+    pub depth: DepthMap,
 }
 
 /// Returns what a pinhole sees of a world; `progress` gets the part that is done, 0–1, from any thread.
@@ -71,5 +71,5 @@ pub fn gathered_view(
         z_m = depths;
     }
     let radiance = SpectralImage::new(dioptric_spectrum::Quantity::Radiance, grid.clone(), planes)?;
-    Ok(GatheredView { radiance, z_m })
+    Ok(GatheredView { radiance, depth: DepthMap::new(z_m)? })
 }

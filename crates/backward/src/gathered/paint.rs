@@ -16,7 +16,7 @@ use super::{
     ViewDetail,
     light::{Gatherer, LightRays},
     look::{Look, depth_m},
-    smooth::{Guide, Lanes, Passes, Smoothing},
+    smooth::{Guide, Lanes, Passes, Smoothing, alike},
 };
 use crate::{Pinhole, Sampler, peeling::Surfaces};
 
@@ -28,10 +28,12 @@ const BOUNCED: usize = 2;
 /// Light on the lattices.
 type Lights<const N: usize> = [Smoothing<N>; 3];
 
+/// The rays of a sample whose neighbors are alike.
+const RAYS: LightRays = LightRays { n_lights: 2, n_bounces: 1, n_gloss: 1 };
+
 /// What a detail means.
 #[derive(Clone, Copy, Debug)]
 struct Effort {
-    rays: LightRays,
     /// Light straight from its sources, light that gloss and mirrors send on and light that has bounced are gathered at every so manyth
     /// corner each way, and smoothed by passes of these steps.
     lattices: [(usize, Passes); 3],
@@ -44,19 +46,17 @@ impl ViewDetail {
     fn effort(self) -> Effort {
         match self {
             Self::Fine => Effort {
-                rays: LightRays { n_lights: 2, n_bounces: 2, n_gloss: 1 },
                 lattices: [
-                    (1, Passes { steps: &[1, 2, 4], keeps_edges_from: 4 }),
+                    (1, Passes { steps: &[1, 2, 4, 8], keeps_edges_from: 4 }),
                     (1, Passes::by_surface(&[1, 2, 4])),
-                    (2, Passes::by_surface(&[1, 2, 4])),
+                    (2, Passes::by_surface(&[1, 2, 4, 8])),
                 ],
                 within: [(0, 0.0), (2, 0.3), (4, 0.2), (12, 0.0734)],
             },
             Self::Quick => Effort {
-                rays: LightRays { n_lights: 4, n_bounces: 2, n_gloss: 1 },
                 lattices: [
-                    (2, Passes { steps: &[1, 2], keeps_edges_from: 2 }),
-                    (2, Passes::by_surface(&[1, 2])),
+                    (2, Passes { steps: &[1, 2, 4], keeps_edges_from: 4 }),
+                    (2, Passes::by_surface(&[1, 2, 4])),
                     (2, Passes::by_surface(&[1, 2, 4, 8])),
                 ],
                 within: [(0, 0.0), (0, 0.0), (2, 0.34), (4, 0.1875)],
@@ -229,28 +229,39 @@ impl<'a, const N: usize> Painter<'a, N> {
     /// Looks through the upper corners of a row of pixels, and gathers light there.
     fn corners_of_row(&self, row: usize) -> Result<Corners<N>, Cancelled> {
         let n = self.size.1 + 1;
-        let Effort { rays, lattices, .. } = self.effort;
+        let lattices = self.effort.lattices;
         let mut corners =
             Corners { looks: Vec::with_capacity(n), lights: std::array::from_fn(|_| (Vec::new(), Vec::new())) };
+        let mut surfaces = Vec::with_capacity(n);
         for column in 0..n {
             self.cancel.check()?;
             let mut look = self.look(row as f64 - 0.5, column as f64 - 0.5);
-            let surface = look.surface.take();
+            surfaces.push(look.surface.take());
+            corners.looks.push(look);
+        }
+        let looks = &corners.looks;
+        for (column, surface) in surfaces.iter().enumerate() {
+            self.cancel.check()?;
+            let look = &looks[column];
             let mut direct = None;
-            for (lattice, (pitch, _)) in lattices.into_iter().enumerate() {
+            for (lattice, (pitch, passes)) in lattices.into_iter().enumerate() {
                 if !(row.is_multiple_of(pitch) && column.is_multiple_of(pitch)) {
                     continue;
                 }
                 let at = (row / pitch, column / pitch);
                 let is_lit = if lattice == GLOSS { look.has_gloss } else { look.is_lit };
-                let light = surface.as_ref().filter(|_| is_lit).map(|surface| match lattice {
-                    BOUNCED => self.gatherer.bounced(surface, at, rays),
-                    _ => {
-                        let direct = direct.get_or_insert_with(|| self.gatherer.direct(surface, at, rays));
-                        if lattice == DIRECT {
-                            direct.irradiance
-                        } else {
-                            self.gatherer.sent_on(surface, &direct.gloss, at)
+                let light = surface.as_ref().filter(|_| is_lit).map(|surface| {
+                    let beside = |n: usize| looks.get(n * pitch).map(|look| &look.guide);
+                    let rays = RAYS.where_alike(alike(&look.guide, at.1, passes.steps, beside));
+                    match lattice {
+                        BOUNCED => self.gatherer.bounced(surface, at, rays),
+                        _ => {
+                            let direct = direct.get_or_insert_with(|| self.gatherer.direct(surface, at, rays));
+                            if lattice == DIRECT {
+                                direct.irradiance
+                            } else {
+                                self.gatherer.sent_on(surface, &direct.gloss, at, rays)
+                            }
                         }
                     }
                 });
@@ -258,7 +269,6 @@ impl<'a, const N: usize> Painter<'a, N> {
                 guides.push(if is_lit { look.guide } else { Guide::NOTHING });
                 lights.push(Lanes(light.unwrap_or([0.0; N])));
             }
-            corners.looks.push(look);
         }
         // The last corners end a row of pixels and begin none.
         if row > 0 {
@@ -341,10 +351,10 @@ impl<'a, const N: usize> Painter<'a, N> {
                 // Too small to have been met by enough samples: its light is gathered for this pixel alone.
                 let again = self.look(look.seen_at.0, look.seen_at.1);
                 if let Some(surface) = again.surface.as_deref() {
-                    let (at, rays) = ((row, column), self.effort.rays);
+                    let (at, rays) = ((row, column), RAYS.where_alike(0.0));
                     let direct = self.gatherer.direct(surface, at, rays);
                     found[DIRECT].get_or_insert(direct.irradiance);
-                    found[GLOSS].get_or_insert_with(|| self.gatherer.sent_on(surface, &direct.gloss, at));
+                    found[GLOSS].get_or_insert_with(|| self.gatherer.sent_on(surface, &direct.gloss, at, rays));
                     found[BOUNCED].get_or_insert_with(|| self.gatherer.bounced(surface, at, rays));
                 }
             }

@@ -3,7 +3,7 @@
 use std::{fs, path::Path, sync::Arc};
 
 use dioptric_backward::{
-    Auxiliary, Bands, Camera, LensCamera, LensCameraSettings, LensOrigin, LightPaths, Pinhole, PixelGrid,
+    Auxiliary, Bands, Camera, GatheredView, LensCamera, LensCameraSettings, LensOrigin, LightPaths, Pinhole, PixelGrid,
     RenderSettings, Renderer, Rendering, ViewDetail, auxiliary, gathered_view, layered_depth, write_auxiliary_exr,
     write_rendering_exr,
 };
@@ -25,7 +25,7 @@ use super::{
 };
 use crate::{
     Diffraction, PaintingFolder, PipelineError, Progress, Quality, RenderEffort, RenderMethod, SceneSource, Stage,
-    WorldLamp, WorldSky, WorldSpec, gathered::GatheredPicture, paintings::SeenView, still_life,
+    WorldLamp, WorldSky, WorldSpec, gathered::GatheredPicture, still_life,
 };
 
 /// Samples of a pass: as many as spread well, and few enough for a first picture soon.
@@ -168,7 +168,7 @@ fn gathered_layers(
     n_layers: u32,
     folder: Option<&PaintingFolder>,
     watch: &Watch<'_>,
-) -> Result<Vec<SeenView>, PipelineError> {
+) -> Result<Vec<GatheredView>, PipelineError> {
     let seen = |layer: u32| {
         let report = |part| watch.progress.at(Stage::Scene, (f64::from(layer) + part) / f64::from(n_layers));
         let mut picture = picture.clone();
@@ -186,7 +186,7 @@ fn rendered_layers(
     (pinhole, n_layers): (Pinhole, u32),
     bands: Bands,
     watch: &Watch<'_>,
-) -> Result<Vec<SeenView>, PipelineError> {
+) -> Result<Vec<GatheredView>, PipelineError> {
     let (effort, samples_per_pass) = match spec.method {
         // As few as reach every band.
         RenderMethod::Backward => (RenderEffort::Samples(1), 1),
@@ -196,20 +196,20 @@ fn rendered_layers(
     let (paths, seed) = (spec.paths, spec.seed);
     let render =
         WorldRender { world: world.clone(), camera, bands, paths, seed, samples_per_pass, identity: String::new() };
-    let seen = |(layer, z_m): (u32, Array2<f32>)| -> Result<SeenView, PipelineError> {
+    let seen = |(layer, z_m): (u32, Array2<f32>)| -> Result<GatheredView, PipelineError> {
         let render = WorldRender { camera: Camera::Pinhole(Pinhole { layer, ..pinhole }), ..render.clone() };
         let mut renderer = render.renderer()?;
         let share = f64::from(n_layers).recip();
         let range = (share * f64::from(layer), share * f64::from(layer + 1));
         let progress = AtStage { progress: watch.progress, stage: Stage::Scene, range };
         render.refine(&mut renderer, effort, &progress, watch.cancel, &mut |_| Ok(true))?;
-        Ok(SeenView { radiance: renderer.picture(), depth: DepthMap::new(z_m)? })
+        Ok(GatheredView { radiance: renderer.picture(), depth: DepthMap::new(z_m)? })
     };
     (0..).zip(layered_depth(world, &pinhole, n_layers as usize, watch.cancel)?).map(seen).collect()
 }
 
 /// Returns what the first surfaces hide; where they hide nothing, the layer repeats them.
-fn hidden_layer(first: &SeenView, behind: SeenView) -> Result<HiddenLayer, PipelineError> {
+fn hidden_layer(first: &GatheredView, behind: GatheredView) -> Result<HiddenLayer, PipelineError> {
     let (mut radiance, mut behind_m) = (behind.radiance, behind.depth.z_m().clone());
     for (at, &first_m) in first.depth.z_m().indexed_iter() {
         // Through the sky nothing is hidden.
