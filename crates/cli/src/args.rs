@@ -200,6 +200,9 @@ pub(crate) struct RunArgs {
     /// What lies behind the first surface of the scene's file: a file of radiance and depth of the same samples
     #[arg(long, value_name = "FILE", help_heading = heading::SCENE)]
     pub(crate) hidden: Option<PathBuf>,
+    /// Points that shine beside the scene, a table (.csv): x_deg, y_deg or x_mm, y_mm; magnitude, lux, candela or w_per_sr; depth_m, light
+    #[arg(long, value_name = "FILE", help_heading = heading::SCENE)]
+    pub(crate) points: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) scene_file: SceneFileArgs,
     /// Light to put the scene under: A, D50, D55, D65, D75, E, FL2, FL11, LED-B3, a temperature (3200K), a chromaticity

@@ -376,8 +376,18 @@ fn noise_table(data: &NoiseData) -> Result<String, std::fmt::Error> {
         ("  of rows", data.prnu_parts_percent.map(|p| p.row), None, 3),
         ("  of columns", data.prnu_parts_percent.map(|p| p.column), None, 3),
         ("  of single pixels", data.prnu_parts_percent.map(|p| p.pixel), None, 3),
-        ("nonwhiteness of DSNU along rows", data.patterns.as_ref().map(|p| p.dsnu_nonwhiteness[0]), None, 2),
-        ("nonwhiteness of DSNU along columns", data.patterns.as_ref().map(|p| p.dsnu_nonwhiteness[1]), None, 2),
+        (
+            "nonwhiteness of DSNU along rows",
+            data.patterns.as_ref().and_then(|p| p.dsnu_nonwhiteness).map(|n| n[0]),
+            None,
+            2,
+        ),
+        (
+            "nonwhiteness of DSNU along columns",
+            data.patterns.as_ref().and_then(|p| p.dsnu_nonwhiteness).map(|n| n[1]),
+            None,
+            2,
+        ),
         ("linearity error, %", data.linearity_error_percent, None, 3),
         ("dark current by mean, e/s", data.dark_current_by_mean_e_per_s, sheet.map(|s| s.dark_current_e_per_s), 3),
         (

@@ -211,6 +211,7 @@ fn change_scene(camera: &mut Camera, arguments: &RunArgs) -> anyhow::Result<()> 
         (scene.field_of_view_deg, scene.depth_m) = (None, None);
         scene.flat = Some(FlatSize { width_mm, distance_mm });
     }
+    scene.points = arguments.points.clone().or_else(|| scene.points.take());
     scene.hidden = arguments.hidden.clone().or_else(|| scene.hidden.take());
     arguments.scene_file.change(scene)?;
     scene.mean_luminance_cd_m2 = arguments.mean_luminance_cd_m2.or(scene.mean_luminance_cd_m2);

@@ -217,3 +217,34 @@ fn what_does_not_apply_is_refused_by_its_option() {
         common::check_error(folder.path(), &[&run[..], options].concat(), words);
     }
 }
+
+/// Stars of a table bring what they are said to: a lux through the entrance pupil of a thin lens, all of it on the film.
+#[test]
+fn points_of_a_table_bring_their_light() {
+    let folder = folder();
+    let points = "name,x_deg,y_deg,lux,depth_m\na,0.5,-0.3,2,200\nb,-0.4,0.2,1,100\nc,0,0,1,\nd,60,0,1,\n";
+    fs::write(folder.path().join("stars.csv"), points).unwrap();
+    let camera = r#"(name: "stars", lens: BuiltIn("thin:50mm:f16"), focus: DistanceMm(500000.0), diffraction: None,
+        film: Pixels(columns: 120, rows: 80, pitch_um: 20.0), sensor: BuiltIn("nikon-d5100"),
+        scene: (source: Target(pattern: Uniform, columns: 60, rows: 40), field_of_view_deg: 4.0, depth_m: 500.0),
+        wavelengths: Range(first_nm: 400.0, last_nm: 700.0, step_nm: 10.0))"#;
+    fs::write(folder.path().join("stars.ron"), camera).unwrap();
+    let run = |more: &[&str]| {
+        let report = report(folder.path(), &[&["run", "stars.ron", "--out", "out"], more].concat());
+        let mean = report["irradiance"]["mean_lux"].as_f64().unwrap();
+        (mean * 120.0 * 80.0 * 0.02 * 0.02, report["scene"]["notes"].to_string())
+    };
+    let ((without, _), (with, notes)) = (run(&[]), run(&["--points", "stars.csv"]));
+    let pupil_mm2 = std::f64::consts::PI * (50.0_f64 / 32.0).powi(2);
+    let cos = 1.0 / (1.0 + 0.5_f64.to_radians().tan().powi(2) + 0.3_f64.to_radians().tan().powi(2)).sqrt();
+    // Two stand before the wall; a star lies behind it, the fourth beside the film. The sine of the image side's angle is its tangent to 0.1 %.
+    let expected = pupil_mm2 * (2.0 * cos + 1.0);
+    assert!(((with - without) / expected - 1.0).abs() < 2e-3, "{with} {without} {expected}");
+    assert!(notes.contains("4 points of stars.csv") && notes.contains("of 4 points 1 lie behind"), "{notes}");
+    fs::write(folder.path().join("stars.csv"), "x_deg,y_deg,lux\n0,0,bright\n").unwrap();
+    common::check_error(
+        folder.path(),
+        &["run", "camera.ron", "--points", "stars.csv"],
+        &["stars.csv", "line 2", "lux"],
+    );
+}

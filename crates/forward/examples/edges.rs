@@ -46,7 +46,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         for (half, mode) in [BlurMode::Pointwise, BlurMode::Layered].into_iter().enumerate() {
             let lens = DiscLens { focus_dioptres, growth: 1.0, ..DiscLens::default() };
             let settings = Settings { mode, ..Settings::default() };
-            let source = Source { radiance: &radiance, depth: &depth, view, occluded: None };
+            let source = Source { radiance: &radiance, depth: &depth, view, occluded: None, points: &[] };
             render(&source, &lens, &film, &settings, &|_| {}, &mut |band, irradiance| {
                 for ((row, column), &value) in irradiance.indexed_iter() {
                     let Rgb(pixel) = picture.get_pixel_mut((half * COLUMNS + column) as u32, row as u32);

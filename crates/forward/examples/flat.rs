@@ -54,7 +54,7 @@ fn main() {
         };
         let depth = DepthMap::new(Array2::from_shape_fn((rows, columns), z_m)).unwrap();
         let view = View { focal_px, center_x_px: 499.5, center_y_px: 499.5 };
-        let source = Source { radiance: &radiance, depth: &depth, view, occluded: None };
+        let source = Source { radiance: &radiance, depth: &depth, view, occluded: None, points: &[] };
         let spec = ImagingSpec { film, grid, settings: Settings::default() };
         let cancel = Cancel::new();
         let plan = ImagingPlan::new(Arc::new(model), &source.geometry(), spec, &|_| {}, &cancel).unwrap();

@@ -61,7 +61,7 @@ fn main() {
         let depth = DepthMap::new(Array2::from_elem(size, plane_m as f32)).unwrap();
         // Far wider than the film sees.
         let view = View { focal_px: 500.0 / 2.0 / 5.0, center_x_px: 249.5, center_y_px: 29.5 };
-        let source = Source { radiance: &radiance, depth: &depth, view, occluded: None };
+        let source = Source { radiance: &radiance, depth: &depth, view, occluded: None, points: &[] };
         let mut pictures = vec![];
         render(&source, &model, &film, &Settings::default(), &|_| {}, &mut |_, band| {
             pictures.push(band);

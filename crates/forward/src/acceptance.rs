@@ -68,7 +68,7 @@ fn depth(dioptres: &Array2<f32>) -> DepthMap {
 
 impl Pixels {
     fn source(&self) -> Source<'_> {
-        Source { radiance: &self.radiance, depth: &self.depth, view: self.view, occluded: None }
+        Source { radiance: &self.radiance, depth: &self.depth, view: self.view, occluded: None, points: &[] }
     }
 }
 

@@ -110,6 +110,9 @@ pub enum ForwardError {
     /// Its pupil could not be divided.
     #[error(transparent)]
     Psf(#[from] dioptric_psf::PsfError),
+    /// A point of the scene cannot be.
+    #[error(transparent)]
+    Scene(#[from] dioptric_scene::SceneError),
     /// A band could not be had.
     #[error(transparent)]
     Spectrum(#[from] SpectrumError),

@@ -16,7 +16,7 @@ use crate::{
     stopwatch::{Part, Stopwatch},
     symmetry::Mirror,
     tile::{Tile, TileGroup, film_pixels},
-    visible::{Looked, Visible},
+    visible::Visible,
 };
 
 /// A layer in one band.
@@ -119,10 +119,7 @@ impl Source {
 
 /// A tile to be gathered.
 struct Member {
-    tile: Tile,
     mirror: Mirror,
-    /// The samples that it gathers from.
-    from: Rectangle,
     /// Its pixels, and the samples on the raster that stand for them: from pixel to pixel `stride` of them.
     pixels: Rectangle,
     out: Rectangle,
@@ -196,44 +193,20 @@ impl GatherTask<'_> {
             };
             let mut gathered = Gathered { at: member.pixels, light, alpha };
             if let Some(past) = past {
-                self.stopwatch.time(Part::Compositing, || {
-                    self.weigh((member, &kernels), &raster, past, &mut gathered);
-                });
+                self.stopwatch.time(Part::Compositing, || self.weigh(past, &mut gathered));
             }
             gathered
         });
         Ok(gathered.collect())
     }
 
-    /// Takes away what nearer surfaces hide of what a tile gathers, by the kernels of its canonical one.
-    fn weigh(
-        &self,
-        (member, canonical): (&Member, &TileKernels),
-        raster: &Raster,
-        past: &Past<'_>,
-        gathered: &mut Gathered,
-    ) {
+    /// Takes away what nearer surfaces hide of what a tile gathers.
+    fn weigh(&self, past: &Past<'_>, gathered: &mut Gathered) {
         let film = film_pixels(self.film);
         let (at, layer) = (gathered.at, self.layer);
         let (down, across) = ((at.first_row - film.first_row) as usize, (at.first_column - film.first_column) as usize);
         let open = |row: usize, column: usize| past.picture.open_well_before(layer, (row + down, column + across));
-        let partly = past.visible.partly_seen(layer, &open, gathered);
-        let kernel_most = canonical.terms[0].samples.iter().copied().fold(0.0, f32::max);
-        let least = past.visible.weigh(&partly, kernel_most, gathered);
-        if !member.light.samples.iter().any(|light| *light > least) {
-            return;
-        }
-        // The kernel in the tile's middle, as it is on the film.
-        let corners = member.tile.corners().map(|node| self.kernels.at((node, raster.level)));
-        let kernels = TileKernels::between(&corners);
-        let stride = raster.level.per_pixel();
-        let TileKernels { at: window, terms } = if stride > 1 { kernels.over_pixels(stride) } else { kernels };
-        let from = member.from;
-        let restored = |source: &Source| member.mirror.restored(&source.samples, (from.rows, from.columns));
-        let light = restored(&member.light);
-        let alpha = if let Alpha::Partly(source) = &member.alpha { restored(source) } else { vec![] };
-        let looked = Looked { layer, raster, from, light: &light, alpha: &alpha, window, kernel: &terms[0].samples };
-        past.visible.add_bright(&looked, least, &partly, gathered);
+        past.visible.weigh(layer, &open, gathered);
     }
 
     /// Returns a tile with what it gathers from; `None` if there is nothing.
@@ -311,9 +284,7 @@ impl GatherTask<'_> {
             positions.iter().map(|px| ((px - f64::from(start)) / side - 0.5) as f32).collect()
         };
         Ok(Some(Member {
-            tile: *tile,
             mirror,
-            from,
             pixels,
             out,
             out_size: mirror.size((out.rows, out.columns)),

@@ -3,10 +3,7 @@
 //! A window holds all but a hundredth of the light of a point; the rest falls with the third power of the distance (`docs/forward.md`, 2). It is taken
 //! from the finished picture of a band and spread on pixels 2, 4, 8 … times as wide, the farther the wider.
 
-use std::{
-    collections::BTreeMap,
-    f64::consts::{PI, SQRT_2},
-};
+use std::{collections::BTreeMap, f64::consts::PI};
 
 use dioptric_psf::{FilmQuery, LensImage};
 use glam::DVec2;
@@ -14,13 +11,18 @@ use multiversion::multiversion;
 use ndarray::Array2;
 use rayon::prelude::*;
 
-use crate::{Film, layers::Layers};
+use crate::{
+    Film,
+    layers::Layers,
+    points::Point,
+    surroundings::{Surroundings, beside},
+};
 
 /// A share of the light beyond the window that is not worth spreading: kernels leave out as little on each side.
 const NEGLIGIBLE: f64 = 1e-6;
 
-/// What an edge bends beyond a square, times half the side over λN: 2 / π² r beyond a circle, the mean of whose 1/r is 2 √2 / π over half the side.
-const BENT: f64 = 4.0 * SQRT_2 / (PI * PI * PI);
+/// What an edge bends beyond a circle, times its radius over λN.
+const BENT: f64 = 2.0 / (PI * PI);
 
 /// Distance, in pixels of a raster, over which a halo passes to the next one of wider pixels.
 const PASSES_OVER: [f64; 2] = [3.0, 4.5];
@@ -38,8 +40,8 @@ const REACH: usize = 5;
 struct Beyond {
     /// Share of the light.
     share: f64,
-    /// Half the side of the window, to the middle of where samples fade out, pixels.
-    half_px: f64,
+    /// The radii between which the samples of the window fade out, pixels.
+    fade_px: [f64; 2],
     /// The part of the share that falls faster than what edges bend.
     steep: f64,
 }
@@ -55,19 +57,52 @@ impl Beyond {
         let kernel = lens.kernel(query);
         if kernel.lambda_n_px == 0.0 {
             // It holds all that there is, whatever it is scaled by.
-            return Self { share: 0.0, half_px: factor, steep: 0.0 };
+            return Self { share: 0.0, fade_px: [factor; 2], steep: 0.0 };
         }
-        let (share, half_px) = (1.0 - kernel.kept_share, 0.5 * (kernel.samples.nrows() as f64 - kernel.fade_px()));
-        let bent = BENT * kernel.lambda_n_px / half_px;
-        Self { share, half_px: factor * half_px, steep: (1.0 - bent / share).clamp(0.0, 1.0) }
+        let fade_px = kernel.fade_px().map(|px| px.max(LEAST_RADIUS));
+        let share = 1.0 - kernel.kept_share;
+        let bent = BENT * kernel.lambda_n_px * Fade(fade_px).inverse();
+        Self { share, fade_px: fade_px.map(|px| factor * px), steep: (1.0 - bent / share).clamp(0.0, 1.0) }
     }
 
     /// Returns what lies beyond between two bands: share times distance, which stands for the halo far out, and the window are linear there.
     fn between(below: Self, above: Self, fraction: f64) -> Self {
         let mix = |below: f64, above: f64| below + fraction * (above - below);
-        let half_px = mix(below.half_px, above.half_px);
-        let share = mix(below.share * below.half_px, above.share * above.half_px) / half_px;
-        Self { share, half_px, steep: mix(below.steep, above.steep) }
+        let fade_px = [0, 1].map(|end| mix(below.fade_px[end], above.fade_px[end]));
+        let far = |beyond: &Self| beyond.share / Fade(beyond.fade_px).inverse();
+        let share = mix(far(&below), far(&above)) * Fade(fade_px).inverse();
+        Self { share, fade_px, steep: mix(below.steep, above.steep) }
+    }
+}
+
+/// The least radius at which a window may begin to fade, pixels: the law of the tail has no middle.
+const LEAST_RADIUS: f64 = 0.5;
+
+/// A linear rise from 0 to 1 between two radii: what windows leave to the halo.
+#[derive(Clone, Copy)]
+struct Fade([f64; 2]);
+
+impl Fade {
+    fn at(self, radius: f64) -> f64 {
+        let Self([start, end]) = self;
+        if end > start { ((radius - start) / (end - start)).clamp(0.0, 1.0) } else { f64::from(radius >= end) }
+    }
+
+    /// The integral of the rise over r² by r: 1 / r of a step.
+    fn inverse(self) -> f64 {
+        let Self([start, end]) = self;
+        if end > start * 1.0001 { (end / start).ln() / (end - start) } else { 1.0 / end }
+    }
+
+    /// The integral of the rise over r⁴ by r: 1 / 3 r³ of a step.
+    fn inverse_cube(self) -> f64 {
+        let Self([start, end]) = self;
+        if end > start * 1.0001 {
+            let (square, cube) = (start.powi(-2) - end.powi(-2), start.powi(-3) - end.powi(-3));
+            (0.5 * square - start * cube / 3.0) / (end - start) + end.powi(-3) / 3.0
+        } else {
+            end.powi(-3) / 3.0
+        }
     }
 }
 
@@ -95,15 +130,21 @@ impl Halos {
             let ((lower, below), (upper, above)) = (known.range(..=band).next_back()?, known.range(band..).next()?);
             let fraction = (band - lower) as f64 / (upper - lower).max(1) as f64;
             let beyond = Beyond::between(*below, *above, fraction);
-            (beyond.share > NEGLIGIBLE).then(|| Halo::new(beyond, (film.rows, film.columns)))
+            let (rows, columns) = (film.rows + 2 * beside(film), film.columns + 2 * beside(film));
+            (beyond.share > NEGLIGIBLE).then(|| Halo::new(beyond, (rows, columns)))
         };
         Self { of_bands: (0..n_bands).into_par_iter().map(halo).collect() }
     }
 
-    /// Returns the picture of a band with the halos of its points, if any light lies beyond its windows.
-    pub(crate) fn applied(&self, band: usize, picture: Array2<f32>) -> Array2<f32> {
+    /// Returns the picture of a band with the halos of its points and of what lies around it, if any light lies beyond its windows.
+    pub(crate) fn applied(
+        &self,
+        band: usize,
+        picture: Array2<f32>,
+        (surroundings, radiance, points): (&Surroundings<'_>, &[f32], &[Point]),
+    ) -> Array2<f32> {
         match self.of_bands.get(band) {
-            Some(Some(halo)) => halo.applied(picture),
+            Some(Some(halo)) => surroundings.with(&picture, (radiance, points), |wide| halo.applied(wide)),
             _ => picture,
         }
     }
@@ -125,7 +166,7 @@ struct RasterPart([[f32; REACH + 1]; REACH + 1]);
 
 impl Halo {
     fn new(beyond: Beyond, (rows, columns): (usize, usize)) -> Self {
-        let n_doublings = (beyond.half_px / FIRST).log2().floor().max(0.0) as usize;
+        let n_doublings = (beyond.fade_px[0] / FIRST).log2().floor().max(0.0) as usize;
         let n_rasters = f64::hypot(rows as f64, columns as f64).log2().ceil().max(0.0) as usize + 1;
         let part = |doublings: usize| RasterPart::new(beyond, doublings, doublings == n_doublings);
         let rasters = (n_doublings..n_rasters.max(n_doublings + 1)).map(part).collect();
@@ -205,13 +246,15 @@ fn on_rasters(picture: &Array2<f32>, rasters: &[RasterPart]) -> Array2<f32> {
 
 impl RasterPart {
     /// Returns the part of the halo beyond a window on pixels that are doubled so many times.
-    fn new(Beyond { half_px, steep, .. }: Beyond, doublings: usize, is_first: bool) -> Self {
+    fn new(Beyond { fade_px, steep, .. }: Beyond, doublings: usize, is_first: bool) -> Self {
         let pixel = (doublings as f64).exp2();
-        // Of sum 1: the integrals of r⁻³ and r⁻⁵ beyond the square are 4 √2 / a and 10 √2 / 9 a³.
-        let (bent, steep) = ((1.0 - steep) * half_px / (4.0 * SQRT_2), steep * half_px.powi(3) * 9.0 / (10.0 * SQRT_2));
+        // Of sum 1.
+        let fade = Fade(fade_px);
+        let (bent, steep) = ((1.0 - steep) / (2.0 * PI * fade.inverse()), steep / (2.0 * PI * fade.inverse_cube()));
         let density = |x: f64, y: f64| {
             let r = x.hypot(y);
-            if x.max(y) < half_px { 0.0 } else { bent * r.powi(-3) + steep * r.powi(-5) }
+            let part = fade.at(r);
+            if part > 0.0 { part * (bent * r.powi(-3) + steep * r.powi(-5)) } else { 0.0 }
         };
         let passed = |r_pixels: f64| {
             let [start, end] = PASSES_OVER;
@@ -328,7 +371,7 @@ mod tests {
     use super::*;
 
     fn halo(half_px: f64, share: f64, size: (usize, usize)) -> Halo {
-        Halo::new(Beyond { share, half_px, steep: 0.0 }, size)
+        Halo::new(Beyond { share, fade_px: [half_px; 2], steep: 0.0 }, size)
     }
 
     #[test]
@@ -344,7 +387,7 @@ mod tests {
         }
     }
 
-    /// Beyond a square of half the side h lies 1, and π / (2 √2) h / r beyond a circle of radius r outside of it.
+    /// Beyond the radius h lies 1, and h / r beyond another.
     #[test]
     fn a_halo_falls_with_the_third_power_of_the_distance() {
         let (n, share) = (801, 0.5);
@@ -358,7 +401,7 @@ mod tests {
                 let from_point = |row: usize, column: usize| {
                     DVec2::new(column as f64 - at.1 as f64, row as f64 - at.0 as f64).length()
                 };
-                let beyond = |r: f64| PI * share * half_px / (2.0 * SQRT_2 * r);
+                let beyond = |r: f64| share * half_px / r;
                 for r in [2.0, 3.0, 5.0, 10.0].map(|times| times * half_px).into_iter().filter(|r| *r > 4.0) {
                     let lights = picture.indexed_iter();
                     let between = lights.filter(|((row, column), _)| (r..395.0).contains(&from_point(*row, *column)));
@@ -372,7 +415,7 @@ mod tests {
                     for place in on_ring {
                         let pixel =
                             ((at.0 as f64 + place.y).round() as usize, (at.1 as f64 + place.x).round() as usize);
-                        let law = share * half_px / (4.0 * SQRT_2) / from_point(pixel.0, pixel.1).powi(3);
+                        let law = share * half_px / (2.0 * PI) / from_point(pixel.0, pixel.1).powi(3);
                         let ratio = f64::from(picture[pixel]) / law;
                         assert!((0.63..1.35).contains(&ratio), "{half_px} {at:?}, at {place}: {ratio}");
                     }

@@ -18,7 +18,9 @@ use crate::{
     gather::{GatherTask, Past, gather, out_samples},
     halo::Halos,
     kept::Kept,
+    lamps::{Lamp, without_lamps},
     places::SceneRaster,
+    points::{Beside, Drawing, Point},
     raster::{Level, Raster},
     rectangle::Rectangle,
     sampler::Sampler,
@@ -26,6 +28,7 @@ use crate::{
     sight::Sight,
     stopwatch::{Part, Stopwatch},
     surface::{LayerCoordinates, Surface},
+    surroundings::Surroundings,
     tile::{TileGroup, film_pixels},
     tiling::{LayeredLens, Rule, Tiling, reach_px},
     visible::Visible,
@@ -55,6 +58,8 @@ pub(crate) struct Imaging {
     /// How far from the middle of the film light is taken from, mm.
     reach_mm: f64,
     visible: Option<Visible>,
+    /// The points beside the scene; `None` where no film point looks.
+    points: Vec<Option<Beside>>,
     kept: Mutex<Kept>,
     halos: Halos,
     /// The largest that the kernels of a band have been, bytes.
@@ -91,6 +96,8 @@ impl Imaging {
             std::iter::once(&scene.coordinates).chain(scene.occluded.layer_coordinates()).collect();
         let blocks = Blocks::find((film, margin_px), &raster, &maps, &surfaces, work.cancel())?;
 
+        let coordinate_of = |depth_m: f32| layers.coordinate_of(depth_m);
+        let points = Beside::all(geometry, maps[1], &raster, (&scene.coordinates, &coordinate_of, scene.hides));
         let sight = Sight::of((lens, film, middle_nm), maps[1], &raster, &scene, work.cancel())?;
 
         // Cut the film into tiles for each of them.
@@ -114,6 +121,7 @@ impl Imaging {
             blocks,
             reach_mm,
             visible,
+            points,
             kept: Mutex::new(kept),
             halos,
             // Those of the middle band tell how much memory kernels take.
@@ -130,6 +138,12 @@ impl Imaging {
             + self.visible.as_ref().map_or(0, Visible::size_bytes)
             + self.tiling.size_bytes()
             + self.kept().size_bytes
+    }
+
+    /// The points that lie behind the first surface, and those where no film point looks.
+    pub(crate) fn points_unseen(&self) -> (usize, usize) {
+        let behind = self.points.iter().flatten().filter(|point| point.is_behind()).count();
+        (behind, self.points.iter().filter(|point| point.is_none()).count())
     }
 
     /// Keeps at most so many bytes of kernels from now on.
@@ -214,7 +228,8 @@ impl Imaging {
         let front = radiance.front.band(band)?;
         let needed = radiance.occluded.filter(|_| self.scene.occluded.needs_radiance());
         let occluded = needed.map(|occluded| occluded.band(band)).transpose()?;
-        let light = BandRadiance { front: &front, occluded: occluded.as_deref() };
+        let points: Vec<f32> = radiance.points.iter().map(|point| point.light.by_band()[band]).collect();
+        let light = BandRadiance { front: &front, occluded: occluded.as_deref(), points: &points };
         light.check(self.size(), self.scene.occluded.needs_radiance())?;
         Ok(self.image(lens, band, light, work)?)
     }
@@ -230,8 +245,26 @@ impl Imaging {
         let cancel = work.cancel();
         let kernels = self.kernels(lens, band, work)?;
         let map = lens.film_map(self.spec.grid.centers_nm()[band], self.reach_mm);
-        let front = self.scene.mixed.unmixed(light.front);
+        let (front, lamps) = without_lamps(self.scene.mixed.unmixed(light.front), &|_, _| true);
         let occluded = self.scene.occluded.samples(&front, light.occluded, cancel)?;
+        let is_behind = |row: usize, column: usize| {
+            let behind = self.scene.occluded.layer_coordinates().filter(|_| self.scene.occluded.needs_radiance());
+            behind.is_some_and(|behind| !behind.samples()[row * self.raster.columns + column].is_nan())
+        };
+        let (occluded, lamps_behind) = occluded.map_or((None, vec![]), |occluded| {
+            let (occluded, lamps) = without_lamps(occluded, &is_behind);
+            (Some(occluded), lamps)
+        });
+        let film_map = (map.as_ref(), 1e-3 * self.spec.film.pitch_um);
+        let lamps = self.lamps_of(&lamps, (&self.scene.coordinates, true), film_map);
+        let lamps_behind = self
+            .scene
+            .occluded
+            .layer_coordinates()
+            .map(|behind| self.lamps_of(&lamps_behind, (behind, false), film_map));
+        let points: Vec<Point> = lamps.into_iter().chain(lamps_behind.unwrap_or_default()).collect();
+        let beside = self.points.iter().zip(light.points);
+        let beside: Vec<Point> = beside.filter_map(|(point, light)| point.as_ref()?.lit(*light, film_map)).collect();
         let front = front.as_standard_layout();
         let occluded = occluded.as_ref().map(|samples| samples.as_standard_layout());
         let surface = |radiance, coordinates| Surface { radiance, coordinates };
@@ -243,6 +276,16 @@ impl Imaging {
         let sampler = Sampler { scene: self.raster, map: &map, blocks: &self.blocks, surfaces: &surfaces, with_alpha };
         let Film { rows, columns, .. } = self.spec.film;
         let mut picture = Composite::new((rows, columns), self.scene.hides);
+        let drawing = Drawing {
+            lens,
+            film: &self.spec.film,
+            wavelength_nm: self.spec.grid.centers_nm()[band],
+            visible: self.visible.as_ref(),
+            hides: self.scene.hides,
+        };
+        // What points bring: those of the scene, and those beside it.
+        let mut brought =
+            [points, beside].map(|points| (vec![0.0; if points.is_empty() { 0 } else { rows * columns }], points));
         for (layer, tiles) in self.tiling.layers.iter().enumerate() {
             let task = GatherTask {
                 film: &self.spec.film,
@@ -252,11 +295,26 @@ impl Imaging {
                 stopwatch: &self.stopwatch,
                 cancel,
             };
+            for (sums, points) in &mut brought {
+                cancel.check()?;
+                let of_layer: Vec<Point> = points.iter().filter(|point| point.layer == layer).copied().collect();
+                drawing.add(&of_layer, &picture, sums);
+            }
             self.lay(&task, &tiles.groups, &mut picture)?;
             work.advance(tiles.groups.len() as u64 * GROUP_UNITS);
         }
-        let lit = self.stopwatch.time(Part::Compositing, || self.lit(picture.finish(), &map));
-        Ok(self.stopwatch.time(Part::Compositing, || self.halos.applied(band, lit)))
+        let [(of_scene, lamps), (beside, points)] = brought;
+        let mut picture = picture.finish();
+        picture.iter_mut().zip(of_scene).for_each(|(sum, light)| *sum += light);
+        Ok(self.stopwatch.time(Part::Compositing, || {
+            // What a pixel sees is spread before it is lit: an even scene stays even.
+            let around = Surroundings { film: &self.spec.film, scene: &self.raster, map: &map };
+            let front = front.as_slice().unwrap_or_default();
+            let picture = self.halos.applied(band, picture, (&around, front, &lamps));
+            let beside = (!beside.is_empty()).then(|| Array2::from_shape_vec((rows, columns), beside).ok()).flatten();
+            let spread = |beside| self.halos.applied(band, beside, (&around, &[], &points));
+            self.lit(picture, beside.map(spread), &map)
+        }))
     }
 
     /// Lays what the tiles of a layer gather behind a picture.
@@ -297,8 +355,25 @@ impl Imaging {
         Rectangle::around(seen)
     }
 
-    /// Returns a picture of radiance as irradiance: times that of a uniform scene of radiance 1. Points that look beyond the scene are dark.
-    fn lit(&self, mut picture: Array2<f32>, map: &FilmMap) -> Array2<f32> {
+    /// Returns lamps as points at their depths, on the first surface or behind it.
+    fn lamps_of(
+        &self,
+        lamps: &[Lamp],
+        (coordinates, is_first): (&LayerCoordinates, bool),
+        map: (&FilmMap, f64),
+    ) -> Vec<Point> {
+        let columns = self.raster.columns;
+        let of = |lamp: &Lamp| {
+            let coordinate = coordinates.samples()[lamp.row * columns + lamp.column];
+            let depth = self.scene.layers.layer_and_dioptres_at(coordinate);
+            Point::of_lamp(lamp, &self.raster, map, (depth, is_first))
+        };
+        lamps.iter().filter_map(of).collect()
+    }
+
+    /// Returns a picture of radiance as irradiance: times that of a uniform scene of radiance 1. Film points that look beyond the scene see but what shines
+    /// `beside` it.
+    fn lit(&self, mut picture: Array2<f32>, beside: Option<Array2<f32>>, map: &FilmMap) -> Array2<f32> {
         let raster = Raster::new(&self.spec.film, Level::PIXEL);
         let Rectangle { first_row, first_column, columns, .. } = film_pixels(&self.spec.film);
         let x_mm: Vec<f64> = (0..columns as i64).map(|column| raster.x_mm((first_column + column) as f64)).collect();
@@ -317,7 +392,8 @@ impl Imaging {
                 } else {
                     1.0
                 };
-                *sample *= if gain.is_nan() { 0.0 } else { gain as f32 * seen_part };
+                *sample = *sample * seen_part + beside.as_ref().map_or(0.0, |beside| beside[(row, i)]);
+                *sample *= if gain.is_nan() { 0.0 } else { gain as f32 };
             }
         });
         picture

@@ -146,6 +146,14 @@ impl Layers {
         ((above - 1) as f64 + (near - dioptres) / (near - far)) as f32
     }
 
+    /// Returns the layer that a coordinate lies in, or behind, and its dioptres.
+    pub(crate) fn layer_and_dioptres_at(&self, coordinate: f32) -> (usize, f64) {
+        let below = (coordinate as usize).min(self.len() - 1);
+        let above = (below + 1).min(self.len() - 1);
+        let fraction = f64::from(coordinate) - below as f64;
+        (below, self.dioptres[below] + fraction * (self.dioptres[above] - self.dioptres[below]))
+    }
+
     /// Returns the largest blur radius of the samples at a layer coordinate, pixels.
     pub(crate) fn radius_px_at(&self, coordinate: f32) -> f64 {
         let below = (coordinate as usize).min(self.len() - 1);

@@ -36,11 +36,11 @@ use crate::{
 /// };
 /// let lens = Arc::new(DiscLens { focus_dioptres: 1.0, radius_um_per_dioptre: 100.0, focal_mm: 50.0, ..DiscLens::default() });
 /// let cancel = Cancel::new();
-/// let scene = SceneGeometry { depth: &depth, view, occluded_depth: None };
+/// let scene = SceneGeometry { depth: &depth, view, occluded_depth: None, points: &[] };
 /// let plan = ImagingPlan::new(lens, &scene, spec, &|_| {}, &cancel)?;
 /// for level in [0.1, 0.2] {
 ///     let radiance = Array2::from_elem((60, 80), level);
-///     let irradiance = plan.image(1, BandRadiance { front: &radiance, occluded: None }, &cancel)?;
+///     let irradiance = plan.image(1, BandRadiance { front: &radiance, occluded: None, points: &[] }, &cancel)?;
 ///     assert!((irradiance[(20, 20)] - level).abs() < 1e-5);
 /// }
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -67,6 +67,11 @@ impl ImagingPlan {
     /// focus, [`BlurMode::Views`](crate::BlurMode::Views) tells them apart.
     pub fn narrow_fraction(&self) -> f64 {
         self.views.first().scene.narrow_fraction
+    }
+
+    /// How many of the points beside the scene lie behind its first surface, and how many where no point of the film looks.
+    pub fn points_unseen(&self) -> (usize, usize) {
+        self.views.first().points_unseen()
     }
 
     /// Plans the imaging of a scene geometry: layers of depth, what their edges hide, and where PSFs are needed.

@@ -52,7 +52,7 @@ impl Scene {
     }
 
     fn geometry(&self) -> SceneGeometry<'_> {
-        SceneGeometry { depth: &self.depth, view: self.view(), occluded_depth: None }
+        SceneGeometry { depth: &self.depth, view: self.view(), occluded_depth: None, points: &[] }
     }
 
     fn spec(&self) -> ImagingSpec {
@@ -69,11 +69,12 @@ impl Scene {
 
     fn band(&self, plan: &ImagingPlan, band: usize) -> Array2<f32> {
         let front = &self.radiance.planes()[band];
-        plan.image(band, BandRadiance { front, occluded: None }, &Cancel::new()).unwrap()
+        plan.image(band, BandRadiance { front, occluded: None, points: &[] }, &Cancel::new()).unwrap()
     }
 
     fn rendered(&self) -> Vec<Array2<f32>> {
-        let source = Source { radiance: &self.radiance, depth: &self.depth, view: self.view(), occluded: None };
+        let source =
+            Source { radiance: &self.radiance, depth: &self.depth, view: self.view(), occluded: None, points: &[] };
         let ImagingSpec { film, settings, .. } = self.spec();
         let mut bands = vec![];
         render(&source, self.lens.as_ref(), &film, &settings, &|_| {}, &mut |_, band| {
@@ -95,7 +96,8 @@ fn planned_bands_equal_rendered_ones() {
             assert_eq!(scene.band(&plan, band), rendered[band], "band {band}");
         }
         let mut streamed = vec![];
-        let source = Source { radiance: &scene.radiance, depth: &scene.depth, view: scene.view(), occluded: None };
+        let source =
+            Source { radiance: &scene.radiance, depth: &scene.depth, view: scene.view(), occluded: None, points: &[] };
         plan.stream(&source.light(), &|_| {}, &Cancel::new(), &mut |band, picture| {
             assert_eq!(band, streamed.len());
             streamed.push(picture);
@@ -112,7 +114,7 @@ fn light_changes_without_another_plan() {
     let plan = scene.plan();
     let first = scene.band(&plan, 2);
     let brighter = scene.radiance.planes()[2].mapv(|v| 4.0 * v);
-    let second = plan.image(2, BandRadiance { front: &brighter, occluded: None }, &Cancel::new()).unwrap();
+    let second = plan.image(2, BandRadiance { front: &brighter, occluded: None, points: &[] }, &Cancel::new()).unwrap();
     // A factor of 4 changes no mantissa.
     assert_eq!(second, first.mapv(|v| 4.0 * v));
 }
@@ -177,7 +179,7 @@ fn cancelled_work_ends_at_once() {
         let ended = plan.and_then(|plan| {
             // Kernels in the first band are those that seams were looked for with.
             let front = &scene.radiance.planes()[1];
-            plan.image(1, BandRadiance { front, occluded: None }, &cancel)
+            plan.image(1, BandRadiance { front, occluded: None, points: &[] }, &cancel)
         });
         (n_planned, lens.asked.load(Ordering::Relaxed), ended)
     };
@@ -196,7 +198,8 @@ fn cancelled_stream_hands_on_no_more() {
     let scene = Scene::new();
     let plan = scene.plan();
     let cancel = Cancel::new();
-    let source = Source { radiance: &scene.radiance, depth: &scene.depth, view: scene.view(), occluded: None };
+    let source =
+        Source { radiance: &scene.radiance, depth: &scene.depth, view: scene.view(), occluded: None, points: &[] };
     let seen = Mutex::new(0.0);
     let progress = |fraction: f64| {
         *seen.lock().unwrap() = fraction;
@@ -218,7 +221,8 @@ fn cancelled_stream_hands_on_no_more() {
 fn streams_begin_anywhere() {
     let scene = Scene::new();
     let rendered = scene.rendered();
-    let source = Source { radiance: &scene.radiance, depth: &scene.depth, view: scene.view(), occluded: None };
+    let source =
+        Source { radiance: &scene.radiance, depth: &scene.depth, view: scene.view(), occluded: None, points: &[] };
     for plan in [scene.plan(), scene.plan().with_band_budget(1)] {
         for first in 0..=7 {
             let mut left = vec![];
@@ -275,7 +279,7 @@ fn streams_end_where_a_band_fails() {
     let stream = |panics: bool, refused: usize| {
         handed_on.lock().unwrap().clear();
         let front = Unreadable { image: &scene.radiance, panics };
-        let light = SceneRadiance { front: &front, occluded: None };
+        let light = SceneRadiance { front: &front, occluded: None, points: &[] };
         let mut sink = |band: usize, _: Array2<f32>| {
             handed_on.lock().unwrap().push(band);
             if band == refused { Err("the disk is full".into()) } else { Ok(()) }
@@ -295,13 +299,13 @@ fn radiance_of_another_scene_is_refused() {
     let scene = Scene::new();
     let plan = scene.plan();
     let message = |band: usize, front: &Array2<f32>| {
-        plan.image(band, BandRadiance { front, occluded: None }, &Cancel::new()).unwrap_err().to_string()
+        plan.image(band, BandRadiance { front, occluded: None, points: &[] }, &Cancel::new()).unwrap_err().to_string()
     };
     assert!(message(0, &Array2::zeros((ROWS, 7))).contains("60 x 7"));
     assert!(message(7, &Array2::zeros((ROWS, COLUMNS))).contains("no band 7"));
     let grid = WavelengthGrid::new((0..7).map(|i| 500.0 + 21.0 * f64::from(i)).collect()).unwrap();
     let other = SpectralImage::zeros(Quantity::Radiance, grid, ROWS, COLUMNS);
-    let source = Source { radiance: &other, depth: &scene.depth, view: scene.view(), occluded: None };
+    let source = Source { radiance: &other, depth: &scene.depth, view: scene.view(), occluded: None, points: &[] };
     let error = plan.stream(&source.light(), &|_| {}, &Cancel::new(), &mut |_, _| Ok(())).unwrap_err();
     assert!(error.to_string().contains("521 nm"), "{error}");
 }

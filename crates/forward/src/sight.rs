@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use crate::{
     Film,
+    blocks::BLOCK,
     layers::DEPTH_EDGE_PX,
     places::{Places, SceneRaster, UNSEEN},
     raster::{Level, Raster},
@@ -30,8 +31,9 @@ pub(crate) struct Sight {
     second: Vec<u16>,
     /// Of each pixel.
     near_edges: Vec<NearEdges>,
-    /// The blur radius of each layer with its sign, pixels.
-    radius_px: Vec<f32>,
+    /// Of each layer.
+    dioptres: Vec<f32>,
+    blur: BlurOverFilm,
     /// How far below and to the right of the film's middle the middle of the pixel of number 0 lies, pixels.
     middle: (f32, f32),
 }
@@ -72,10 +74,9 @@ impl Sight {
         if !scene.hides {
             return Ok(None);
         }
-        let pitch_mm = 1e-3 * film.pitch_um;
-        let signed = |&dioptres: &f64| (lens.blur_radius_mm(DVec2::ZERO, dioptres, wavelength_nm) / pitch_mm) as f32;
-        let radius_px: Vec<f32> = scene.layers.dioptres().iter().map(signed).collect();
-        let widest_px = radius_px.iter().fold(0.0_f32, |widest, radius| widest.max(radius.abs()));
+        let blur = BlurOverFilm::of((lens, film, wavelength_nm));
+        let dioptres: Vec<f32> = scene.layers.dioptres().iter().map(|dioptres| *dioptres as f32).collect();
+        let widest_px = blur.widest_px(&dioptres);
         let margin = (widest_px.ceil() as usize).min(film.rows.max(film.columns)) + SOFT_EDGE[1];
         let pixels = Raster::new(film, Level::PIXEL);
         let mut this = Self {
@@ -84,7 +85,8 @@ impl Sight {
             first: vec![],
             second: vec![],
             near_edges: vec![],
-            radius_px,
+            dioptres,
+            blur,
             middle: (pixels.down_px(0) as f32, pixels.across_px(0) as f32),
         };
         this.first = this.looked_at((&pixels, map, raster), &scene.coordinates, cancel)?;
@@ -133,6 +135,7 @@ impl Sight {
         size_of_val(self.first.as_slice())
             + size_of_val(self.second.as_slice())
             + size_of_val(self.near_edges.as_slice())
+            + size_of_val(self.blur.by_block.as_slice())
     }
 
     /// Drops what lies behind the first surface: only plans ask for it.
@@ -140,9 +143,14 @@ impl Sight {
         self.second = vec![];
     }
 
-    /// The blur radius of each layer with its sign, pixels.
-    pub(crate) fn radius_px(&self) -> &[f32] {
-        &self.radius_px
+    /// Returns the blur radius at a pixel of a layer with its sign, pixels.
+    pub(crate) fn radius_px(&self, layer: usize, pixel: (i64, i64)) -> f32 {
+        self.blur.at(pixel).of(self.dioptres[layer])
+    }
+
+    /// Returns the blur radius at a pixel of a depth with its sign, pixels.
+    pub(crate) fn radius_px_of(&self, dioptres: f64, pixel: (i64, i64)) -> f32 {
+        self.blur.at(pixel).of(dioptres as f32)
     }
 
     /// Returns where the middle of a pixel lies, pixels below and to the right of the film's middle.
@@ -190,8 +198,10 @@ impl Sight {
 
     /// Returns the layers that the rays of some pixels may meet, nearest first, all with the ratio to a blur radius of 1 pixel.
     pub(crate) fn met_by(&self, pixels: &Rectangle) -> Vec<Met> {
-        let mut is_met = vec![[false; 2]; self.radius_px.len()];
-        let widest = self.radius_px.iter().fold(0.0_f32, |widest, radius| widest.max(radius.abs()));
+        let mut is_met = vec![[false; 2]; self.dioptres.len()];
+        let blur =
+            self.blur.at((pixels.first_row + pixels.rows as i64 / 2, pixels.first_column + pixels.columns as i64 / 2));
+        let widest = blur.widest_px(&self.dioptres);
         let around = pixels.grown(widest.ceil() as usize + 1);
         if let Some(around) = around.intersection(&self.at) {
             let n = self.per_pixel;
@@ -215,17 +225,17 @@ impl Sight {
             let around = [is_met[layer - 1], is_met[layer + 1]];
             (0..2).for_each(|of| is_met[layer][of] |= around[0][of] && around[1][of]);
         }
-        let met = is_met.iter().zip(&self.radius_px).enumerate().filter(|(_, (is_met, _))| is_met[0] || is_met[1]);
-        met.map(|(layer, (is_met, &ratio))| Met { layer, ratio, is_of_first: is_met[0] }).collect()
+        let met = is_met.iter().enumerate().filter(|(_, is_met)| is_met[0] || is_met[1]);
+        met.map(|(layer, is_met)| Met { layer, ratio: blur.of(self.dioptres[layer]), is_of_first: is_met[0] }).collect()
     }
 
-    /// The blur radius at a layer coordinate, with its sign; far behind all where nothing is seen.
-    fn radius_at(&self, coordinate: u16) -> f32 {
-        let last = self.radius_px.len() - 1;
+    /// The dioptres at a layer coordinate; those of the last layer where nothing is seen.
+    fn dioptres_at(&self, coordinate: u16) -> f32 {
+        let last = self.dioptres.len() - 1;
         let coordinate = f32::from(coordinate) / PARTS_OF_LAYER;
         let below = (coordinate as usize).min(last);
         let above = (below + 1).min(last);
-        self.radius_px[below] + coordinate.fract() * (self.radius_px[above] - self.radius_px[below])
+        self.dioptres[below] + coordinate.fract() * (self.dioptres[above] - self.dioptres[below])
     }
 
     /// Returns the edges of depth in the bundle of each pixel: those no farther from it than the blur radius of their near sides.
@@ -238,6 +248,8 @@ impl Sight {
         };
         for (row, column) in (0..rows).flat_map(|row| (0..columns).map(move |column| (row, column))) {
             let mine = coordinate(row, column);
+            let blur = self.blur.at((self.at.first_row + row as i64, self.at.first_column + column as i64));
+            let radius_at = |coordinate: u16| blur.of(self.dioptres_at(coordinate));
             for by in SOFT_EDGE {
                 for (other_row, other_column) in [(row, column + by), (row + by, column)] {
                     if other_row >= rows || other_column >= columns {
@@ -247,7 +259,7 @@ impl Sight {
                     if mine == other {
                         continue;
                     }
-                    let (near, far) = (self.radius_at(mine.min(other)), self.radius_at(mine.max(other)));
+                    let (near, far) = (radius_at(mine.min(other)), radius_at(mine.max(other)));
                     if (near - far).abs() > DEPTH_EDGE_PX {
                         // In focus too it has a part of a pixel.
                         let px = near.abs().max(0.1);
@@ -265,6 +277,64 @@ impl Sight {
         spread(&mut reach, columns);
         reach.reverse();
         reach.into_iter().map(|reach| reach.edges).collect()
+    }
+}
+
+/// The blur radius over depth at a place, with its sign, pixels: it is linear in dioptres.
+#[derive(Clone, Copy, Debug)]
+struct Blur {
+    at_infinity_px: f32,
+    px_per_dioptre: f32,
+}
+
+impl Blur {
+    #[inline]
+    fn of(self, dioptres: f32) -> f32 {
+        self.at_infinity_px + self.px_per_dioptre * dioptres
+    }
+
+    /// Returns the largest of the blur radii of layers.
+    fn widest_px(self, dioptres: &[f32]) -> f32 {
+        [dioptres.first(), dioptres.last()].into_iter().flatten().map(|d| self.of(*d).abs()).fold(0.0, f32::max)
+    }
+}
+
+/// The blur over depth at each block of pixels of a film.
+#[derive(Debug)]
+struct BlurOverFilm {
+    /// The rows and columns of blocks that the film has a part of, first and last.
+    rows: (i64, i64),
+    columns: (i64, i64),
+    by_block: Vec<Blur>,
+}
+
+impl BlurOverFilm {
+    fn of((lens, film, wavelength_nm): (&dyn LensImage, &Film, f64)) -> Self {
+        let (pixels, pitch_mm) = (film_pixels(film), 1e-3 * film.pitch_um);
+        let blocks = |first: i64, n: usize| (first.div_euclid(BLOCK), (first + n as i64 - 1).div_euclid(BLOCK));
+        let (rows, columns) = (blocks(pixels.first_row, pixels.rows), blocks(pixels.first_column, pixels.columns));
+        let places = (rows.0..=rows.1).flat_map(|row| (columns.0..=columns.1).map(move |column| (row, column)));
+        let blur = |(row, column): (i64, i64)| {
+            let middle = DVec2::new(column as f64 + 0.5, -(row as f64 + 0.5)) * (BLOCK as f64 * pitch_mm);
+            let half_mm = film.half_size_mm();
+            let radius_px = |dioptres: f64| {
+                lens.blur_radius_mm(middle.clamp(-half_mm, half_mm), dioptres, wavelength_nm) / pitch_mm
+            };
+            let at_infinity_px = radius_px(0.0);
+            Blur { at_infinity_px: at_infinity_px as f32, px_per_dioptre: (radius_px(1.0) - at_infinity_px) as f32 }
+        };
+        Self { rows, columns, by_block: places.map(blur).collect() }
+    }
+
+    /// Returns that of a pixel; beside the film, of the nearest of its blocks.
+    fn at(&self, (row, column): (i64, i64)) -> Blur {
+        let row = row.div_euclid(BLOCK).clamp(self.rows.0, self.rows.1) - self.rows.0;
+        let column = column.div_euclid(BLOCK).clamp(self.columns.0, self.columns.1) - self.columns.0;
+        self.by_block[(row * (self.columns.1 - self.columns.0 + 1) + column) as usize]
+    }
+
+    fn widest_px(&self, dioptres: &[f32]) -> f32 {
+        self.by_block.iter().map(|blur| blur.widest_px(dioptres)).fold(0.0, f32::max)
     }
 }
 

@@ -1,6 +1,6 @@
 //! What is to be imaged: geometry on one side, light on the other.
 
-use dioptric_scene::{Scene, View};
+use dioptric_scene::{PointLight, Scene, View};
 use dioptric_spectrum::{Bands, DepthMap, Quantity, SpectrumError, WavelengthGrid};
 use ndarray::Array2;
 
@@ -17,6 +17,8 @@ pub struct Source<'a> {
     pub view: View,
     /// What lies behind the first surface, where that is known; elsewhere it is estimated.
     pub occluded: Option<OccludedLayer<'a>>,
+    /// Stars and lamps beside the samples.
+    pub points: &'a [PointLight],
 }
 
 /// What would be seen if the first surface of a scene were taken away.
@@ -38,17 +40,18 @@ impl<'a> Source<'a> {
         let view = scene.view.ok_or_else(|| ForwardError::MissingView { scene: scene.name.clone() })?;
         let occluded =
             scene.hidden.as_ref().map(|layer| OccludedLayer { radiance: &layer.radiance, depth: &layer.depth });
-        Ok(Self { radiance: &scene.radiance, depth, view, occluded })
+        Ok(Self { radiance: &scene.radiance, depth, view, occluded, points: &scene.points })
     }
 
     /// The part that an imaging plan is made from.
     pub fn geometry(&self) -> SceneGeometry<'a> {
-        SceneGeometry { depth: self.depth, view: self.view, occluded_depth: self.occluded.map(|layer| layer.depth) }
+        let occluded_depth = self.occluded.map(|layer| layer.depth);
+        SceneGeometry { depth: self.depth, view: self.view, occluded_depth, points: self.points }
     }
 
     /// The part that may change without another plan.
     pub fn light(&self) -> SceneRadiance<'a> {
-        SceneRadiance { front: self.radiance, occluded: self.occluded.map(|layer| layer.radiance) }
+        SceneRadiance { front: self.radiance, occluded: self.occluded.map(|layer| layer.radiance), points: self.points }
     }
 }
 
@@ -62,6 +65,8 @@ pub struct SceneGeometry<'a> {
     /// Axial depth of what lies behind the first surface, where that is known; no deeper than the first surface
     /// where nothing lies behind it.
     pub occluded_depth: Option<&'a DepthMap>,
+    /// Stars and lamps beside the samples.
+    pub points: &'a [PointLight],
 }
 
 impl SceneGeometry<'_> {
@@ -85,6 +90,8 @@ pub struct SceneRadiance<'a> {
     pub front: &'a dyn Bands,
     /// Of what lies behind it; needed where a plan was made with its depth.
     pub occluded: Option<&'a dyn Bands>,
+    /// Stars and lamps beside the samples, those of which the places were planned.
+    pub points: &'a [PointLight],
 }
 
 impl SceneRadiance<'_> {
@@ -104,6 +111,7 @@ impl SceneRadiance<'_> {
                 return Err(SpectrumError::Shape { what: bands_of, expected, found }.into());
             }
         }
+        self.points.iter().try_for_each(|point| point.check(grid.len()))?;
         let planned = grid.centers_nm().iter();
         let differs = |(_, (planned, found)): &(usize, (&f64, &f64))| (*planned - *found).abs() > 1e-3;
         match planned.zip(self.front.grid().centers_nm()).enumerate().find(differs) {
@@ -120,6 +128,8 @@ pub struct BandRadiance<'a> {
     pub front: &'a Array2<f32>,
     /// Of what lies behind it; needed where a plan was made with its depth.
     pub occluded: Option<&'a Array2<f32>>,
+    /// How bright each point is in the band, as [`PointBrightness`](dioptric_scene::PointBrightness) has it.
+    pub points: &'a [f32],
 }
 
 impl BandRadiance<'_> {

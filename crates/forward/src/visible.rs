@@ -11,7 +11,6 @@ use crate::{
     coverage::Gathered,
     layers::tent,
     node_kernels::{LayerKernels, NodeKernel},
-    raster::Raster,
     rectangle::Rectangle,
     sight::{Met, NearEdges, Ray, Sight},
     tile::film_pixels,
@@ -45,29 +44,14 @@ enum Parts<'a> {
     At(&'a [u8]),
 }
 
-/// A pixel that sees a layer through a part of its pupil.
-pub(crate) struct PartlySeen {
-    /// Of the pixel among those of its tile, and its row and column.
-    index: usize,
-    pixel: (i64, i64),
-    /// What of its coverage is seen, and how far that is told by rays.
-    part: f32,
-    told: f32,
-    /// What it gathers, seen or not.
-    light: f32,
-}
-
-/// A layer as a tile gathers it.
-pub(crate) struct Looked<'a> {
+/// A point that shines, as the pixels around it see it.
+pub(crate) struct SeenPoint {
+    /// The layer that it lies in or behind, and its depth.
     pub(crate) layer: usize,
-    pub(crate) raster: &'a Raster,
-    /// The samples that it is gathered from, row by row: radiance times coverage, and coverage, which is empty where it is 1.
-    pub(crate) from: Rectangle,
-    pub(crate) light: &'a [f32],
-    pub(crate) alpha: &'a [f32],
-    /// The kernel in the middle of the tile.
-    pub(crate) window: Rectangle,
-    pub(crate) kernel: &'a [f32],
+    pub(crate) dioptres: f64,
+    /// Pixels below and to the right of the film's middle, and how wide it is, pixels.
+    pub(crate) place_px: (f32, f32),
+    pub(crate) width_px: f32,
 }
 
 /// Blur radii between which rays begin to tell parts of the pupil apart, pixels: what a point in focus becomes is aberrations and pixels.
@@ -80,10 +64,8 @@ const POINTS_OF_RADIUS: f32 = 6.0;
 const NEGLIGIBLE_PART: f32 = 1e-3;
 /// Part of the rays that must meet a layer to tell what is seen of it; of less, all rays tell.
 const FEW_RAYS: f32 = 0.02;
-/// The share of a pixel's light that a sample has whose own rays are drawn, and how many times as bright as the mean of the pixels it is.
-const BRIGHT: (f32, f32) = (0.04, 2.0);
-/// Rays to a bright sample, each way.
-const TO_SAMPLE: usize = 2;
+/// Rays from a pixel to a point, each way.
+const TO_POINT: usize = 2;
 
 impl Visible {
     /// Draws rays, by the kernels of the layers, from the pixels of a film.
@@ -118,17 +100,9 @@ impl Visible {
         self.sight.size_bytes() + parts.sum::<usize>()
     }
 
-    /// Returns the pixels of a tile that see a layer through a part of their pupils, `open` being the part that layers well before it leave.
-    pub(crate) fn partly_seen(
-        &self,
-        layer: usize,
-        open: &dyn Fn(usize, usize) -> f32,
-        gathered: &Gathered,
-    ) -> Vec<PartlySeen> {
-        let told = |radius_px: f32| (radius_px.abs() - TELLS_APART_PX.0) / (TELLS_APART_PX.1 - TELLS_APART_PX.0);
-        let told_of_layer = told(self.sight.radius_px()[layer]);
+    /// Takes from what pixels gather of a layer what they do not see of it, `open` being the part of their pupils that layers well before it leave.
+    pub(crate) fn weigh(&self, layer: usize, open: &dyn Fn(usize, usize) -> f32, gathered: &mut Gathered) {
         let Rectangle { first_row, first_column, rows, columns } = gathered.at;
-        let mut partly = vec![];
         for row in 0..rows {
             let mut column = 0;
             while column < columns {
@@ -140,6 +114,7 @@ impl Visible {
                     continue;
                 };
                 let parts = block.of_layer(layer);
+                let told_of_layer = told(self.sight.radius_px(layer, pixel));
                 for column in column..end {
                     let (index, pixel) = (row * columns + column, (pixel.0, first_column + column as i64));
                     if gathered.alpha[index] <= 0.0 {
@@ -159,103 +134,43 @@ impl Visible {
                         Parts::At(parts) => block.part(parts, pixel),
                     };
                     let part = open + told * (by_rays - open);
-                    partly.push(PartlySeen { index, pixel, part, told, light: gathered.light[index] });
+                    gathered.light[index] *= part;
+                    gathered.alpha[index] *= part;
                 }
                 column = end;
             }
         }
-        partly
     }
 
-    /// Takes away what pixels do not see of a layer, and returns from what light on samples stand out, by kernels that are so large at most.
-    pub(crate) fn weigh(&self, partly: &[PartlySeen], kernel_most: f32, gathered: &mut Gathered) -> f32 {
-        for seen in partly {
-            gathered.light[seen.index] *= seen.part;
-            gathered.alpha[seen.index] *= seen.part;
-        }
-        let told = partly.iter().filter(|seen| seen.told > 0.0);
-        let (sum, n) = told.fold((0.0, 0.0), |(sum, n), seen| (sum + seen.light, n + 1.0));
-        // Where there is less light than in the mean, less stands out.
-        if sum > 0.0 { BRIGHT.1.max(0.5 * BRIGHT.0 / kernel_most) * sum / n } else { f32::INFINITY }
-    }
-
-    /// Corrects the light of samples from so much on: each by its own rays.
-    pub(crate) fn add_bright(&self, looked: &Looked<'_>, least: f32, partly: &[PartlySeen], gathered: &mut Gathered) {
-        let Looked { layer, raster, from, light, alpha, window, kernel } = looked;
-        let step_px = raster.level.step_px() as f32;
-        let shift_px = 0.5 * (1.0 - step_px.min(1.0));
-        let own_px = self.sight.radius_px()[*layer];
-        let at = gathered.at;
-        let mut by_pixel: Vec<Option<&PartlySeen>> = vec![None; at.len()];
-        partly.iter().filter(|seen| seen.told > 0.0).for_each(|seen| by_pixel[seen.index] = Some(seen));
-        // Of each row the first such pixel, and the one after the last.
-        let spans = by_pixel.chunks_exact(at.columns).map(|line| {
-            let first = line.iter().position(Option::is_some).unwrap_or(at.columns);
-            first..line.iter().rposition(Option::is_some).map_or(first, |last| last + 1)
-        });
-        let spans: Vec<_> = spans.collect();
-        let first = self.sight.place_px((at.first_row, at.first_column));
-        for (index, &light) in light.iter().enumerate().filter(|(_, light)| **light > least) {
-            let (sample, alpha) = ((index / from.columns, index % from.columns), alpha.get(index).unwrap_or(&1.0));
-            let place = (
-                raster.down_px(from.first_row + sample.0 as i64) as f32,
-                raster.across_px(from.first_column + sample.1 as i64) as f32,
-            );
-            // The pixels x with the sample at x − d, for d in the window.
-            let pixels = |px: f32, (first, n): (i64, usize), (first_px, n_pixels): (f32, usize)| {
-                let from = (px + shift_px + (first as f32 - 0.5) * step_px - first_px).ceil().max(0.0) as usize;
-                let to = (px + shift_px + (first as f32 + n as f32 - 0.5) * step_px - first_px).ceil().max(0.0);
-                from..(to as usize).min(n_pixels)
-            };
-            let rows = pixels(place.0, (window.first_row, window.rows), (first.0, at.rows));
-            let columns = pixels(place.1, (window.first_column, window.columns), (first.1, at.columns));
-            for row in rows {
-                let within = columns.start.max(spans[row].start)..columns.end.min(spans[row].end);
-                for seen in by_pixel[row * at.columns..].get(within).unwrap_or_default().iter().flatten() {
-                    let (down, across) = self.sight.place_px(seen.pixel);
-                    let beside = (place.0 - down, place.1 - across);
-                    let in_window = |beside: f32, first: i64, n: usize| {
-                        let sample = ((-beside - shift_px) / step_px).round() as i64 - first;
-                        usize::try_from(sample).ok().filter(|sample| *sample < n)
-                    };
-                    let row = in_window(beside.0, window.first_row, window.rows);
-                    let column = in_window(beside.1, window.first_column, window.columns);
-                    let (Some(row), Some(column)) = (row, column) else { continue };
-                    let weight = kernel[row * window.columns + column];
-                    if weight * light <= BRIGHT.0 * seen.light {
-                        continue;
-                    }
-                    let block = (seen.pixel.0.div_euclid(BLOCK), seen.pixel.1.div_euclid(BLOCK));
-                    let Some(BlockParts { met, .. }) = self.blocks.get(&block) else { continue };
-                    let open = self.open_to((*layer, own_px, met), (down, across), (beside, step_px));
-                    let more = seen.told * weight * (open - seen.part);
-                    gathered.light[seen.index] += more * light;
-                    gathered.alpha[seen.index] += more * alpha;
-                }
-            }
-        }
-        for seen in partly {
-            let (light, alpha) = (&mut gathered.light[seen.index], &mut gathered.alpha[seen.index]);
-            (*light, *alpha) = (light.max(0.0), alpha.max(0.0));
-        }
-    }
-
-    /// Returns the part of the rays from a point to a sample beside it that reaches a layer of a blur radius.
-    fn open_to(
-        &self,
-        (layer, own_px, met): (usize, f32, &[Met]),
-        from: (f32, f32),
-        ((down, across), width_px): ((f32, f32), f32),
-    ) -> f32 {
-        let reach = (0..TO_SAMPLE * TO_SAMPLE).filter(|ray| {
-            let within = |number: usize| width_px * ((number as f32 + 0.5) / TO_SAMPLE as f32 - 0.5);
-            let (down, across) = (down + within(ray / TO_SAMPLE), across + within(ray % TO_SAMPLE));
+    /// Returns the part of a point's light that reaches a pixel, `open` being the part that layers well before the point leave of the pixel's pupil.
+    pub(crate) fn part_of_point(&self, point: &SeenPoint, pixel: (i64, i64), open: f32) -> f32 {
+        let most_px = self.sight.near_edges(pixel).most_px;
+        let radius_px = self.sight.radius_px_of(point.dioptres, pixel);
+        let told = told(radius_px).min(told(most_px)).clamp(0.0, 1.0);
+        let block = self.blocks.get(&(pixel.0.div_euclid(BLOCK), pixel.1.div_euclid(BLOCK)));
+        let Some(BlockParts { met, .. }) = block.filter(|_| told > 0.0 && open > NEGLIGIBLE_PART) else { return open };
+        let from = self.sight.place_px(pixel);
+        let width_px = point.width_px.max(1.0);
+        let reach = (0..TO_POINT * TO_POINT).filter(|ray| {
+            let within = |number: usize| width_px * ((number as f32 + 0.5) / TO_POINT as f32 - 0.5);
+            let down = point.place_px.0 - from.0 + within(ray / TO_POINT);
+            let across = point.place_px.1 - from.1 + within(ray % TO_POINT);
             // What aberrations and pixels put beyond the disc came through its rim.
-            let scale = (own_px.abs() / down.hypot(across).max(1e-6)).min(1.0) / own_px;
-            self.sight.reaches(layer, met, from, (scale * down, scale * across))
+            let scale = (radius_px.abs() / down.hypot(across).max(1e-6)).min(1.0) / radius_px;
+            self.sight.reaches(point.layer, met, from, (scale * down, scale * across))
         });
-        reach.count() as f32 / (TO_SAMPLE * TO_SAMPLE) as f32
+        open + told * (reach.count() as f32 / (TO_POINT * TO_POINT) as f32 - open)
     }
+
+    /// Whether edges of depth lie in the bundle of a pixel.
+    pub(crate) fn has_edges(&self, pixel: (i64, i64)) -> bool {
+        self.sight.near_edges(pixel).most_px > 0.0
+    }
+}
+
+/// How far rays through the pupil of a blur radius tell parts of it apart; in focus all of it sees the same.
+fn told(radius_px: f32) -> f32 {
+    (radius_px.abs() - TELLS_APART_PX.0) / (TELLS_APART_PX.1 - TELLS_APART_PX.0)
 }
 
 /// Rays through a pupil: where each goes in a layer of a blur radius of 1 pixel, and its weight.

@@ -81,7 +81,7 @@ fn picture(scene: &[(SpectralImage, DepthMap); 2]) -> Array2<f32> {
     let view = View { focal_px: 1000.0 * FINE as f64, center_x_px: middle, center_y_px: middle };
     let [front, behind] = scene;
     let occluded = Some(OccludedLayer { radiance: &behind.0, depth: &behind.1 });
-    let source = Source { radiance: &front.0, depth: &front.1, view, occluded };
+    let source = Source { radiance: &front.0, depth: &front.1, view, occluded, points: &[] };
     let lens = DiscLens { focus_dioptres: 20.0, ..DiscLens::default() };
     let mut picture = None;
     let mut sink = |_: usize, plane: Array2<f32>| {

@@ -21,7 +21,7 @@ fn error(lens: &str, f_number: f64, plane_m: f64, diffraction: Diffraction, sett
     let depth = DepthMap::new(Array2::from_elem(size, plane_m as f32)).unwrap();
     // Far wider than the film sees.
     let view = View { focal_px: 60.0, center_x_px: 149.5, center_y_px: 74.5 };
-    let source = Source { radiance: &radiance, depth: &depth, view, occluded: None };
+    let source = Source { radiance: &radiance, depth: &depth, view, occluded: None, points: &[] };
     let mut picture = Array2::zeros((0, 0));
     let mut sink = |_: usize, band: Array2<f32>| {
         picture = band;
@@ -72,7 +72,7 @@ fn contrast(f_number: f64, cycles_per_px: f64) -> f64 {
     let (center_x_px, center_y_px) = (0.5 * (columns as f64 - 1.0), 0.5 * (rows as f64 - 1.0));
     // As the lens sees from its middle.
     let view = View { focal_px: film_distance_mm / 5e-3 * FINE as f64, center_x_px, center_y_px };
-    let source = Source { radiance: &radiance, depth: &depth, view, occluded: None };
+    let source = Source { radiance: &radiance, depth: &depth, view, occluded: None, points: &[] };
     let mut picture = Array2::zeros((0, 0));
     let mut sink = |_: usize, band: Array2<f32>| {
         picture = band;

@@ -58,8 +58,13 @@ impl Slats {
         let middle = 0.5 * ((FINE * SIDE) as f64 - 1.0);
         let view = View { focal_px: 1000.0 * FINE as f64, center_x_px: middle, center_y_px: middle };
         let occluded = OccludedLayer { radiance: &self.wall.0, depth: &self.wall.1 };
-        let source =
-            Source { radiance: &self.front.0, depth: &self.front.1, view, occluded: wall_is_known.then_some(occluded) };
+        let source = Source {
+            radiance: &self.front.0,
+            depth: &self.front.1,
+            view,
+            occluded: wall_is_known.then_some(occluded),
+            points: &[],
+        };
         picture(&source, lens, mode).unwrap()
     }
 
@@ -148,7 +153,7 @@ fn views_of_one_plane_add_up() {
     let view = View { focal_px: 1000.0 * FINE as f64, center_x_px: middle, center_y_px: middle };
     // A wall that leans by 4 pixels of blur over the picture.
     let leaning = depth(plane(|x, _| 20.0 - 4.0 - 4.0 * x / SIDE as f64));
-    let source = Source { radiance: &scene.wall.0, depth: &leaning, view, occluded: None };
+    let source = Source { radiance: &scene.wall.0, depth: &leaning, view, occluded: None, points: &[] };
     let growing = DiscLens { growth: 0.4, distortion_per_mm2: 0.5, ..lens() };
     for lens in [lens(), growing] {
         let exact =
@@ -172,7 +177,7 @@ fn views_of_one_plane_add_up() {
 fn number_of_views_is_checked() {
     let scene = Slats::new();
     let view = View { focal_px: 1000.0, center_x_px: 79.5, center_y_px: 79.5 };
-    let source = Source { radiance: &scene.front.0, depth: &scene.front.1, view, occluded: None };
+    let source = Source { radiance: &scene.front.0, depth: &scene.front.1, view, occluded: None, points: &[] };
     for n in [0, 1, 257] {
         let error = picture(&source, &lens(), BlurMode::Views(n)).unwrap_err().to_string();
         assert!(error.contains("the number of views") && error.contains("2 to 256"), "{error}");

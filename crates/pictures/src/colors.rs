@@ -8,6 +8,8 @@ use moxcms::{
     ToneReprCurve, TransferCharacteristics, XyY,
 };
 
+use crate::bmp::{BmpColors, colors_of_bmp};
+
 /// How far curve and matrix of a profile may be from those of sRGB to be taken as these: four digits of a profile's fractions.
 const SAME: f64 = 2e-3;
 /// The highest code.
@@ -27,7 +29,7 @@ pub struct StatedColors {
 impl StatedColors {
     /// Returns what a file states; `None` where it says sRGB, or nothing.
     ///
-    /// Of PNG the chunk that counts is, as its third edition has it, the first of cICP, iCCP, sRGB, and gAMA with cHRM; of the other formats the
+    /// Of BMP its header of version 4 or 5. Of PNG the chunk that counts is, as its third edition has it, the first of cICP, iCCP, sRGB, and gAMA with cHRM; of the other formats the
     /// ICC profile, or Adobe RGB by the Exif data of a camera (DCF 2.0).
     ///
     /// # Errors
@@ -38,6 +40,9 @@ impl StatedColors {
         let format = reader.format();
         if format == Some(ImageFormat::Png) {
             return of_png(path);
+        }
+        if format == Some(ImageFormat::Bmp) {
+            return of_bmp(path);
         }
         if format == Some(ImageFormat::Jpeg) && colors_of_jpeg(path) == Some(4) {
             return Err("holds inks (CMYK), expected gray or red, green and blue; convert it to sRGB".to_owned());
@@ -159,6 +164,26 @@ fn text_of(text: &ProfileText) -> Option<String> {
 fn table(curve: &ToneReprCurve) -> Result<Vec<f64>, moxcms::CmsError> {
     let curve = curve.make_linear_evaluator()?;
     Ok((0..=u16::MAX).map(|code| f64::from(curve.evaluate_value(f32::from(code) / f32::from(u16::MAX)))).collect())
+}
+
+/// Returns what the header of a BMP file states.
+fn of_bmp(path: &Path) -> Result<Option<StatedColors>, String> {
+    match colors_of_bmp(path) {
+        BmpColors::Usual => Ok(None),
+        BmpColors::Linked => {
+            Err("names an ICC profile in another file, expected it within or none; convert it to sRGB".to_owned())
+        }
+        BmpColors::Profile(profile) => StatedColors::of_icc(&profile),
+        BmpColors::Calibrated { primaries: [red, green, blue], white, gammas } => {
+            let curve =
+                |gamma: f64| (0..=u16::MAX).map(|code| (f64::from(code) / TOP).powf(gamma)).collect::<Vec<f64>>();
+            let point = |[x, y]: [f32; 2]| Chromaticity::new(x, y);
+            let primaries = ColorPrimaries { red: point(red), green: point(green), blue: point(blue) };
+            let name =
+                format!("primaries and gammas of {:.3}, {:.3}, {:.3} of its header", gammas[0], gammas[1], gammas[2]);
+            StatedColors::made(name, gammas.map(curve), matrix_of(XyY::new(white[0], white[1], 1.0), primaries))
+        }
+    }
 }
 
 /// Returns what the chunks of a PNG file state.

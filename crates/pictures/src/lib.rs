@@ -1,6 +1,7 @@
 //! Files of pictures, read and written.
 #![doc = include_str!("../README.md")]
 
+mod bmp;
 mod colors;
 mod reduced;
 mod tagged;

@@ -75,7 +75,7 @@ pub use shown::{ShowRequest, ShownPicture, open_display};
 pub use stages::{
     AberrationSummary, CameraSummary, Capture, FilmPart, FilmPlace, FrameSet, Given, GivenParts, IRRADIANCE_FILE,
     Irradiance, IrradianceSummary, KeptCamera, LensAberrations, NarrowSurfaces, PaintReach, RESUME_FILE,
-    RenderingSummary, ResolvedLens, ResolvedScene, Resumed, SceneSummary, StageCounts, Video, VideoFrame,
+    RenderingSummary, ResolvedLens, ResolvedScene, Resumed, SceneSummary, StageCounts, UnseenPoints, Video, VideoFrame,
     VideoFrameFacts, WorldRender, WorldSummary, has_kept_bands, world_camera, write_seen_png,
 };
 pub use video_files::{VideoFacts, write_video_frame};

@@ -29,6 +29,7 @@ fn slats(width_px: usize, hidden: bool) -> Scene {
         depth: Some(DepthMap::new(z_m).unwrap()),
         view: Some(view),
         hidden: hidden.then_some(behind),
+        points: vec![],
         ..Scene::new("slats", image(front))
     }
 }

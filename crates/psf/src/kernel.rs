@@ -3,7 +3,7 @@
 use glam::IVec2;
 use ndarray::{Array2, s};
 
-/// Within how much of the borders of a window diffracted light fades out, in units of λN: what is spread beyond has no edge there then.
+/// Over how much of the radius of a window diffracted light fades out, in units of λN: what is spread beyond has no edge there then.
 const FADE: f64 = 4.0;
 
 /// A point spread function on square pixels: odd × odd, in the picture frame (row 0 is the top). The point of the film that it is about is the middle of a pixel:
@@ -18,15 +18,17 @@ pub struct Kernel {
     pub pitch_um: f64,
     /// Where the middle pixel lies, pixels to the right of the one that the kernel is about and below it; mostly 0.
     pub middle_px: IVec2,
-    /// λN of the light on the film, pixels; 0 without diffraction. The samples of diffracted light, which has no end at the borders, fade out there:
+    /// λN of the light on the film, pixels; 0 without diffraction. The samples of diffracted light, which has no end at the borders, fade out before them:
     /// [`fade_px`](Self::fade_px).
     pub lambda_n_px: f64,
+    /// The radius about the middle of the window at which they end, pixels; 0 without diffraction.
+    pub edge_px: f64,
 }
 
 impl Kernel {
     /// Returns the kernel of these samples, odd × odd, that is about the middle of the middle one.
     pub fn centered(samples: Array2<f32>, pitch_um: f64) -> Self {
-        Self { samples, kept_share: 1.0, pitch_um, middle_px: IVec2::ZERO, lambda_n_px: 0.0 }
+        Self { samples, kept_share: 1.0, pitch_um, middle_px: IVec2::ZERO, lambda_n_px: 0.0, edge_px: 0.0 }
     }
 
     /// Returns the kernel that blurs nothing.
@@ -34,28 +36,26 @@ impl Kernel {
         Self::centered(Array2::ones((1, 1)), pitch_um)
     }
 
-    /// Within how much of the borders the samples fade out linearly, pixels: four λN, or up to the middle.
-    pub fn fade_px(&self) -> f64 {
-        (FADE * self.lambda_n_px).min(0.5 * self.samples.nrows() as f64)
+    /// Returns the radii about the middle of the window between which the samples of diffracted light fade out linearly, pixels: over four λN, or from the
+    /// middle on.
+    pub fn fade_px(&self) -> [f64; 2] {
+        [(self.edge_px - FADE * self.lambda_n_px).max(0.0), self.edge_px]
     }
 
-    /// Returns the kernel of light with this λN, faded out for it.
-    pub(crate) fn faded_out(mut self, lambda_n_px: f64) -> Self {
+    /// Returns the kernel of light with this λN, faded out for it along circles that hold what rays make of it, which reach so far.
+    pub(crate) fn faded_out(mut self, lambda_n_px: f64, reach_px: f64) -> Self {
         self.lambda_n_px = lambda_n_px;
-        let (fade_px, side) = (self.fade_px(), self.samples.nrows());
-        let factors = (0..side.div_ceil(2)).map(|from_border| (from_border as f64 + 0.5) / fade_px);
-        let factors: Vec<f32> = factors.take_while(|factor| *factor < 1.0).map(|factor| factor as f32).collect();
-        let n_faded = factors.len();
-        for (row, mut line) in self.samples.rows_mut().into_iter().enumerate() {
-            let from_border = row.min(side - 1 - row);
-            // Of a row that does not fade out itself, the ends do.
-            let columns = if from_border < n_faded { 0..side.div_ceil(2) } else { 0..n_faded };
-            for column in columns {
-                let Some(factor) = factors.get(column.min(from_border)) else { continue };
-                line[column] *= factor;
-                if column != side - 1 - column {
-                    line[side - 1 - column] *= factor;
-                }
+        if lambda_n_px <= 0.0 {
+            return self;
+        }
+        let side = self.samples.nrows();
+        self.edge_px = (0.5 * side as f64).max(reach_px + FADE * lambda_n_px);
+        let [start, end] = self.fade_px();
+        let from_middle = |i: usize| i as f64 - 0.5 * (side as f64 - 1.0);
+        for ((row, column), sample) in self.samples.indexed_iter_mut() {
+            let radius = from_middle(row).hypot(from_middle(column));
+            if radius > start {
+                *sample *= ((end - radius) / (end - start)).max(0.0) as f32;
             }
         }
         self

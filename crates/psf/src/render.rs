@@ -44,8 +44,9 @@ pub(crate) struct Layout<'a> {
     bending: Option<StopHurb>,
     /// The middle pixel of the window, to the right of the one about which spots count, and below it.
     middle_px: IVec2,
-    /// The geometric picture's reach from the middle, pixels.
+    /// The geometric picture's reach from the middle, pixels: along rows and columns, and any way.
     reach: f64,
+    radius: f64,
     /// λN, pixels; 0 without diffraction.
     lambda_n_px: f64,
     side: usize,
@@ -78,9 +79,10 @@ impl<'a> Layout<'a> {
         let (low, high) = spots.bounds_mm();
         let reach = [low, high].map(|corner| (corner * per_mm - middle).abs().max_element());
         let reach = reach[0].max(reach[1]).max(0.0);
+        let radius = nodes.iter().map(|node| node.at_mm.length()).fold(0.0, f64::max);
         let lambda_n_px = bending.map_or(0.0, |bending| lambda_n(&nodes[0], bending));
         let side = 2 * (reach + TAILS * lambda_n_px - 0.5).ceil().clamp(0.0, MOST_PIXELS) as usize + 1;
-        Self { spots, nodes, bending, middle_px, reach, lambda_n_px, side, natural_side: side }
+        Self { spots, nodes, bending, middle_px, reach, radius, lambda_n_px, side, natural_side: side }
     }
 
     /// Returns the layout with a window of so many pixels along its side: about the middle of a pixel if the number is odd, else about the corner of four.
@@ -147,7 +149,7 @@ impl<'a> Layout<'a> {
     /// Returns drawn energies of the window as a kernel, trimmed to what matters.
     pub(crate) fn kernel(&self, energies: &Array2<f64>, pitch_um: f64) -> Kernel {
         let kept = if self.lambda_n_px > 0.0 { KEPT_OF_TAILS } else { KEPT_OF_RAYS };
-        let kernel = Kernel::centered(trim(energies, kept), pitch_um).faded_out(self.lambda_n_px);
+        let kernel = Kernel::centered(trim(energies, kept), pitch_um).faded_out(self.lambda_n_px, self.radius);
         Kernel { middle_px: self.middle_px, ..kernel }
     }
 }

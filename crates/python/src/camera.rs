@@ -126,7 +126,7 @@ impl Camera {
     /// border : {"hold", "mirror", "black"}
     ///     What the lens sees beyond the ends of the scene: the samples at its border, the scene mirrored, or nothing.
     /// scene : Scene or path
-    /// fov_deg, depth_m, width_mm, distance_mm, fill_depth, hidden, white_level, quantity, unit, scale, scene_wavelengths_nm, variable,
+    /// fov_deg, depth_m, width_mm, distance_mm, fill_depth, hidden, points, white_level, quantity, unit, scale, scene_wavelengths_nm, variable,
     /// axes, no_data, depth, depth_unit, depth_kind, view, panorama
     /// illuminant, illuminance_lux, scene_light, mean_luminance_cd_m2
     ///     Of the scene, as of `Scene.read`.

@@ -63,6 +63,7 @@ const ALL: &[&str] = &[
     "distance_mm",
     "fill_depth",
     "hidden",
+    "points",
     "white_level",
     "quantity",
     "unit",

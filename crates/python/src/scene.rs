@@ -183,6 +183,8 @@ impl Scene {
     ///     The depth where none was measured: the farther of those beside it, the farthest of the scene, or so many metres.
     /// hidden : str or os.PathLike, optional
     ///     A file of what lies behind the first surface: radiance and depth of the same samples.
+    /// points : str or os.PathLike, optional
+    ///     A table (``.csv``) of points that shine beside it: stars, LEDs, lamps.
     /// white_level : float, optional
     ///     The number that a perfect white has in a cube that does not state it.
     /// quantity : {"radiance", "reflectance", "photons"}, optional
@@ -375,6 +377,7 @@ pub(crate) const SCENE_OPTIONS: &[&str] = &[
     "distance_mm",
     "fill_depth",
     "hidden",
+    "points",
     "white_level",
     "quantity",
     "unit",
@@ -428,6 +431,10 @@ pub(crate) fn set_scene_option(spec: &mut SceneSpec, key: &str, value: &Bound<'_
         "depth" | "view" => {
             let path: PathBuf = value.extract().map_err(|_| wrong_type(key, type_name(value), "a path"))?;
             if key == "depth" { spec.reading.depth = Some(path) } else { spec.reading.view = Some(path) }
+        }
+        "points" => {
+            let expected = "a path: a table of points that shine";
+            spec.points = Some(value.extract().map_err(|_| wrong_type(key, type_name(value), expected))?);
         }
         "hidden" => {
             let expected = "a path: a file of what lies behind the first surface";

@@ -29,6 +29,7 @@ mod display_model;
 mod error;
 mod formats;
 mod light;
+mod point_lights;
 mod preview;
 mod reframe;
 mod resample;
@@ -45,11 +46,12 @@ pub use display_model::{DisplayCurve, DisplayModel, PixelLayout};
 pub use error::SceneError;
 pub use formats::{
     DepthKind, ExrParts, ExrSamples, FileQuantity, FileReading, FillDepth, NoData, Panorama, PictureSamples,
-    ReadOptions, SpectralFile, SpectralHead, envi_bytes, filled_depth, joules_per_photon, may_be_read_with,
+    PointTable, ReadOptions, SpectralFile, SpectralHead, envi_bytes, filled_depth, joules_per_photon, may_be_read_with,
     notes_on_samples, read_exr_light, read_hidden_layer, read_picture, read_picture_samples, read_planes_exr,
     read_scene, read_spectral_exr, write_iset_scene, write_planes_exr, write_scene_exr, write_spectral_exr,
 };
 pub use light::SceneLight;
+pub use point_lights::{PointBrightness, PointLight, PointPlace};
 pub use preview::{srgb_preview, write_preview_png};
 pub use resample::{reflectance_under, resampled};
 pub use scene::{HiddenLayer, Scene};

@@ -6,7 +6,7 @@ use dioptric_spectrum::{DepthMap, Observer, Quantity, SpectralImage, SpectrumErr
 use ndarray::{Array2, s};
 use rayon::prelude::*;
 
-use crate::{SceneError, SceneLight, View, resample::resampled};
+use crate::{PointLight, SceneError, SceneLight, View, resample::resampled};
 
 /// How much nearer than the first surface, relatively, a hidden layer may be: half floats carry three digits.
 const HIDDEN_TOLERANCE: f32 = 2e-3;
@@ -24,6 +24,8 @@ pub struct Scene {
     pub view: Option<View>,
     /// What lies behind the first surface, where that is known.
     pub hidden: Option<HiddenLayer>,
+    /// Stars and lamps beside its samples.
+    pub points: Vec<PointLight>,
     /// The light on it, where that is known: what a white balance may go by.
     pub light: Option<SceneLight>,
     /// What was done to its samples to make it, a sentence each: depths filled, bands resampled.
@@ -44,7 +46,16 @@ pub struct HiddenLayer {
 impl Scene {
     /// Returns a scene of radiance alone.
     pub fn new(name: impl Into<String>, radiance: SpectralImage) -> Self {
-        Self { name: name.into(), radiance, depth: None, view: None, hidden: None, light: None, notes: vec![] }
+        Self {
+            name: name.into(),
+            radiance,
+            depth: None,
+            view: None,
+            hidden: None,
+            points: vec![],
+            light: None,
+            notes: vec![],
+        }
     }
 
     /// The number of rows.
@@ -197,6 +208,7 @@ impl Scene {
             depth: self.depth.as_ref().map(depth).transpose()?,
             view,
             hidden,
+            points: self.points.clone(),
             light: self.light.clone(),
             notes: self.notes.clone(),
         })
@@ -280,6 +292,11 @@ impl Scene {
             depth: self.depth.clone(),
             view: self.view,
             hidden,
+            points: self
+                .points
+                .iter()
+                .map(|point| point.resampled(self.radiance.grid(), grid))
+                .collect::<Result<_, _>>()?,
             light: self.light.clone(),
             notes: self.notes.clone(),
         })

@@ -57,6 +57,7 @@ impl Sensor {
             ("row_noise_v", self.row_noise_v),
             ("row_time_us", self.row_time_us),
             ("defects.hot_e_per_s", self.defects.hot_e_per_s),
+            ("telegraph.mean_amplitude_e", self.telegraph.mean_amplitude_e),
             ("high_gain.read_noise_v", self.high_gain.map_or(0.0, |h| h.read_noise_v)),
             ("split_pixel.read_noise_e", self.split_pixel.map_or(0.0, |s| s.read_noise_e)),
         ];
@@ -64,6 +65,7 @@ impl Sensor {
             ("fill_factor", self.fill_factor),
             ("blooming_fraction", self.blooming_fraction),
             ("defects.hot_fraction", self.defects.hot_fraction),
+            ("telegraph.fraction", self.telegraph.fraction),
             ("defects.dead_fraction", self.defects.dead_fraction),
         ];
         let finite = [("offset_v", self.offset_v), ("dark_current.at_c", self.dark_current.at_c)];

@@ -118,7 +118,7 @@ pub use raw::{Levels, MergedFrame, Raw, RawPlane};
 pub use response::{Adc, Response};
 pub use rolling::{ImagePlace, RollingShutter};
 pub use scielab::{scielab_delta_e, visual_snr};
-pub use sensor::{DarkCurrent, Defects, Filter, HighGain, Layer, Sensor, SplitPixel};
+pub use sensor::{DarkCurrent, Defects, Filter, HighGain, Layer, Sensor, SplitPixel, TelegraphNoise};
 pub use sfr::{EdgeResponse, find_edge, find_edges};
 pub use shading::{LensShading, ShadingMap};
 pub use similarity::{psnr_db, ssim};

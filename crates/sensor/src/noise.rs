@@ -29,11 +29,13 @@ pub enum NoiseSource {
     Column,
     /// Hot and dead pixels.
     Defects,
+    /// Random telegraph noise.
+    Telegraph,
 }
 
 impl NoiseSource {
     /// Every source with its name on the command line.
-    pub const NAMES: [(&'static str, Self); 9] = [
+    pub const NAMES: [(&'static str, Self); 10] = [
         ("photon", Self::Photon),
         ("dark-current", Self::DarkCurrent),
         ("read", Self::Read),
@@ -43,6 +45,7 @@ impl NoiseSource {
         ("dsnu", Self::Dsnu),
         ("column", Self::Column),
         ("defects", Self::Defects),
+        ("telegraph", Self::Telegraph),
     ];
 
     const fn bit(self) -> u32 {
@@ -171,7 +174,7 @@ impl From<NoiseSources> for Words {
 pub struct Noise {
     /// The seed of what changes from frame to frame.
     pub seed: u64,
-    /// The seed of what stays with the chip: PRNU, DSNU, columns, defects.
+    /// The seed of what stays with the chip: PRNU, DSNU, columns, defects, pixels with telegraph noise.
     #[serde(default)]
     pub fixed_pattern_seed: u64,
     /// What is on.
@@ -224,11 +227,13 @@ pub(crate) enum Kind {
     Read = 2,
     Reset = 3,
     Row = 4,
+    Telegraph = 5,
     Prnu = 17,
     Dsnu = 18,
     ColumnOffset = 19,
     ColumnGain = 20,
     Defects = 21,
+    TelegraphSites = 22,
 }
 
 impl Kind {
@@ -267,6 +272,6 @@ mod tests {
     #[test]
     fn the_table_of_names_has_every_source_once() {
         let bits: u32 = NoiseSource::NAMES.iter().map(|(_, source)| source.bit()).sum();
-        assert_eq!((NoiseSources::ALL.0, bits), (0x1ff, 0x1ff));
+        assert_eq!((NoiseSources::ALL.0, bits), (0x3ff, 0x3ff));
     }
 }

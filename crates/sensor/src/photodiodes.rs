@@ -4,7 +4,7 @@ use ndarray::Array2;
 
 use crate::{
     Adc, DarkCurrent, Defects, ElectronRate, Electrons, Exposure, HighGain, Noise, Raw, RawPlane, Response, Sensor,
-    SensorError,
+    SensorError, TelegraphNoise,
 };
 
 impl Sensor {
@@ -89,6 +89,7 @@ impl Sensor {
             dsnu_v: root * self.dsnu_v,
             column_offset_v: root * self.column_offset_v,
             row_noise_v: root * self.row_noise_v,
+            telegraph: TelegraphNoise { mean_amplitude_e: root * self.telegraph.mean_amplitude_e, ..self.telegraph },
             prnu_fraction: self.prnu_fraction / root,
             ..self.clone()
         }

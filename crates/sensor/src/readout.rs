@@ -1,11 +1,13 @@
 //! From electrons to volts and digital numbers.
 
 use ndarray::Array2;
-use rand_distr::{Distribution, StandardNormal};
+use rand::RngExt;
+use rand_distr::{Distribution, Exp1, StandardNormal};
 use rayon::prelude::*;
 
 use crate::{
-    Electrons, Exposure, Noise, NoiseSource, Raw, RawPlane, Sensor, SensorError, Volts, noise::Kind, raw::Levels,
+    Electrons, Exposure, Noise, NoiseSource, Raw, RawPlane, Sensor, SensorError, TelegraphNoise, Volts, noise::Kind,
+    raw::Levels,
 };
 
 impl Sensor {
@@ -97,6 +99,8 @@ struct Readout<'a> {
     reset_noise_v: f64,
     row_noise_v: f64,
     dsnu_v: f64,
+    /// Volts an electron, and whether each pixel is read twice.
+    telegraph: Option<(TelegraphNoise, f64, bool)>,
 }
 
 impl<'a> Readout<'a> {
@@ -122,6 +126,11 @@ impl<'a> Readout<'a> {
             },
             row_noise_v: on(NoiseSource::Row, sensor.row_noise_v),
             dsnu_v: on(NoiseSource::Dsnu, sensor.dsnu_v),
+            telegraph: (noise.has(NoiseSource::Telegraph) && sensor.telegraph.rms_e(true) > 0.0).then_some((
+                sensor.telegraph,
+                gain_v_per_e,
+                sensor.correlated_double_sampling,
+            )),
         }
     }
 
@@ -133,9 +142,31 @@ impl<'a> Readout<'a> {
         self.add_gaussian(Kind::Read, self.read_noise_v, row, values);
         self.add_gaussian(Kind::Reset, self.reset_noise_v, row, values);
         self.add_gaussian(Kind::Dsnu, self.dsnu_v, row, values);
+        self.add_telegraph(row, values);
         if self.row_noise_v > 0.0 {
             let g: f64 = StandardNormal.sample(&mut self.noise.rng(Kind::Row, self.plane, row));
             values.iter_mut().for_each(|v| *v += (self.row_noise_v * g) as f32);
+        }
+    }
+
+    /// Adds what traps take from or give to some pixels.
+    fn add_telegraph(&self, row: usize, values: &mut [f32]) {
+        let Some((TelegraphNoise { fraction, mean_amplitude_e }, gain_v_per_e, is_read_twice)) = self.telegraph else {
+            return;
+        };
+        let mut sites = self.noise.rng(Kind::TelegraphSites, self.plane, row);
+        let mut states = self.noise.rng(Kind::Telegraph, self.plane, row);
+        for value in values {
+            let (lot, size): (f64, f64) = (sites.random(), Exp1.sample(&mut sites));
+            let (first, second): (bool, bool) = (states.random(), states.random());
+            if lot < fraction {
+                let change = if is_read_twice {
+                    f64::from(u8::from(first)) - f64::from(u8::from(second))
+                } else {
+                    0.5 - f64::from(u8::from(first))
+                };
+                *value += (change * size * mean_amplitude_e * gain_v_per_e) as f32;
+            }
         }
     }
 

@@ -87,6 +87,9 @@ pub struct Sensor {
     /// Pixels that do not work.
     #[serde(default)]
     pub defects: Defects,
+    /// Pixels whose source follower has a trap.
+    #[serde(default)]
+    pub telegraph: TelegraphNoise,
     /// A fixed voltage added before the analog gain, V.
     #[serde(default)]
     pub offset_v: f64,
@@ -213,6 +216,31 @@ pub struct Defects {
     pub hot_e_per_s: f64,
     /// The share of pixels that see no light.
     pub dead_fraction: f64,
+}
+
+/// Random telegraph noise: some pixels have a trap below the gate of their source follower, whose charge comes and goes.
+///
+/// A trapped charge lowers the output by an amplitude of the pixel's own. Amplitudes are distributed exponentially over pixels, as the tails of measured
+/// histograms are. Traps are full half of the time, and correlated double sampling reads each twice, farther apart than charges stay: the difference is
+/// minus the amplitude, nothing, or the amplitude, in a quarter, a half and a quarter of the frames (the three peaks of Wang, Rao, Mierop and Theuwissen,
+/// IEDM 2006).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub struct TelegraphNoise {
+    /// The share of pixels with a trap.
+    pub fraction: f64,
+    /// The mean of their amplitudes, electrons.
+    pub mean_amplitude_e: f64,
+}
+
+impl TelegraphNoise {
+    /// Returns the rms over all pixels and frames, electrons: the mean square of amplitudes is twice the square of their mean, and half of it with
+    /// correlated double sampling, a quarter without.
+    pub fn rms_e(self, correlated_double_sampling: bool) -> f64 {
+        let part = if correlated_double_sampling { 1.0 } else { 0.5 };
+        self.mean_amplitude_e * (part * self.fraction).sqrt()
+    }
 }
 
 const fn whole() -> f64 {

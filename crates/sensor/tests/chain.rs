@@ -116,6 +116,7 @@ fn one_thread_and_two_give_the_same_bits() {
         correlated_double_sampling: false,
         blooming_fraction: 0.5,
         defects: dioptric_sensor::Defects { hot_fraction: 0.01, hot_e_per_s: 1e4, dead_fraction: 0.01 },
+        telegraph: dioptric_sensor::TelegraphNoise { fraction: 0.1, mean_amplitude_e: 5.0 },
         ..Sensor::built_in("imx363").unwrap()
     };
     let control = ExposureControl::Auto(AutoExposure::new(Metering::Mean, 0.6));

@@ -448,3 +448,37 @@ fn what_dng_cannot_hold_is_refused_in_one_sentence() {
         assert!(!path.exists());
     }
 }
+
+/// Of the pixels with a trap a quarter of the frames are one amplitude up, a quarter one down; the same pixels in all of them.
+#[test]
+fn telegraph_noise_jumps_by_the_amplitude_of_a_pixel() {
+    let (fraction, mean_amplitude_e) = (0.2, 30.0);
+    let sensor = Sensor {
+        telegraph: dioptric_sensor::TelegraphNoise { fraction, mean_amplitude_e },
+        dark_current: dioptric_sensor::DarkCurrent::default(),
+        ..Sensor::built_in("imx363").unwrap()
+    };
+    let (rows, columns) = (120, 160);
+    let rate = ElectronRate { planes_e_per_s: vec![Array2::zeros((rows, columns))] };
+    let exposure = Exposure::seconds(0.01);
+    let frame = |seed| {
+        let noise = Noise::only(seed, &[NoiseSource::Telegraph]);
+        let electrons = sensor.electrons(&rate, &exposure, &noise).unwrap();
+        let volts = sensor.volts(&electrons, &exposure, &noise).unwrap();
+        let gain = sensor.conversion_gain_v_per_e(exposure.gain_mode) as f32;
+        volts.planes_v[0].mapv(|v| v / gain)
+    };
+    let frames: Vec<_> = (0..40).map(frame).collect();
+    let n = (rows * columns) as f64;
+    let variance = frames.iter().flatten().map(|v| f64::from(*v).powi(2)).sum::<f64>() / (n * frames.len() as f64);
+    let expected = sensor.telegraph.rms_e(true).powi(2);
+    assert!((variance / expected - 1.0).abs() < 0.1, "{variance} {expected}");
+    let mut with_trap = 0;
+    for at in 0..rows * columns {
+        let values: Vec<f32> = frames.iter().map(|frame| frame[(at / columns, at % columns)]).collect();
+        let most = values.iter().fold(0.0_f32, |most, v| most.max(v.abs()));
+        with_trap += usize::from(most > 0.0);
+        assert!(values.iter().all(|v| v.abs() < 1e-4 * most + 1e-6 || (v.abs() - most).abs() < 1e-4 * most + 1e-6));
+    }
+    assert!((with_trap as f64 / n / fraction - 1.0).abs() < 0.05, "{with_trap}");
+}

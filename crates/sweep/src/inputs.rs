@@ -93,6 +93,7 @@ fn paths(camera: &mut Camera) -> Vec<&mut PathBuf> {
         .chain(camera.filters.iter_mut().filter_map(FilterSpec::file_mut))
         .chain(scene)
         .chain(&mut camera.scene.hidden)
+        .chain(&mut camera.scene.points)
         .chain(&mut camera.scene.reading.depth)
         .chain(&mut camera.scene.reading.view)
         .collect()

@@ -386,19 +386,22 @@ fn wrong(key: &'static str, found: String, expected: &str) -> PipelineError {
     PipelineError::Value { origin: "the command line".to_owned(), key, found, expected: expected.to_owned() }
 }
 
+/// Returns the line of a channel's response over frequencies, cycles a pixel.
+pub(super) fn response_series(channel: &str, frequencies: &[f64], response: &[f64]) -> Series {
+    Series {
+        label: Some(channel.to_owned()),
+        color: palette::channel(channel),
+        points: frequencies.iter().copied().zip(response.iter().copied()).collect(),
+        is_dashed: channel == "luminance",
+    }
+}
+
 impl Measurement for EdgeMeasurement {
     fn charts(&self) -> Vec<(String, LineChart)> {
-        let series = self.channels.iter().map(|channel| Series {
-            label: Some(channel.channel.clone()),
-            color: palette::channel(&channel.channel),
-            points: channel
-                .frequencies_cycles_per_pixel
-                .iter()
-                .copied()
-                .zip(channel.response.iter().copied())
-                .collect(),
-            is_dashed: channel.channel == "luminance",
-        });
+        let series = self
+            .channels
+            .iter()
+            .map(|channel| response_series(&channel.channel, &channel.frequencies_cycles_per_pixel, &channel.response));
         let highest = self.channels.iter().flat_map(|c| &c.response).copied().fold(1.0, f64::max);
         let chart = LineChart {
             title: format!("Spatial frequency response, edge slanted by {:.2}°", self.slant_deg),

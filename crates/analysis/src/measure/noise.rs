@@ -152,7 +152,8 @@ pub struct SpatialPatterns {
     /// The same of bright ones.
     pub vertical_prnu_percent: Vec<f64>,
     /// The variance of dark patterns over that of white ones of the median of the spectrum along rows, and along columns: 1 of white noise.
-    pub dsnu_nonwhiteness: [f64; 2],
+    /// None where rounding or the lowest code hides them.
+    pub dsnu_nonwhiteness: Option<[f64; 2]>,
     /// The same of bright ones.
     pub prnu_nonwhiteness: [f64; 2],
     /// Shares of all pixels, in powers of a half from 1/2 on, and by how many electrons these or fewer pixels are off in the dark.
@@ -162,7 +163,8 @@ pub struct SpatialPatterns {
 }
 
 impl SpatialPatterns {
-    fn of(dark: &FrameStack, bright: &FrameStack, gain_dn_per_e: f64) -> Self {
+    /// Whether dark patterns are measured is said by who measures them.
+    fn of((dark, dark_is_measured): (&FrameStack, bool), bright: &FrameStack, gain_dn_per_e: f64) -> Self {
         let (to_e, to_percent) = (1.0 / gain_dn_per_e, 100.0 / (bright.mean() - dark.mean()));
         let scaled = |spectrogram: &Spectrogram, by: f64| spectrogram.amplitude_dn.iter().map(|v| v * by).collect();
         let along = [true, false].map(|rows| (dark.spectrogram(rows), bright.spectrogram(rows)));
@@ -178,7 +180,8 @@ impl SpatialPatterns {
             vertical_cycles_per_pixel: dark_along_columns.frequencies.clone(),
             vertical_dsnu_e: scaled(dark_along_columns, to_e),
             vertical_prnu_percent: scaled(bright_along_columns, to_percent),
-            dsnu_nonwhiteness: [nonwhite(dark, dark_along_rows), nonwhite(dark, dark_along_columns)],
+            dsnu_nonwhiteness: dark_is_measured
+                .then(|| [nonwhite(dark, dark_along_rows), nonwhite(dark, dark_along_columns)]),
             prnu_nonwhiteness: [nonwhite(bright, bright_along_rows), nonwhite(bright, bright_along_columns)],
             dsnu_accumulated_e: accumulated(dark.deviations_dn(), to_e),
             prnu_accumulated_percent: accumulated(bright.deviations_dn(), to_percent),
@@ -319,6 +322,7 @@ fn data_sheet(bench: &Bench) -> NoiseDataSheet {
     let step_v = sensor.adc.step_v(sensor.swing_v).unwrap_or(1.0);
     let dark_e_per_s = sensor.dark_current.at(exposure.temperature_c);
     let read_e = sensor.read_noise_v(exposure.gain_mode).hypot(sensor.row_noise_v) / gain_v_per_e;
+    let read_e = read_e.hypot(sensor.telegraph.rms_e(sensor.correlated_double_sampling));
     let [iso_40, iso_10] = ISO_SNR.map(|snr| sensor.iso_by_noise(&ISO_LIGHT, &exposure, snr));
     NoiseDataSheet {
         gain_dn_per_e: gain_v_per_e * exposure.analog_gain / step_v,
@@ -462,9 +466,9 @@ impl Collected {
             prnu_error_percent: response.map(|u| 100.0 * u.prnu_error_fraction),
             dsnu_parts_e: dark_pattern.map(|u| u.dsnu_parts_e),
             prnu_parts_percent: response.map(|u| percent(u.prnu_parts_fraction)),
-            patterns: self
-                .stacks(&transfer)
-                .map(|(dark, bright)| SpatialPatterns::of(dark, bright, transfer.gain_dn_per_e)),
+            patterns: self.stacks(&transfer).map(|(dark, bright)| {
+                SpatialPatterns::of((dark, dark_pattern.is_some()), bright, transfer.gain_dn_per_e)
+            }),
             dark_current_by_mean_e_per_s: current.map(|c| c.by_mean_e_per_s),
             dark_current_by_variance_e_per_s: current.map(|c| c.by_variance_e_per_s),
             raised_black_dn: 0,

@@ -92,6 +92,9 @@ pub fn notes_on_picture(path: &Path, curve: CodeCurve) -> Vec<String> {
             (Some(kind), CodeCurve::Linear | CodeCurve::Srgb) if !kind.has_color() => {
                 "its codes become light as the command line says, not by what it states"
             }
+            (Some(ColorType::Rgb32F | ColorType::Rgba32F), _) => {
+                "its floating-point samples are taken as linear, in the primaries that it states"
+            }
             (_, CodeCurve::ByFile) => "its codes become light by what it states",
             (_, CodeCurve::Linear | CodeCurve::Srgb) => {
                 "its codes become light as the command line says, its primaries are those that it states"

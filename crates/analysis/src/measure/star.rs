@@ -10,8 +10,8 @@ use dioptric_pipeline::PipelineError;
 use ndarray::Array2;
 use serde::Serialize;
 
-use super::{CodeCurve, MeasuredPicture, Measurement, PixelRegion};
-use crate::{Corner, LineChart, Scale, Series, palette};
+use super::{CodeCurve, MeasuredPicture, Measurement, PixelRegion, edge::response_series};
+use crate::{Corner, LineChart, Scale};
 
 /// Segments of the circle (ISO 12233).
 const SEGMENTS: usize = 8;
@@ -351,17 +351,10 @@ fn solved(m: [[f64; 3]; 3], v: [f64; 3]) -> [f64; 3] {
 
 impl Measurement for StarMeasurement {
     fn charts(&self) -> Vec<(String, LineChart)> {
-        let series = self.channels.iter().map(|channel| Series {
-            label: Some(channel.channel.clone()),
-            color: palette::channel(&channel.channel),
-            points: channel
-                .frequencies_cycles_per_pixel
-                .iter()
-                .copied()
-                .zip(channel.response.iter().copied())
-                .collect(),
-            is_dashed: channel.channel == "luminance",
-        });
+        let series = self
+            .channels
+            .iter()
+            .map(|channel| response_series(&channel.channel, &channel.frequencies_cycles_per_pixel, &channel.response));
         let chart = LineChart {
             title: format!("Response of a star of {} cycles", self.n_cycles),
             x_label: "cycles a pixel".to_owned(),

@@ -241,7 +241,9 @@ impl RunReport {
                 notes: {
                     let narrow = capture.irradiance.summary.narrow_surfaces;
                     let narrow = narrow.and_then(|narrow| narrow.note());
-                    scene.notes.iter().cloned().chain(narrow).chain(note_on_coarse_samples(run)).collect()
+                    let points = capture.irradiance.summary.unseen_points.and_then(|points| points.note());
+                    let notes = scene.notes.iter().cloned().chain(narrow).chain(points);
+                    notes.chain(note_on_coarse_samples(run)).collect()
                 },
             },
             irradiance: IrradianceData {

@@ -41,6 +41,11 @@ pub struct SceneSpec {
     /// known. A layer `hidden` of the file itself does as well.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub hidden: Option<PathBuf>,
+    /// A table (`.csv`) of points that shine beside the samples: stars, LEDs, lamps. Each is drawn once, at its exact place, hidden by what lies before it.
+    /// Columns: `x_deg`, `y_deg` (angles to the right and upwards) or `x_mm`, `y_mm` (on the film); `magnitude`, `lux`, `candela` or `w_per_sr`; and
+    /// `depth_m` (infinite if left out), `light` (D65 if left out), `name`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub points: Option<PathBuf>,
     /// The number that a perfect white has in a cube that does not state it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub white_level: Option<f64>,
@@ -152,6 +157,7 @@ impl SceneSpec {
             flat: None,
             fill_depth: None,
             hidden: None,
+            points: None,
             white_level: None,
             reading: FileReading::default(),
             illuminant: None,
@@ -189,6 +195,9 @@ impl SceneSpec {
         }
         if self.hidden.is_some() && !matches!(self.source, SceneSource::File(_)) {
             checker.wrong("hidden", "a file", "a source that is a file as well")?;
+        }
+        if self.points.is_some() && matches!(&self.source, SceneSource::World(world) if world.backward().is_some()) {
+            checker.wrong("points", "a table", "none where rays from the film make the picture: they meet no point")?;
         }
         if let Some(lux) = self.illuminance_lux {
             checker.number("illuminance_lux", lux)?;
@@ -409,7 +418,9 @@ impl SceneSpec {
             SceneSource::World(_) => {}
             SceneSource::StillLife { .. } | SceneSource::Target { .. } => {}
         }
-        for file in [&mut self.hidden, &mut self.reading.depth, &mut self.reading.view].into_iter().flatten() {
+        for file in
+            [&mut self.hidden, &mut self.points, &mut self.reading.depth, &mut self.reading.view].into_iter().flatten()
+        {
             *file = folder.join(&file);
         }
     }

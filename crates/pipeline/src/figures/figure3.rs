@@ -124,7 +124,7 @@ pub fn irradiance(target: &Target, distance_mm: f64, blur_scale: f64) -> Result<
     let view = View::from_horizontal_fov_deg(2.0 * half_tan.atan().to_degrees(), columns, rows)?;
     let film = Film::centered(rows, columns, 2e3 * FIGURE_3_FILM_MM * half_tan / columns as f64);
     let depth = scene.depth.as_ref().expect("a target has a depth");
-    let source = Source { radiance: &scene.radiance, depth, view, occluded: None };
+    let source = Source { radiance: &scene.radiance, depth, view, occluded: None, points: &[] };
     let mut planes = Vec::new();
     let mut sink = |_band: usize, plane: Array2<f32>| {
         planes.push(plane);

@@ -29,6 +29,7 @@ use super::{
         AberrationInputs, BankInputs, ElectronInputs, FilmInputs, FrameInputs, IrradianceInputs, LensInputs,
         PictureInputs, PlanInputs, SceneInputs,
     },
+    unseen_points::UnseenPoints,
     world,
 };
 use crate::{BlurSpec, DualPixelSpec, PaintingFolder, PipelineError, Progress, Stage};
@@ -56,7 +57,7 @@ impl Chain<'_> {
             self.watch.progress.at(Stage::Scene, 0.0);
             self.watch.cancel.check()?;
             let paintings = self.paintings();
-            let scene = match inputs.geometry.world() {
+            let mut scene = match inputs.geometry.world() {
                 Some((_, spec)) => {
                     let has_room = |size, n_bands, n_layers| {
                         self.budget.map_or(Ok(()), |budget| budget.check_rendering(size, n_bands, n_layers))
@@ -73,6 +74,9 @@ impl Chain<'_> {
                     scene::open(inputs, pupil_z_mm, finest, paintings, &self.watch)?
                 }
             };
+            if let Some(path) = &inputs.geometry.points {
+                scene::put_points(&mut scene.scene, path)?;
+            }
             self.watch.progress.at(Stage::Scene, 1.0);
             Ok(scene)
         })
@@ -199,7 +203,8 @@ impl Chain<'_> {
         let irradiance = irradiance::image(&plan, scene, &place, keeping, &self.watch)?;
         let is_layered = inputs.plan.blur == BlurSpec::Layered;
         let narrow = if is_layered { NarrowSurfaces::of(&plan, scene) } else { None };
-        Ok(irradiance.with_narrow_surfaces(narrow))
+        let points = UnseenPoints::of(&plan, scene);
+        Ok(irradiance.with_narrow_surfaces(narrow).with_unseen_points(points))
     }
 
     /// Returns the chain with its progress reported elsewhere.
@@ -239,13 +244,14 @@ impl Chain<'_> {
             Ok(irradiance.without_seen())
         };
         let photodiodes = (0..n).map(irradiance).collect::<Result<Vec<_>, PipelineError>>()?;
-        let narrow = photodiodes[0].summary.narrow_surfaces;
+        let (narrow, points) = (photodiodes[0].summary.narrow_surfaces, photodiodes[0].summary.unseen_points);
         let memory_bytes = match self.budget {
             Some(budget) => budget.left_beside_film(&place, photodiodes[0].grid().len(), self.kept.imaging_bytes()),
             None => u64::MAX,
         };
         let memory_bytes = memory_bytes.min(self.memory_bytes);
-        Ok(Irradiance::of_photodiodes(photodiodes, memory_bytes)?.with_narrow_surfaces(narrow))
+        let irradiance = Irradiance::of_photodiodes(photodiodes, memory_bytes)?;
+        Ok(irradiance.with_narrow_surfaces(narrow).with_unseen_points(points))
     }
 
     pub(super) fn electrons(&self, inputs: &ElectronInputs) -> Result<Arc<PixelRates>, PipelineError> {

@@ -19,6 +19,7 @@ use super::{
     film::FilmPlace,
     narrow_surfaces::NarrowSurfaces,
     spec::FileStamp,
+    unseen_points::UnseenPoints,
 };
 use crate::{
     PipelineError, Stage,
@@ -80,6 +81,8 @@ pub struct IrradianceSummary {
     total: Array2<f32>,
     /// Surfaces narrower than the pupil, where the scene has any and was imaged in layers of depth.
     pub narrow_surfaces: Option<NarrowSurfaces>,
+    /// Of points beside the scene those that no pixel sees.
+    pub unseen_points: Option<UnseenPoints>,
 }
 
 impl IrradianceSummary {
@@ -246,6 +249,11 @@ impl Irradiance {
 
     /// Returns it with the surfaces that are narrower than the pupil.
     #[must_use]
+    pub(super) fn with_unseen_points(mut self, points: Option<UnseenPoints>) -> Self {
+        self.summary.unseen_points = points;
+        self
+    }
+
     pub(super) fn with_narrow_surfaces(mut self, narrow: Option<NarrowSurfaces>) -> Self {
         self.summary.narrow_surfaces = narrow;
         self
@@ -402,6 +410,7 @@ impl Summing {
             seen: LinearRgb::black(rows, columns),
             total: Array2::zeros((rows, columns)),
             narrow_surfaces: None,
+            unseen_points: None,
         };
         Self { to_rgb: SpectrumToRgb::shown(grid), luminous, summary }
     }

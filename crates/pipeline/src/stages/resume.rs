@@ -14,6 +14,7 @@ use super::{
     narrow_surfaces::NarrowSurfaces,
     scene::SceneSummary,
     spec::FileStamp,
+    unseen_points::UnseenPoints,
 };
 use crate::{Camera, PipelineError, Quality, write_file};
 
@@ -30,6 +31,8 @@ struct Kept {
     place: FilmPlace,
     #[serde(default)]
     narrow_surfaces: Option<NarrowSurfaces>,
+    #[serde(default)]
+    unseen_points: Option<UnseenPoints>,
 }
 
 /// A camera that continues a run.
@@ -60,6 +63,7 @@ impl KeptCamera {
             scene: (*capture.scene).clone(),
             place: (*capture.place).clone(),
             narrow_surfaces: capture.irradiance.summary.narrow_surfaces,
+            unseen_points: capture.irradiance.summary.unseen_points,
         };
         let text = ron::ser::to_string_pretty(&kept, ron::ser::PrettyConfig::new())
             .map_err(|e| PipelineError::Write { path: folder.join(RESUME_FILE), reason: e.to_string() })?;
@@ -112,7 +116,7 @@ impl KeptCamera {
                 Irradiance::of_photodiodes(photodiodes, u64::MAX)?
             }
         };
-        let irradiance = irradiance.with_narrow_surfaces(kept.narrow_surfaces);
+        let irradiance = irradiance.with_narrow_surfaces(kept.narrow_surfaces).with_unseen_points(kept.unseen_points);
         if kept.camera.outputs.exr_samples == ExrSamples::Half {
             notes.push(format!("{IRRADIANCE_FILE} has half floats: its samples are those of the run to .05 %"));
         }

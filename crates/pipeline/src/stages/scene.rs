@@ -1,6 +1,8 @@
 //! What stands before the camera, at the resolution and on the bands that a quality asks for.
 
-use dioptric_scene::{Scene, SceneLight};
+use std::path::Path;
+
+use dioptric_scene::{PointLight, PointTable, Scene, SceneLight};
 use dioptric_spectrum::WavelengthGrid;
 use serde::{Deserialize, Serialize};
 
@@ -165,4 +167,16 @@ fn read(
             watch.run(move || scene.open_with(wanted.as_ref(), finest, |_, _| unreachable!("it is no still life")))
         }
     }
+}
+
+/// Puts the points of a table beside a scene.
+pub(super) fn put_points(scene: &mut Scene, path: &Path) -> Result<(), PipelineError> {
+    let table = PointTable::read(path)?;
+    scene.points = table.on(scene.radiance.grid())?;
+    let is_dark = |point: &&PointLight| point.light.by_band().iter().all(|value| *value == 0.0);
+    let n_dark = scene.points.iter().filter(is_dark).count();
+    let dark = if n_dark > 0 { format!(", {n_dark} of them without light in these bands") } else { String::new() };
+    let points = if table.len() == 1 { "point" } else { "points" };
+    scene.notes.push(format!("{} {points} of {}{dark}", table.len(), path.display()));
+    Ok(())
 }

@@ -85,6 +85,7 @@ pub(crate) struct GeometryInputs {
     pub(crate) flat: Option<(FlatSize, Box<LensInputs>)>,
     pub(crate) fill_depth: Option<FillDepth>,
     pub(crate) hidden: Option<PathBuf>,
+    pub(crate) points: Option<PathBuf>,
     pub(crate) wavelengths: WavelengthSpec,
     pub(crate) quality: Quality,
     /// The lens, and the distance between the pixels behind it, µm, that see a picture that is large in all bands: it is read no finer than by far more
@@ -276,7 +277,8 @@ impl GeometryInputs {
 impl SceneInputs {
     /// Returns the part of a camera file that says this.
     pub(crate) fn choice(&self) -> SceneSpec {
-        let GeometryInputs { source, field_of_view_deg, depth_m, flat, fill_depth, hidden, .. } = &self.geometry;
+        let GeometryInputs { source, field_of_view_deg, depth_m, flat, fill_depth, hidden, points, .. } =
+            &self.geometry;
         SceneSpec {
             source: source.clone(),
             field_of_view_deg: *field_of_view_deg,
@@ -284,6 +286,7 @@ impl SceneInputs {
             flat: flat.as_ref().map(|(flat, _)| *flat),
             fill_depth: *fill_depth,
             hidden: hidden.clone(),
+            points: points.clone(),
             white_level: self.white_level,
             reading: self.reading.clone(),
             illuminant: self.illuminant.clone(),
@@ -304,20 +307,26 @@ impl SceneInputs {
                 flat: scene.flat.map(|flat| (flat, Box::new(LensInputs::of(camera, given)))),
                 fill_depth: scene.fill_depth,
                 hidden: scene.hidden.clone(),
+                points: scene.points.clone(),
                 wavelengths: camera.wavelengths.clone(),
                 quality,
                 seen_by: None,
                 is_summary: is_summary(&scene.source, camera.film),
                 frame: None,
-                files: match &scene.source {
-                    SceneSource::File(path) if given.scene.is_none() => {
-                        let others = [&scene.hidden, &scene.reading.depth, &scene.reading.view];
-                        let others = others.into_iter().flatten().flat_map(|path| FileStamp::all_of(path));
-                        FileStamp::all_of(path).into_iter().chain(others).collect()
-                    }
-                    SceneSource::World(world) if !world.is_still_life() => FileStamp::all_of(&world.file),
-                    _ => Vec::new(),
-                },
+                files: scene
+                    .points
+                    .iter()
+                    .flat_map(|path| FileStamp::all_of(path))
+                    .chain(match &scene.source {
+                        SceneSource::File(path) if given.scene.is_none() => {
+                            let others = [&scene.hidden, &scene.reading.depth, &scene.reading.view];
+                            let others = others.into_iter().flatten().flat_map(|path| FileStamp::all_of(path));
+                            FileStamp::all_of(path).into_iter().chain(others).collect()
+                        }
+                        SceneSource::World(world) if !world.is_still_life() => FileStamp::all_of(&world.file),
+                        _ => Vec::new(),
+                    })
+                    .collect(),
             },
             illuminant: scene.illuminant.clone(),
             light: scene.light.clone(),

@@ -33,6 +33,7 @@ mod payload_tests;
 mod pfm;
 mod photons;
 mod picture;
+mod point_table;
 mod primaries;
 mod raw_depth;
 mod read_options;
@@ -58,6 +59,7 @@ pub use exr_write::{ExrParts, write_planes_exr, write_scene_exr, write_spectral_
 pub use mat::write_iset_scene;
 pub use photons::joules_per_photon;
 pub use picture::{PictureSamples, notes_on_samples, read_picture, read_picture_samples};
+pub use point_table::PointTable;
 pub use read_options::ReadOptions;
 pub use read_scene::{read_hidden_layer, read_scene};
 pub use reading::{DepthKind, FileQuantity, FileReading, NoData, Panorama};

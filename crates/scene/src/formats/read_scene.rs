@@ -503,7 +503,7 @@ fn finish(path: &Path, name: String, mut contents: Contents, options: &ReadOptio
         let planes = radiance.planes().iter().map(|plane| straightened(plane, how)).collect();
         radiance = SpectralImage::new(quantity, grid, planes)?;
     }
-    let scene = Scene { name, radiance, depth, view, hidden, light, notes };
+    let scene = Scene { name, radiance, depth, view, hidden, points: vec![], light, notes };
     let mut scene = match options.depth_m {
         Some(depth_m) => scene.or_flat_depth_m(depth_m)?,
         None => scene,

@@ -146,6 +146,11 @@ fn of_file(ui: &mut Ui, scene: &mut SceneSpec) {
     if let Some(typed) = text(ui, "hidden file", words, &now) {
         scene.hidden = (!typed.is_empty()).then(|| PathBuf::from(typed));
     }
+    let now = scene.points.as_deref().unwrap_or(Path::new("")).display().to_string();
+    let words = "A table (.csv) of points that shine beside the samples, as stars and lamps: x_deg, y_deg, magnitude or candela, depth_m; empty for none";
+    if let Some(typed) = text(ui, "points file", words, &now) {
+        scene.points = (!typed.is_empty()).then(|| PathBuf::from(typed));
+    }
 }
 
 fn same_fill(a: &Option<FillDepth>, b: &Option<FillDepth>) -> bool {

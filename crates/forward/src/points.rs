@@ -1,0 +1,407 @@
+//! Points that shine: lamps among the samples of a scene, and stars and lamps beside it. Each is drawn once, by the kernel of its own place.
+
+use std::collections::BTreeMap;
+
+use dioptric_psf::{FilmMap, FilmQuery, Kernel, LensImage};
+use dioptric_scene::{PointBrightness, PointLight, PointPlace};
+use glam::DVec2;
+use rayon::prelude::*;
+
+use crate::{
+    Film, SceneGeometry,
+    coverage::Composite,
+    lamps::Lamp,
+    places::SceneRaster,
+    raster::{Level, Raster},
+    rectangle::Rectangle,
+    surface::LayerCoordinates,
+    tile::film_pixels,
+    visible::{SeenPoint, Visible},
+};
+
+/// A point as a band shows it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Point {
+    /// Where its chief ray meets the film, mm from the middle.
+    place_mm: DVec2,
+    dioptres: f64,
+    /// The layer that it lies in, or behind.
+    pub(crate) layer: usize,
+    /// Side of the square that it is, mm on the film; 0 for a point.
+    width_mm: f64,
+    /// Radiance times the area of film that sees it, in pixels.
+    light: f64,
+    /// Whether it is a part of the first surface.
+    is_of_surface: bool,
+}
+
+/// A point beside the scene, as it lies among its layers.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Beside {
+    field_tan: DVec2,
+    /// Radiance times the area in tangents over its brightness.
+    tan2: f64,
+    dioptres: f64,
+    layer: usize,
+    /// Whether it lies behind the first surface, and whether that has its own layer: then all of it is hidden.
+    is_behind: bool,
+    is_hidden: bool,
+}
+
+/// How much farther than the first surface a point may lie that is not behind it: depth maps are that exact.
+const AT_SURFACE: f64 = 1.01;
+
+impl Beside {
+    /// Places the points of a scene by the map of a band.
+    pub(crate) fn all(
+        scene: &SceneGeometry<'_>,
+        map: &FilmMap,
+        raster: &SceneRaster,
+        (coordinates, coordinate_of, hides): (&LayerCoordinates, &dyn Fn(f32) -> f32, bool),
+    ) -> Vec<Option<Self>> {
+        let of = |point: &PointLight| {
+            let field_tan = match point.place {
+                PointPlace::Field { tan_x, tan_y } => DVec2::new(tan_x, tan_y),
+                PointPlace::Film { x_mm, y_mm } => map.field_tan(DVec2::new(x_mm, y_mm))?,
+            };
+            let coordinate = coordinate_of(point.depth_m as f32);
+            let seen_at = raster.position_of(field_tan.x, field_tan.y);
+            let (is_behind, is_hidden) = if raster.is_within(seen_at) {
+                let at = seen_at.map(|position| position.round().max(0.0) as usize);
+                let at = (at[0].min(raster.rows - 1), at[1].min(raster.columns - 1));
+                let surface = coordinates.samples()[at.0 * raster.columns + at.1];
+                let is_behind = point.depth_m > AT_SURFACE * f64::from(scene.depth.z_m()[at]);
+                (is_behind, is_behind && (!hides || coordinate - surface < 1.0))
+            } else {
+                (false, false)
+            };
+            // Radiance times tan² is the irradiance of a star over cos³, the intensity of a lamp over z² cos.
+            let per_cos = (1.0 + field_tan.length_squared()).sqrt();
+            let tan2 = match point.light {
+                PointBrightness::Irradiance(_) => per_cos.powi(3),
+                PointBrightness::Intensity(_) => per_cos / (point.depth_m * point.depth_m),
+            };
+            Some(Self {
+                field_tan,
+                tan2,
+                dioptres: 1.0 / point.depth_m,
+                layer: coordinate as usize,
+                is_behind,
+                is_hidden,
+            })
+        };
+        scene.points.iter().map(of).collect()
+    }
+
+    /// Whether it lies behind the first surface.
+    pub(crate) fn is_behind(&self) -> bool {
+        self.is_behind
+    }
+
+    /// Returns it with its brightness in a band; `None` where it cannot be seen.
+    pub(crate) fn lit(&self, brightness: f32, (map, pitch_mm): (&FilmMap, f64)) -> Option<Point> {
+        if self.is_hidden || brightness <= 0.0 {
+            return None;
+        }
+        let place_mm = map.place_mm(self.field_tan)?;
+        let light =
+            f64::from(brightness) * self.tan2 * map.jacobian_mm(place_mm).determinant().abs() / (pitch_mm * pitch_mm);
+        let Self { dioptres, layer, .. } = *self;
+        Some(Point { place_mm, dioptres, layer, width_mm: 0.0, light, is_of_surface: false })
+    }
+}
+
+impl Point {
+    /// Returns how far below and to the right of the film's middle it lies, in pixels of a pitch.
+    pub(crate) fn place_px(&self, pitch_mm: f64) -> [f64; 2] {
+        [-self.place_mm.y, self.place_mm.x].map(|mm| mm / pitch_mm)
+    }
+
+    /// Its radiance times the area of film that sees it, in pixels.
+    pub(crate) fn light(&self) -> f64 {
+        self.light
+    }
+
+    /// Returns a lamp among the samples of a scene, at a depth, on the first surface or behind it.
+    pub(crate) fn of_lamp(
+        lamp: &Lamp,
+        raster: &SceneRaster,
+        (map, pitch_mm): (&FilmMap, f64),
+        ((layer, dioptres), is_of_surface): ((usize, f64), bool),
+    ) -> Option<Self> {
+        let (tan_x, tan_y) = raster.view.tan_at(lamp.row as f64, lamp.column as f64);
+        let place_mm = map.place_mm(DVec2::new(tan_x, tan_y))?;
+        let area_mm2 = map.jacobian_mm(place_mm).determinant().abs() / raster.view.focal_px.powi(2);
+        let light = f64::from(lamp.radiance) * area_mm2 / (pitch_mm * pitch_mm);
+        Some(Self { place_mm, dioptres, layer, width_mm: area_mm2.sqrt(), light, is_of_surface })
+    }
+}
+
+/// What draws points in a band.
+pub(crate) struct Drawing<'a> {
+    pub(crate) lens: &'a dyn LensImage,
+    pub(crate) film: &'a Film,
+    pub(crate) wavelength_nm: f64,
+    pub(crate) visible: Option<&'a Visible>,
+    /// Whether layers hide those behind them.
+    pub(crate) hides: bool,
+}
+
+/// What a surface that spans ten layers leaves open of a pixel before the last of them: less is left by others.
+const OWN_SURFACE: f32 = 0.1;
+/// Points no farther apart than this share a kernel, pixels; of more than so many kernels, twice as far, and so on.
+const APART_PX: f64 = 16.0;
+const MOST_KERNELS: usize = 256;
+/// Change of blur radius between points that share a kernel, pixels.
+const BLUR_STEP_PX: f64 = 0.5;
+/// Blur radius of kernels on samples of a quarter pixel, pixels; wider ones are on samples in proportion.
+const QUARTER_BLUR_PX: f64 = 8.0;
+
+impl Drawing<'_> {
+    /// Adds what points of a layer bring to the pixels of the film, row by row: radiance. `picture` is what lies before the layer.
+    pub(crate) fn add(&self, points: &[Point], picture: &Composite, sums: &mut [f32]) {
+        let film = film_pixels(self.film);
+        let groups = self.groups(points);
+        let patches: Vec<(Rectangle, Vec<f32>)> =
+            groups.par_iter().filter_map(|group| self.patch(group, picture, &film)).collect();
+        for (at, light) in patches {
+            let lines = sums[at.offset_in(&film)..].chunks_mut(film.columns);
+            for (line, light) in lines.zip(light.chunks_exact(at.columns)) {
+                line.iter_mut().zip(light).for_each(|(sum, light)| *sum += light);
+            }
+        }
+    }
+
+    fn pitch_mm(&self) -> f64 {
+        1e-3 * self.film.pitch_um
+    }
+
+    /// Returns points that share a kernel.
+    fn groups<'p>(&self, points: &'p [Point]) -> Vec<Vec<&'p Point>> {
+        let radius_px =
+            |dioptres: f64| self.lens.blur_radius_mm(DVec2::ZERO, dioptres, self.wavelength_nm) / self.pitch_mm();
+        let per_dioptre = radius_px(1.0) - radius_px(0.0);
+        let mut apart_px = APART_PX;
+        loop {
+            let mut groups: BTreeMap<[i64; 4], Vec<&Point>> = BTreeMap::new();
+            for point in points {
+                let cell = (point.place_mm / self.pitch_mm() / apart_px).floor();
+                let blur = (point.dioptres * per_dioptre / BLUR_STEP_PX).round() as i64;
+                let width = (point.width_mm / self.pitch_mm() * 8.0).round() as i64;
+                groups.entry([cell.x as i64, cell.y as i64, blur, width]).or_default().push(point);
+            }
+            if groups.len() <= MOST_KERNELS || apart_px > 4.0 * (self.film.rows + self.film.columns) as f64 {
+                return groups.into_values().collect();
+            }
+            apart_px *= 2.0;
+        }
+    }
+
+    /// Returns what points that share a kernel bring to the film, and where.
+    fn patch(&self, group: &[&Point], picture: &Composite, film: &Rectangle) -> Option<(Rectangle, Vec<f32>)> {
+        let n = group.len() as f64;
+        let place_mm = group.iter().map(|point| point.place_mm).sum::<DVec2>() / n;
+        let dioptres = group.iter().map(|point| point.dioptres).sum::<f64>() / n;
+        let pitch_mm = self.pitch_mm();
+        let spread_px = self.lens.spread_mm(place_mm, dioptres, self.wavelength_nm) / pitch_mm;
+        let cell_px = 0.25 * (spread_px / QUARTER_BLUR_PX).log2().ceil().max(0.0).exp2();
+        let query =
+            FilmQuery { place_mm, dioptres, wavelength_nm: self.wavelength_nm, pitch_um: cell_px * self.film.pitch_um };
+        let width_px = group[0].width_mm / pitch_mm;
+        let kernel = Sums::of(&self.lens.kernel(query), cell_px, width_px);
+
+        let pixels = Raster::new(self.film, Level::PIXEL);
+        let reached =
+            group.iter().filter_map(|point| kernel.reached(point.place_px(pitch_mm), &pixels).intersection(film));
+        let at = Rectangle::around(reached)?;
+        let mut light = vec![0.0; at.len()];
+        for point in group {
+            let place = point.place_px(pitch_mm);
+            let Some(reached) = kernel.reached(place, &pixels).intersection(film) else { continue };
+            let seen = SeenPoint {
+                layer: point.layer,
+                dioptres,
+                place_px: (place[0] as f32, place[1] as f32),
+                width_px: width_px as f32,
+            };
+            let parts = kernel.on_pixels(place, &pixels, &reached);
+            for (row, parts) in parts.chunks_exact(reached.columns).enumerate() {
+                let pixel_row = reached.first_row + row as i64;
+                let first = (pixel_row - at.first_row) as usize * at.columns
+                    + (reached.first_column - at.first_column) as usize;
+                for (column, (sum, part)) in light[first..].iter_mut().zip(parts).enumerate() {
+                    if *part > 0.0 {
+                        let pixel = (pixel_row, reached.first_column + column as i64);
+                        *sum += (point.light * part) as f32 * self.part_seen(point, &seen, pixel, (picture, film));
+                    }
+                }
+            }
+        }
+        Some((at, light))
+    }
+
+    /// Returns the part of a point's light that reaches a pixel past nearer surfaces.
+    fn part_seen(
+        &self,
+        point: &Point,
+        seen: &SeenPoint,
+        pixel: (i64, i64),
+        (picture, film): (&Composite, &Rectangle),
+    ) -> f32 {
+        if !self.hides {
+            return 1.0;
+        }
+        let at = ((pixel.0 - film.first_row) as usize, (pixel.1 - film.first_column) as usize);
+        let open = picture.open_well_before(point.layer, at);
+        match self.visible.filter(|visible| visible.has_edges(pixel)) {
+            Some(visible) => visible.part_of_point(seen, pixel, open),
+            // Nearer parts of its own surface hide nothing of it.
+            None if point.is_of_surface => (open / OWN_SURFACE).min(1.0),
+            None => open,
+        }
+    }
+}
+
+/// Sums of a kernel from its upper left corner on: what lies in any rectangle is a difference of four.
+struct Sums {
+    /// One more than there are cells, each way.
+    rows: usize,
+    columns: usize,
+    sums: Vec<f64>,
+    /// Of the first cell's corner, pixels below and to the right of the point.
+    first_px: [f64; 2],
+    cell_px: f64,
+}
+
+impl Sums {
+    /// Takes a kernel on cells that are so many pixels wide, each of whose points is a square so wide.
+    fn of(kernel: &Kernel, cell_px: f64, width_px: f64) -> Self {
+        let (rows, columns) = kernel.samples.dim();
+        // Cells are squares themselves.
+        let taps = square_taps((width_px.powi(2) / cell_px.powi(2) - 1.0).max(0.0).sqrt());
+        let margin = taps.len() / 2;
+        let (wide_rows, wide_columns) = (rows + 2 * margin, columns + 2 * margin);
+        let mut across = vec![0.0; rows * wide_columns];
+        for (line, samples) in across.chunks_exact_mut(wide_columns).zip(kernel.samples.rows()) {
+            for (k, tap) in taps.iter().enumerate() {
+                line[k..].iter_mut().zip(samples).for_each(|(sum, sample)| *sum += tap * f64::from(*sample));
+            }
+        }
+        let mut sums = vec![0.0; (wide_rows + 1) * (wide_columns + 1)];
+        for (k, tap) in taps.iter().enumerate() {
+            for (row, line) in across.chunks_exact(wide_columns).enumerate() {
+                let sums = &mut sums[(row + k + 1) * (wide_columns + 1) + 1..];
+                sums.iter_mut().zip(line).for_each(|(sum, value)| *sum += tap * value);
+            }
+        }
+        let total: f64 = sums.iter().sum();
+        for row in 1..=wide_rows {
+            let (above, own) = sums[(row - 1) * (wide_columns + 1)..].split_at_mut(wide_columns + 1);
+            let mut along = 0.0;
+            for (sum, above) in own.iter_mut().zip(above.iter()) {
+                along += *sum / total;
+                *sum = above + along;
+            }
+        }
+        let first = |middle: i32, n: usize| f64::from(middle) - 0.5 * n as f64;
+        let first_px = [first(kernel.middle_px.y, wide_rows), first(kernel.middle_px.x, wide_columns)];
+        let first_px = first_px.map(|cells| cells * cell_px);
+        Self { rows: wide_rows + 1, columns: wide_columns + 1, sums, first_px, cell_px }
+    }
+
+    /// Returns the pixels that some of it falls on, of a point so far below and to the right of the film's middle.
+    fn reached(&self, place_px: [f64; 2], pixels: &Raster) -> Rectangle {
+        let [top, left] = [0, 1].map(|axis| place_px[axis] + self.first_px[axis]);
+        let [bottom, right] =
+            [(top, self.rows), (left, self.columns)].map(|(first, n)| first + (n - 1) as f64 * self.cell_px);
+        let (first_row, first_column) = (pixels.row_before(top + 0.5), pixels.column_before(left + 0.5));
+        let (last_row, last_column) = (pixels.row_before(bottom + 0.5), pixels.column_before(right + 0.5));
+        let n = |first: i64, last: i64| (last - first + 1) as usize;
+        Rectangle { first_row, first_column, rows: n(first_row, last_row), columns: n(first_column, last_column) }
+    }
+
+    /// Returns the parts that fall on some pixels.
+    fn on_pixels(&self, place_px: [f64; 2], pixels: &Raster, at: &Rectangle) -> Vec<f64> {
+        let split = |edge_px: f64, axis: usize, n: usize| {
+            let cells = ((edge_px - place_px[axis] - self.first_px[axis]) / self.cell_px).clamp(0.0, (n - 1) as f64);
+            let below = (cells as usize).min(n - 2);
+            (below, cells - below as f64)
+        };
+        let columns: Vec<(usize, f64)> = (0..=at.columns as i64)
+            .map(|column| split(pixels.across_px(at.first_column + column) - 0.5, 1, self.columns))
+            .collect();
+        let corners_of = |row: i64| -> Vec<f64> {
+            let (above, down) = split(pixels.down_px(at.first_row + row) - 0.5, 0, self.rows);
+            let (upper, lower) = (
+                &self.sums[above * self.columns..][..self.columns],
+                &self.sums[(above + 1) * self.columns..][..self.columns],
+            );
+            let sum_at = |left: usize| upper[left] + down * (lower[left] - upper[left]);
+            columns.iter().map(|&(left, across)| sum_at(left) + across * (sum_at(left + 1) - sum_at(left))).collect()
+        };
+        let mut parts = Vec::with_capacity(at.len());
+        let mut before = corners_of(0);
+        for row in 1..=at.rows as i64 {
+            let next = corners_of(row);
+            parts.extend((0..at.columns).map(|i| (next[i + 1] - next[i] - before[i + 1] + before[i]).max(0.0)));
+            before = next;
+        }
+        parts
+    }
+}
+
+/// Returns what of a square so many cells wide falls on each cell about its middle.
+fn square_taps(width: f64) -> Vec<f64> {
+    let half = 0.5 * width;
+    // The part of it up to a place.
+    let part = |at: f64| if half > 0.0 { (0.5 + 0.5 * at / half).clamp(0.0, 1.0) } else { f64::from(at > 0.0) };
+    let reach = (half - 0.5).ceil().max(0.0) as i64;
+    (-reach..=reach).map(|cell| part(cell as f64 + 0.5) - part(cell as f64 - 0.5)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ndarray::Array2;
+
+    /// Whatever its cells and wherever it lies, a kernel keeps its sum and its middle.
+    #[test]
+    fn parts_on_pixels_keep_sum_and_centroid() {
+        let film = Film::centered(40, 41, 3.0);
+        let pixels = Raster::new(&film, Level::PIXEL);
+        let samples = Array2::from_shape_fn((5, 7), |(row, column)| (1 + row * column) as f32);
+        let sum: f32 = samples.sum();
+        let mean = |weight: &dyn Fn(usize, usize) -> f64| {
+            samples.indexed_iter().map(|((r, c), v)| weight(r, c) * f64::from(*v)).sum::<f64>() / f64::from(sum)
+        };
+        let middle = [mean(&|row, _| row as f64 - 2.0), mean(&|_, column| column as f64 - 3.0)];
+        for (cell_px, width_px) in [(0.25, 0.0), (0.25, 0.7), (1.0, 0.0), (4.0, 3.0)] {
+            let sums = Sums::of(&Kernel::centered(samples.clone(), 1.0), cell_px, width_px);
+            for place in [[0.0, 0.0], [0.13, -3.42], [2.77, 1.5]] {
+                let at = sums.reached(place, &pixels);
+                let parts = sums.on_pixels(place, &pixels, &at);
+                let centroid = [0, 1].map(|axis| {
+                    let px = |i: usize| match axis {
+                        0 => pixels.down_px(at.first_row + (i / at.columns) as i64),
+                        _ => pixels.across_px(at.first_column + (i % at.columns) as i64),
+                    };
+                    parts.iter().enumerate().map(|(i, part)| px(i) * part).sum::<f64>()
+                });
+                assert!((parts.iter().sum::<f64>() - 1.0).abs() < 1e-12);
+                for axis in [0, 1] {
+                    let expected = place[axis] + cell_px * middle[axis];
+                    // A pixel counts by its middle: exact for cells of whole pixels or in the mean of even light.
+                    assert!((centroid[axis] - expected).abs() < 0.25, "{cell_px} {place:?}: {centroid:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn squares_are_spread_over_cells() {
+        for (width, expected) in [(0.0, vec![1.0]), (0.8, vec![1.0]), (2.0, vec![0.25, 0.5, 0.25])] {
+            let taps = square_taps(width);
+            assert!(taps.len() == expected.len() && taps.iter().zip(&expected).all(|(a, b)| (a - b).abs() < 1e-12));
+        }
+    }
+}

@@ -1,0 +1,80 @@
+//! What lies around a film, whose wings reach into it.
+
+use dioptric_psf::FilmMap;
+use ndarray::{Array2, s};
+
+use crate::{
+    Film,
+    places::{Places, SceneRaster, UNSEEN},
+    points::Point,
+    raster::{Level, Raster},
+    tile::film_pixels,
+};
+
+/// The most pixels beside a film that are looked at, and the pixels in all up to which there are as many; of larger films, as many pixels around as within.
+const MOST_BESIDE: f64 = 256.0;
+const AMPLE_PIXELS: f64 = 360_000.0;
+
+/// Returns how far beside a film is looked, pixels.
+pub(crate) fn beside(film: &Film) -> usize {
+    let (rows, columns) = (film.rows as f64, film.columns as f64);
+    let most = (2.0 * rows * columns).max(AMPLE_PIXELS);
+    // Of (rows + 2 m)(columns + 2 m) = most.
+    let sides = rows + columns;
+    let beside = 0.25 * ((sides * sides + 4.0 * (most - rows * columns)).sqrt() - sides);
+    beside.clamp(0.0, MOST_BESIDE) as usize
+}
+
+/// A film, and where in the scene what lies around it is seen.
+pub(crate) struct Surroundings<'a> {
+    pub(crate) film: &'a Film,
+    pub(crate) scene: &'a SceneRaster,
+    pub(crate) map: &'a FilmMap,
+}
+
+impl Surroundings<'_> {
+    /// Returns a picture changed by what is done to it with its surroundings: what chief rays see of the radiance of a surface, row by row, if any, and points.
+    pub(crate) fn with(
+        &self,
+        picture: &Array2<f32>,
+        (radiance, points): (&[f32], &[Point]),
+        change: impl FnOnce(Array2<f32>) -> Array2<f32>,
+    ) -> Array2<f32> {
+        let m = beside(self.film);
+        let (rows, columns) = picture.dim();
+        let (wide_rows, wide_columns) = (rows + 2 * m, columns + 2 * m);
+        let (pixels, film) = (Raster::new(self.film, Level::PIXEL), film_pixels(self.film));
+        let (first_row, first_column) = (film.first_row - m as i64, film.first_column - m as i64);
+        let mut wide = vec![0.0; wide_rows * wide_columns];
+        if !radiance.is_empty() {
+            let (across, down) = self.scene.steps();
+            let step_mm = pixels.x_mm(1.0) - pixels.x_mm(0.0);
+            let mut places = Places::default();
+            for (row, line) in wide.chunks_exact_mut(wide_columns).enumerate() {
+                let y_mm = pixels.y_mm((first_row + row as i64) as f64);
+                places.find(self.scene, self.map, wide_columns, (pixels.x_mm(first_column as f64), step_mm, y_mm));
+                for (k, value) in line.iter_mut().enumerate().filter(|(k, _)| places.first[*k] != UNSEEN) {
+                    let first = places.first[k] as usize;
+                    let nearest = first
+                        + if places.across[k] >= 0.5 { across } else { 0 }
+                        + if places.down[k] >= 0.5 { down } else { 0 };
+                    *value = radiance[nearest] * places.light[k];
+                }
+            }
+        }
+        for point in points {
+            let [down_px, across_px] = point.place_px(1e-3 * self.film.pitch_um);
+            let row = pixels.row_before(down_px + 0.5) - first_row;
+            let column = pixels.column_before(across_px + 0.5) - first_column;
+            if (0..wide_rows as i64).contains(&row) && (0..wide_columns as i64).contains(&column) {
+                wide[row as usize * wide_columns + column as usize] += point.light() as f32;
+            }
+        }
+        for (row, line) in picture.rows().into_iter().enumerate() {
+            let own = &mut wide[(row + m) * wide_columns + m..][..columns];
+            own.iter_mut().zip(line).for_each(|(own, value)| *own = *value);
+        }
+        let wide = Array2::from_shape_vec((wide_rows, wide_columns), wide).expect("a value for each pixel");
+        change(wide).slice(s![m..m + rows, m..m + columns]).to_owned()
+    }
+}
