@@ -26,7 +26,11 @@ const ALLOWED: &[(&str, &[&str], &str)] = &[
     ),
     ("psf", &["narrow_gaussian", "splat"], "splats are sorted into narrow Gaussians, which are made of a `Splat`"),
     ("scene", &["light", "scene"], "a scene has a light and is put under another"),
-    ("cli", &["analyze", "lens"], "`lens` dispatches to `analyze`, which opens lenses as `lens` does"),
+    (
+        "cli",
+        &["analyze", "lens", "lens_compare"],
+        "`lens` dispatches to `analyze` and `lens_compare`, which open and ask for lenses as `lens` and `analyze` do",
+    ),
     ("python", &["camera", "shot"], "a camera takes shots, and a shot has the camera that took it"),
     ("sensor", &["exposure", "sensor"], "an exposure is resolved for a sensor, whose methods take an exposure"),
 ];

@@ -21,13 +21,15 @@ mod sensor_table;
 pub use chart::{Corner, LineChart, Scale, Series};
 pub use filter_table::{FilterRow, built_in_filters};
 pub use lens::{
-    AfocalView, AnalysisFields, AnalysisFilm, AnalysisRequest, AxialColorRow, ConfigurationData, ConvertedLens, FanRow,
-    FieldPlace, FieldRow, FilmPlace, FilmUse, FocusData, GRID_LINES, GlassData, GlassRow, GridRow, ImageData,
-    LensAnalysis, LensCurves, LensData, LensDefaults, LensInfoRequest, LensModulation, LensPageData, LensRow, OpdMap,
-    PlaneData, PupilRow, RayTable, SharpDepths, SpotRow, SurfaceRow, TraceError, TraceSettings, WavefrontRow,
-    built_in_lenses, convert_lens, ends_of, glass_data, glass_rows, placement_lines, surface_rows,
+    AfocalView, AnalysisFields, AnalysisFilm, AnalysisRequest, AxialColorRow, ComparedLens, ComparisonRow,
+    ConfigurationData, ConvertedLens, FanRow, FieldPlace, FieldRow, FilmPlace, FilmUse, FocusData, Footprint,
+    GRID_LINES, GlassData, GlassRow, GridRow, ImageData, LensAnalysis, LensComparison, LensCurves, LensData,
+    LensDefaults, LensInfoRequest, LensModulation, LensPageData, LensRow, OpdMap, PlaneData, PupilRow, RayTable,
+    SharpDepths, SpotRow, SurfaceRow, TraceError, TraceSettings, WavefrontRow, built_in_lenses, convert_lens, ends_of,
+    glass_data, glass_rows, placement_lines, surface_rows,
 };
 pub use methods::{Fit, MethodComparison, MethodRow};
+pub use palette::line as line_color;
 pub use psf::{MtfRow, PolychromaticPsf, PsfRequest, PsfRow, PsfSampling, PsfSet, ThroughFocus, psf_csv};
 pub use run::{
     ChannelStatistics, DisparityData, DngReport, DualPixelData, FilmData, IrradianceData, LossRow, MOST_ERROR_PX,

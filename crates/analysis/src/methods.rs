@@ -83,6 +83,8 @@ impl MethodComparison {
             camera.scene.source = SceneSource::World(WorldSpec { layers: 2, ..WorldSpec::still_life((columns, rows)) });
             camera.validate()?;
         }
+        // Both ways under the light that the world has.
+        let told_lux = camera.scene.mean_lux.take();
         let SceneSource::World(spec) = &camera.scene.source else {
             let reason = "it is no world, expected 'source: World((file: ...))' or the still life".to_owned();
             return Err(PipelineError::Unsuitable { what: "scene", reason });
@@ -112,6 +114,9 @@ impl MethodComparison {
         let mut comparison = Self::new(&camera.name, effort, (&blurred, &renderer.rendering()), is_edge);
         comparison.parts_of_pixels = parts.n;
         comparison.notes.extend(parts.note());
+        comparison
+            .notes
+            .extend(told_lux.map(|_| "mean_lux is left out: it would hide how much light each way has".to_owned()));
         let centers_nm: Vec<f64> = comparison.rows.iter().map(|row| row.wavelength_nm).collect();
         comparison.notes.extend(forward.lens(progress, cancel)?.notes_at(&centers_nm));
         Ok(comparison)

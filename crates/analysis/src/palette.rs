@@ -9,7 +9,7 @@ pub(crate) const LINES: [&str; 9] =
 pub(crate) const REFERENCE: &str = "#999999";
 
 /// Returns the color of the i-th line.
-pub(crate) fn line(i: usize) -> String {
+pub fn line(i: usize) -> String {
     LINES[i % LINES.len()].to_owned()
 }
 

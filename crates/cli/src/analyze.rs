@@ -6,13 +6,13 @@ use anyhow::Context;
 use dioptric_analysis::{
     AnalysisFields, AnalysisRequest, FieldPlace, FieldRow, LensAnalysis, LensDefaults, LensModulation, LensPageData,
 };
-use dioptric_pipeline::{Staged, parse_pairs};
+use dioptric_pipeline::{Staged, parse_directions, parse_pairs};
 use dioptric_report::{AnalysisPlots, DRAWS_PNG, LensPage, chart_svg, write_drawing};
 
 use crate::{
     args::Common,
     lens::{USUAL_NM, list_of, pairs_in_words, tell_taken},
-    lens_args::LensAnalyzeArgs,
+    lens_args::{AnalysisArgs, LensAnalyzeArgs},
     terminal::{Bar, fixed, print, print_json, remark, remark_on_png},
 };
 
@@ -21,7 +21,7 @@ const PNG_SCALE: f64 = 1.5;
 
 pub(crate) fn run(arguments: &LensAnalyzeArgs, common: &Common) -> anyhow::Result<()> {
     let used = arguments.lens.open(common)?;
-    let request = request(arguments, &used, common)?;
+    let request = request(&arguments.asked, &used, common)?;
     let used = arguments.lens.state.apply(used, request.reference_nm(), common)?;
     // The place is tried before the work.
     let staged = arguments.out.as_ref().map(|path| Staged::folder(path)).transpose()?;
@@ -40,6 +40,7 @@ pub(crate) fn run(arguments: &LensAnalyzeArgs, common: &Common) -> anyhow::Resul
             ("spots", plots.spots_svg()),
             ("opd", plots.opd_svg()),
             ("distortion", plots.grid_svg()),
+            ("footprints", plots.footprints_svg(&shown.footprints)),
         ] {
             write_drawing(&svg, staged.path(), name, PNG_SCALE)?;
         }
@@ -64,7 +65,7 @@ pub(crate) fn run(arguments: &LensAnalyzeArgs, common: &Common) -> anyhow::Resul
         remark(
             common.quiet,
             &format!(
-                "wrote analysis.json, analysis.html, and analysis, spots, opd, distortion, mtf and curves over field, focus and \
+                "wrote analysis.json, analysis.html, and analysis, spots, opd, distortion, footprints, mtf and curves over field, focus and \
                  wavelength as {} (curves as .csv too), in {}",
                 if DRAWS_PNG { ".svg and .png" } else { ".svg" },
                 path.display()
@@ -76,7 +77,11 @@ pub(crate) fn run(arguments: &LensAnalyzeArgs, common: &Common) -> anyhow::Resul
 }
 
 /// Returns what is asked for; where it is not said, what the lens's file says.
-fn request(arguments: &LensAnalyzeArgs, used: &LensDefaults, common: &Common) -> anyhow::Result<AnalysisRequest> {
+pub(crate) fn request(
+    arguments: &AnalysisArgs,
+    used: &LensDefaults,
+    common: &Common,
+) -> anyhow::Result<AnalysisRequest> {
     let mut taken = Vec::new();
     let asked_nm = arguments.bands.nm()?;
     let wavelengths_nm = asked_nm.clone().unwrap_or_else(|| used.wavelengths_or(&USUAL_NM));
@@ -96,7 +101,7 @@ fn request(arguments: &LensAnalyzeArgs, used: &LensDefaults, common: &Common) ->
     }
     let of_file = used.analysis_fields(request.reference_nm());
     request.fields = match (&arguments.fields_deg, &arguments.fields_mm, of_file) {
-        (Some(list), _, _) => AnalysisFields::AnglesDeg(parse_pairs("--fields-deg", list)?),
+        (Some(list), _, _) => AnalysisFields::AnglesDeg(parse_directions("--fields-deg", list)?),
         (None, Some(list), _) => AnalysisFields::HeightsMm(parse_pairs("--fields-mm", list)?),
         // Places of an object elsewhere say nothing of this one.
         (None, None, Some(AnalysisFields::HeightsMm(_))) if arguments.distance_mm.is_some() => AnalysisFields::ByLight,
@@ -180,7 +185,9 @@ fn focus_table(analysis: &LensAnalysis) -> Result<String, std::fmt::Error> {
         if place.is_none() && what.ends_with("along x") {
             continue;
         }
-        let size = size.filter(|size| size.is_finite()).map_or(String::new(), |size| format!("  {size:.4} {unit}"));
+        let size = size
+            .filter(|size| size.is_finite())
+            .map_or(String::new(), |size| format!("  {size:.4} {}", in_units(unit, analysis)));
         writeln!(text, "{what:<28} film {:>10} mm{size}", cell(place, 4))?;
     }
     Ok(text)

@@ -200,7 +200,7 @@ pub(crate) struct RunArgs {
     /// What lies behind the first surface of the scene's file: a file of radiance and depth of the same samples
     #[arg(long, value_name = "FILE", help_heading = heading::SCENE)]
     pub(crate) hidden: Option<PathBuf>,
-    /// Points that shine beside the scene, a table (.csv): x_deg, y_deg or x_mm, y_mm; magnitude, lux, candela or w_per_sr; depth_m, light
+    /// Points that shine beside the scene, a table (.csv): `x_deg`, `y_deg` or `x_mm`, `y_mm`; magnitude, lux, candela or `w_per_sr`; `depth_m`, light
     #[arg(long, value_name = "FILE", help_heading = heading::SCENE)]
     pub(crate) points: Option<PathBuf>,
     #[command(flatten)]
@@ -215,6 +215,9 @@ pub(crate) struct RunArgs {
     /// Scales the radiance to this mean luminance, cd/m²
     #[arg(long, alias = "mean-luminance", value_name = "L", help_heading = heading::SCENE)]
     pub(crate) mean_luminance_cd_m2: Option<f64>,
+    /// Scales the light of the scene so that the film gets this illuminance on average, lux
+    #[arg(long, value_name = "LUX", conflicts_with = "mean_luminance_cd_m2", help_heading = heading::SCENE)]
+    pub(crate) mean_lux: Option<f64>,
     /// Light that is on a scene of radiance whose file does not state it, as --illuminant has it
     #[arg(long, value_name = "LIGHT", help_heading = heading::SCENE)]
     pub(crate) scene_light: Option<String>,
@@ -327,7 +330,7 @@ pub(crate) struct FrameArgs {
     /// most .05 %) or uncompressed [default: single]
     #[arg(long, value_name = "KIND", help_heading = heading::RESULTS)]
     pub(crate) exr_samples: Option<ExrSamples>,
-    /// Switches noise on: all, none, or a list of photon, dark-current, read, reset, row, prnu, dsnu, column, defects;
+    /// Switches noise on: all, none, or a list of photon, dark-current, read, reset, row, prnu, dsnu, column, defects, telegraph;
     /// all,-NAME leaves one out [default: all]
     #[arg(long, value_name = "LIST", help_heading = heading::EXPOSURE)]
     pub(crate) noise: Option<String>,
@@ -411,7 +414,8 @@ pub(crate) struct TraceArgs {
 pub(crate) struct PsfArgs {
     #[command(flatten)]
     pub(crate) lens: LensArgs,
-    /// Field angles, degrees [default: those of the lens's file, else 0]
+    /// Field angles, degrees: to the right as 0,10, along x and y as 5/10, or from the axis and about it as 100@30 [default: those of
+    /// the lens's file, else 0]
     #[arg(long, value_name = "LIST", help_heading = heading::POINTS)]
     pub(crate) fields_deg: Option<String>,
     /// How far above the axis all of these fields lie, degrees
@@ -484,7 +488,7 @@ pub(crate) enum PsfMode {
 /// A sensor to expose.
 #[derive(Debug, Args)]
 pub(crate) struct SenseArgs {
-    /// Spectral irradiance, EXR
+    /// Spectral irradiance: EXR, or an optical image of `ISETCam` (.mat)
     pub(crate) irradiance: PathBuf,
     /// Sensor, a file or the name of a built-in one
     #[arg(long, value_name = "SENSOR", help_heading = heading::FILM)]

@@ -27,6 +27,7 @@ pub(crate) fn run(command: &LensCommand, common: &Common) -> anyhow::Result<()> 
         LensCommand::List => list(common),
         LensCommand::Info(arguments) => info(arguments, common),
         LensCommand::Analyze(arguments) => crate::analyze::run(arguments, common),
+        LensCommand::Compare(arguments) => crate::lens_compare::run(arguments, common),
         LensCommand::Draw(arguments) => draw(arguments, common),
         LensCommand::Convert { input, output, strict, reading } => {
             convert((input, output), *strict, &reading.reading(), common)

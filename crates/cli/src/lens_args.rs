@@ -17,11 +17,13 @@ pub(crate) enum LensCommand {
     Info(LensInfoArgs),
     /// Analyzes the lens by real rays: spots, fans, wavefronts, field curvature, distortion, color, illumination, focus
     Analyze(LensAnalyzeArgs),
+    /// Compares two lenses by real rays: numbers and curves side by side
+    Compare(LensCompareArgs),
     /// Draws the lens with rays, as SVG or, in a build with the feature png, PNG
     Draw(LensDrawArgs),
     /// Writes a lens in another format, chosen by the extension
     Convert {
-        /// Lens to read: a file, the name of a built-in one, thin:50mm:f2 or pinhole:0.1mm
+        /// Lens to read: a file, the name of a built-in one, thin:50mm:f2, pinhole:0.1mm or eye:navarro:4D
         input: String,
         /// File to write; a .zmx file of a lens with glasses of its own gets a catalogue (.agf) beside it
         output: PathBuf,
@@ -36,7 +38,7 @@ pub(crate) enum LensCommand {
 /// A lens, how far it is open and how it stands: what every command about one lens takes.
 #[derive(Debug, Args)]
 pub(crate) struct LensArgs {
-    /// Lens: a file, the name of a built-in one, thin:50mm:f2 or pinhole:0.1mm
+    /// Lens: a file, the name of a built-in one, thin:50mm:f2, pinhole:0.1mm or eye:navarro:4D
     pub(crate) lens: String,
     #[command(flatten)]
     pub(crate) state: LensStateArgs,
@@ -185,6 +187,9 @@ pub(crate) struct LensReadingArgs {
     /// Which configuration of a file that has several, as the positions of a zoom lens, from 1 [default: the file's own]
     #[arg(long, value_name = "N")]
     pub(crate) configuration: Option<usize>,
+    /// Makes the lens so many times as large in all its lengths, as 25.4 for a file in inches that says millimetres [default: 1]
+    #[arg(long, value_name = "K")]
+    pub(crate) lens_scale: Option<f64>,
 }
 
 /// What the numbers of surfaces are in a CODE V file that does not say.
@@ -253,6 +258,7 @@ impl LensReadingArgs {
         }
         reading.configuration = self.configuration.or(reading.configuration);
         reading.slope_per_nm = self.slope_per_nm.or(reading.slope_per_nm);
+        reading.lens_scale = self.lens_scale.or(reading.lens_scale);
     }
 }
 
@@ -280,8 +286,35 @@ pub(crate) struct LensInfoArgs {
 pub(crate) struct LensAnalyzeArgs {
     #[command(flatten)]
     pub(crate) lens: LensArgs,
-    /// Field angles, degrees: above the axis as 0,10,20, or along x and y as 5/10 [default: those of the lens's file, else 0,
-    /// 0.5, 0.7 and 1 of where the light falls to a quarter]
+    #[command(flatten)]
+    pub(crate) asked: AnalysisArgs,
+    /// Folder for analysis.json, analysis.html and the plots (analysis, spots, opd, distortion, footprints) as SVG; as PNG too in a
+    /// build with the feature png
+    #[arg(long, short, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+}
+
+/// Which two lenses to compare, and how they are looked at.
+#[derive(Debug, Args)]
+pub(crate) struct LensCompareArgs {
+    /// Lens: a file, the name of a built-in one, thin:50mm:f2, pinhole:0.1mm or eye:navarro:4D
+    pub(crate) lens: String,
+    /// The lens to compare it with, in the fields, wavelengths and at the object of the first
+    pub(crate) other: String,
+    #[command(flatten)]
+    pub(crate) state: LensStateArgs,
+    #[command(flatten)]
+    pub(crate) asked: AnalysisArgs,
+    /// Folder for comparison.json, comparison.html and the curves of both as SVG and CSV
+    #[arg(long, short, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+}
+
+/// What an analysis by real rays is of.
+#[derive(Debug, Args)]
+pub(crate) struct AnalysisArgs {
+    /// Field angles, degrees: above the axis as 0,10,20, along x and y as 5/10, or from the axis and about it as 100@30 [default: those
+    /// of the lens's file, else 0, 0.5, 0.7 and 1 of where the light falls to a quarter]
     #[arg(long, value_name = "LIST")]
     pub(crate) fields_deg: Option<String>,
     /// Fields as object points, mm from the axis, for an object at a finite distance: y, or x/y
@@ -297,10 +330,6 @@ pub(crate) struct LensAnalyzeArgs {
     /// Rings of rays in a spot: N of them have 1 + 3N(N + 1) rays
     #[arg(long, value_name = "N", default_value_t = 12)]
     pub(crate) rings: usize,
-    /// Folder for analysis.json, analysis.html and the plots (analysis, spots, opd, distortion) as SVG; as PNG too in a
-    /// build with the feature png
-    #[arg(long, short, value_name = "DIR")]
-    pub(crate) out: Option<PathBuf>,
 }
 
 /// How to draw a lens.

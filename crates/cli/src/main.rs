@@ -14,6 +14,7 @@ mod filter;
 mod glass;
 mod lens;
 mod lens_args;
+mod lens_compare;
 mod light_field;
 mod measure;
 mod measure_args;

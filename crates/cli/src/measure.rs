@@ -143,7 +143,7 @@ fn color(arguments: &ColorArgs, common: &Common) -> anyhow::Result<()> {
     let out = arguments.picture_args.out.as_deref();
     if let Some(against) = &arguments.against {
         let request = CompareRequest {
-            viewing: viewing(arguments)?,
+            viewing: viewing(arguments, common)?,
             patch: arguments.patch.as_deref().map(PixelRegion::parse).transpose()?,
             curve,
         };
@@ -160,10 +160,12 @@ fn color(arguments: &ColorArgs, common: &Common) -> anyhow::Result<()> {
     finish.with(&request.measure(&arguments.picture)?, chart_table)
 }
 
-fn viewing(arguments: &ColorArgs) -> anyhow::Result<PictureViewing> {
+fn viewing(arguments: &ColorArgs, common: &Common) -> anyhow::Result<PictureViewing> {
     Ok(match &arguments.display {
         Some(name) => {
-            PictureViewing::Display { display: Box::new(open_display(name)?), distance_m: arguments.distance_m }
+            let (display, notes) = open_display(name)?;
+            tell(&notes, common);
+            PictureViewing::Display { display: Box::new(display), distance_m: arguments.distance_m }
         }
         None => PictureViewing::PixelsPerDegree(arguments.pixels_per_degree),
     })

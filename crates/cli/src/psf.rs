@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use dioptric_analysis::{AnalysisFilm, LensDefaults, PsfRequest, PsfRow, PsfSampling, PsfSet, psf_csv};
-use dioptric_pipeline::{REFERENCE_WAVELENGTH_NM, RetiredBank, Staged, parse_numbers, parse_pairs};
+use dioptric_pipeline::{REFERENCE_WAVELENGTH_NM, RetiredBank, Staged, parse_directions, parse_numbers};
 use dioptric_report::{PsfFormat, chart_svg, psf_page, write_drawing, write_psfs};
 
 use crate::{
@@ -121,10 +121,7 @@ fn points(arguments: &PsfArgs, used: &LensDefaults, common: &Common) -> anyhow::
     }
     let fields_of_file = || used.psf_fields_deg(used.wavelength_or_usual());
     let fields_deg = match (&arguments.fields_deg, arguments.fields_deg.is_none().then(fields_of_file).flatten()) {
-        (Some(list), _) if list.contains('/') => parse_pairs("--fields-deg", list)?,
-        (Some(list), _) => {
-            parse_numbers("--fields-deg", list)?.into_iter().map(|deg| [deg, arguments.field_y_deg]).collect()
-        }
+        (Some(list), _) => fields_of(list, arguments.field_y_deg)?,
         (None, Some(fields_deg)) => {
             taken.push(format!("fields of {} degrees", pairs_in_words(&fields_deg)));
             fields_deg
@@ -149,6 +146,22 @@ fn points(arguments: &PsfArgs, used: &LensDefaults, common: &Common) -> anyhow::
     };
     tell_taken(&taken, common);
     Ok(Points { fields_deg, distances_mm, wavelengths_nm, film, focus_nm, spectral_weights })
+}
+
+/// Returns the fields of a list: angles to the right, which take the angle upwards of all, x/y or ANGLE@AZIMUTH.
+fn fields_of(list: &str, field_y_deg: f64) -> anyhow::Result<Vec<[f64; 2]>> {
+    let is_direction = |item: &&str| item.contains(['/', '@']);
+    if field_y_deg != 0.0 && list.split(',').any(|item| is_direction(&item)) {
+        anyhow::bail!("--field-y-deg is {field_y_deg}, expected none beside fields that have their own ({list})");
+    }
+    let mut fields_deg = Vec::new();
+    for item in list.split(',') {
+        match is_direction(&item) {
+            true => fields_deg.extend(parse_directions("--fields-deg", item)?),
+            false => fields_deg.extend(parse_numbers("--fields-deg", item)?.into_iter().map(|x| [x, field_y_deg])),
+        }
+    }
+    Ok(fields_deg)
 }
 
 /// Returns the rows with one more after those of each point: the light of all its wavelengths together.

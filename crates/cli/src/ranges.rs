@@ -2,7 +2,7 @@
 
 use anyhow::bail;
 use clap::{ArgMatches, Command};
-use dioptric_pipeline::{parse_numbers, parse_pairs, range_of};
+use dioptric_pipeline::{parse_directions, parse_numbers, range_of};
 
 /// Checks every number that was given, or each of a list, against the range of its option.
 ///
@@ -34,7 +34,7 @@ fn numbers(matches: &ArgMatches, id: &str) -> Vec<f64> {
         return values.map(|n| f64::from(*n)).collect();
     }
     let Ok(Some(lists)) = matches.try_get_many::<String>(id) else { return Vec::new() };
-    let pairs = |list: &str| parse_pairs("a list", list).unwrap_or_default().into_flattened();
+    let pairs = |list: &str| parse_directions("a list", list).unwrap_or_default().into_flattened();
     lists.flat_map(|list| parse_numbers("a list", list).unwrap_or_else(|_| pairs(list))).collect()
 }
 

@@ -77,6 +77,8 @@ pub(crate) fn run(arguments: &RenderArgs, common: &Common) -> anyhow::Result<()>
     let own_has_lens = takes_own && camera.take_from_world(&own)?;
     if !has_lens && !own_has_lens {
         let grid = camera.wavelengths.grid()?.map_or_else(|| WavelengthGrid::uniform(400.0, 700.0, 10.0), Ok)?;
+        let (first_nm, last_nm) = grid.range_nm();
+        tell(&world.note_on_bands(first_nm, last_nm).into_iter().collect::<Vec<_>>(), common);
         let render = WorldRender::of_own_camera(world.clone(), &own, &spec, grid)?;
         let render = cropped(render, arguments)?;
         return render_without_sensor(arguments, common, (&render, &clock, &cancel), &|rendering| {

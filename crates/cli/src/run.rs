@@ -67,7 +67,8 @@ pub(crate) fn run(arguments: &RunArgs, common: &Common) -> anyhow::Result<()> {
     if report.film.dark_fraction > display::LEAST_DARK_FRACTION {
         let percent = 100.0 * report.film.dark_fraction;
         let words = "where that is not black in the scene, the lens shows less of it than the film is large: take a smaller \
-                     film (--film scene) or a wider scene";
+                     film (--film scene) or a wider scene. A scene ends before 90 degrees from the axis; what a lens sees beyond, dioptric render \
+                     takes from a panorama (--sky)";
         remark(common.quiet, &format!("{percent:.1} % of the film gets no light; {words}"));
     }
     if report.sensor.exposure_time_s > LONGEST_EXPOSURE_S {
@@ -216,6 +217,11 @@ fn change_scene(camera: &mut Camera, arguments: &RunArgs) -> anyhow::Result<()> 
     arguments.scene_file.change(scene)?;
     scene.mean_luminance_cd_m2 = arguments.mean_luminance_cd_m2.or(scene.mean_luminance_cd_m2);
     scene.illuminance_lux = arguments.illuminance_lux.or(scene.illuminance_lux);
+    // A level that is asked for takes the place of the other.
+    if arguments.mean_lux.is_some() {
+        scene.mean_luminance_cd_m2 = None;
+    }
+    scene.mean_lux = arguments.mean_lux.or(scene.mean_lux.filter(|_| arguments.mean_luminance_cd_m2.is_none()));
     if let Some(name) = &arguments.illuminant {
         scene.illuminant = Some(parse_illuminant(name)?);
     }
@@ -525,6 +531,26 @@ mod tests {
         let [width_mm, height_mm] = kept.film_size_mm(&Silent, &Cancel::new()).unwrap();
         assert_relative_eq!(width_mm, 4032.0 * 1.4e-3, max_relative = 1e-9);
         assert_relative_eq!(height_mm, 3024.0 * 1.4e-3, max_relative = 1e-9);
+    }
+
+    /// A flat cube is not read for the size of its film: of this one the numbers are not there.
+    #[test]
+    fn a_header_tells_the_film_of_a_flat_cube() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("large.hdr");
+        let head = "ENVI\nsamples = 200000\nlines = 100000\nbands = 31\ndata type = 12\ninterleave = bil\n";
+        std::fs::write(&path, head).unwrap();
+        std::fs::write(path.with_extension("raw"), "").unwrap();
+        let scene =
+            ["--scene", path.to_str().unwrap(), "--fov-deg", "40", "--depth-m", "1000", "--lens", "pinhole:0.2mm"];
+        let more = ["--film-mm", "10", "--pixels", "320x320"];
+        let FilmSpec::Pixels { columns, rows, pitch_um } = camera(&[&scene[..], &more].concat()).film else {
+            panic!("a film of no size")
+        };
+        // As wide as 40° are 10 mm behind the hole, and half as high.
+        let half_height_mm = 5.0 * 20_f64.to_radians().tan();
+        assert_eq!((columns, rows), (320, 320));
+        assert_relative_eq!(pitch_um, 1e3 * 2.0 * half_height_mm / 320.0, max_relative = 1e-6);
     }
 
     #[test]

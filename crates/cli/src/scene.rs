@@ -3,7 +3,9 @@
 use std::{fmt::Write as _, path::PathBuf};
 
 use clap::{Args, Subcommand};
-use dioptric_pipeline::{Crop, ExrSamples, SceneInfo, SceneRequest, SceneSpec, parse_illuminant, parse_numbers};
+use dioptric_pipeline::{
+    Crop, ExrSamples, SceneInfo, SceneRequest, SceneSpec, convert_irradiance, parse_illuminant, parse_numbers,
+};
 
 use crate::{
     common::Common,
@@ -17,7 +19,7 @@ use crate::{
 pub(crate) enum SceneCommand {
     /// Says what a file of a scene holds, how it is understood and what of it is not used
     Info(SceneInfoArgs),
-    /// Writes a scene, or a part of it, as spectral EXR or for ISETCam
+    /// Writes a scene, or a part of it, as spectral EXR or for ISETCam; a file of irradiance as well
     Convert(SceneConvertArgs),
 }
 
@@ -84,6 +86,11 @@ pub(crate) fn run(command: &SceneCommand, common: &Common) -> anyhow::Result<()>
     let info = match command {
         SceneCommand::Info(arguments) => request(&arguments.scene)?.describe(arguments.out.as_deref())?,
         SceneCommand::Convert(arguments) => {
+            if let Some(notes) = convert_irradiance(&request(&arguments.scene)?, &arguments.out, arguments.exr_samples)?
+            {
+                tell(&notes, common);
+                return Ok(());
+            }
             let info = request(&arguments.scene)?.convert(&arguments.out, arguments.exr_samples)?;
             if !common.json {
                 tell(&[vec![info.understood.clone()], info.notes.clone()].concat(), common);

@@ -7,6 +7,7 @@ use dioptric_pipeline::{ShowRequest, ShownPicture, open_display, parse_numbers};
 
 use crate::{
     common::Common,
+    lens::tell,
     terminal::{print, print_json, remark},
 };
 
@@ -18,7 +19,7 @@ pub(crate) struct ShowArgs {
     /// Scene to write: spectral radiance with depth and view, EXR
     #[arg(long, short, value_name = "F.exr")]
     pub(crate) out: PathBuf,
-    /// Display, a RON file or the name of a built-in one: srgb, display-p3, rec2020, apple-studio
+    /// Display, a RON file, a display of `ISETCam` (.mat), or the name of a built-in one: srgb, display-p3, rec2020, apple-studio
     #[arg(long, value_name = "DISPLAY", default_value = "srgb")]
     pub(crate) display: String,
     /// How far away the display is, m
@@ -33,7 +34,8 @@ pub(crate) struct ShowArgs {
 }
 
 pub(crate) fn run(arguments: &ShowArgs, common: &Common) -> anyhow::Result<()> {
-    let mut display = open_display(&arguments.display)?;
+    let (mut display, notes) = open_display(&arguments.display)?;
+    tell(&notes, common);
     display.white_cd_m2 = arguments.white_cd_m2.or(display.white_cd_m2);
     let wavelengths_nm =
         arguments.wavelengths_nm.as_deref().map(|list| parse_numbers("--wavelengths-nm", list)).transpose()?;

@@ -218,6 +218,22 @@ fn what_does_not_apply_is_refused_by_its_option() {
     }
 }
 
+/// What is written is what its name says, and a part beyond all numbers is refused as any other.
+#[test]
+fn scenes_are_written_as_their_names_say() {
+    let folder = folder();
+    let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures/scenes/iset_scene.mat");
+    let scene = scene.to_str().unwrap();
+    common::check_error(folder.path(), &["scene", "convert", scene, "out.tif"], &["out.tif", ".exr or .mat"]);
+    common::check_error(folder.path(), &["scene", "info", scene, "-o", "out.jpg"], &["out.jpg", ".png"]);
+    let most = format!("{},0,1,1", u64::MAX);
+    common::check_error(
+        folder.path(),
+        &["scene", "convert", scene, "out.exr", "--crop", &most],
+        &["the part of the scene"],
+    );
+}
+
 /// Stars of a table bring what they are said to: a lux through the entrance pupil of a thin lens, all of it on the film.
 #[test]
 fn points_of_a_table_bring_their_light() {

@@ -136,6 +136,11 @@ impl Halos {
         Self { of_bands: (0..n_bands).into_par_iter().map(halo).collect() }
     }
 
+    /// Whether light lies beyond the windows of any band.
+    pub(crate) fn are_any(&self) -> bool {
+        self.of_bands.iter().any(Option::is_some)
+    }
+
     /// Returns the picture of a band with the halos of its points and of what lies around it, if any light lies beyond its windows.
     pub(crate) fn applied(
         &self,

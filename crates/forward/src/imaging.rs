@@ -28,10 +28,10 @@ use crate::{
     sight::Sight,
     stopwatch::{Part, Stopwatch},
     surface::{LayerCoordinates, Surface},
-    surroundings::Surroundings,
+    surroundings::{Surroundings, beside},
     tile::{TileGroup, film_pixels},
     tiling::{LayeredLens, Rule, Tiling, reach_px},
-    visible::Visible,
+    visible::{Before, Visible},
     work::Work,
 };
 
@@ -97,7 +97,7 @@ impl Imaging {
         let blocks = Blocks::find((film, margin_px), &raster, &maps, &surfaces, work.cancel())?;
 
         let coordinate_of = |depth_m: f32| layers.coordinate_of(depth_m);
-        let points = Beside::all(geometry, maps[1], &raster, (&scene.coordinates, &coordinate_of, scene.hides));
+        let points = Beside::all(geometry, (film, maps[1]), &raster, (&scene.coordinates, &coordinate_of));
         let sight = Sight::of((lens, film, middle_nm), maps[1], &raster, &scene, work.cancel())?;
 
         // Cut the film into tiles for each of them.
@@ -210,10 +210,16 @@ impl Imaging {
 
     /// About what a band takes while it is imaged, bytes: its planes, and kernels.
     pub(crate) fn band_bytes(&self) -> usize {
-        // The picture, what is open and what the surface covers; a layer as it is sampled and as it is gathered, light and coverage of each.
-        const PLANES: usize = 7;
+        // The picture, what is open and what the surface covers; a layer as it is sampled and as it is gathered, light and coverage of each; both surfaces
+        // without their lamps.
+        const PLANES: usize = 9;
         let (Film { rows, columns, .. }, (scene_rows, scene_columns)) = (self.spec.film, self.size());
-        PLANES * size_of::<f32>() * (rows * columns).max(scene_rows * scene_columns) + self.kernel_bytes
+        // Halos: the picture with what lies around it, what they bring and take.
+        const HALO_PLANES: usize = 4;
+        let m = beside(&self.spec.film);
+        let halos = if self.halos.are_any() { HALO_PLANES * (rows + 2 * m) * (columns + 2 * m) } else { 0 };
+        let planes = PLANES * (rows * columns).max(scene_rows * scene_columns) + halos;
+        size_of::<f32>() * planes + self.kernel_bytes
     }
 
     /// Reads a band and images it.
@@ -245,11 +251,13 @@ impl Imaging {
         let cancel = work.cancel();
         let kernels = self.kernels(lens, band, work)?;
         let map = lens.film_map(self.spec.grid.centers_nm()[band], self.reach_mm);
-        let (front, lamps) = without_lamps(self.scene.mixed.unmixed(light.front), &|_, _| true);
+        let (front, lamps) =
+            without_lamps(self.scene.mixed.unmixed(light.front), &|row, column| self.is_inner(row, column));
         let occluded = self.scene.occluded.samples(&front, light.occluded, cancel)?;
         let is_behind = |row: usize, column: usize| {
             let behind = self.scene.occluded.layer_coordinates().filter(|_| self.scene.occluded.needs_radiance());
-            behind.is_some_and(|behind| !behind.samples()[row * self.raster.columns + column].is_nan())
+            self.is_inner(row, column)
+                && behind.is_some_and(|behind| !behind.samples()[row * self.raster.columns + column].is_nan())
         };
         let (occluded, lamps_behind) = occluded.map_or((None, vec![]), |occluded| {
             let (occluded, lamps) = without_lamps(occluded, &is_behind);
@@ -355,6 +363,12 @@ impl Imaging {
         Rectangle::around(seen)
     }
 
+    /// Whether a sample of the scene does not go on beyond its edges.
+    fn is_inner(&self, row: usize, column: usize) -> bool {
+        let SceneRaster { rows, columns, .. } = self.raster;
+        self.raster.border == Border::Black || (row > 0 && column > 0 && row + 1 < rows && column + 1 < columns)
+    }
+
     /// Returns lamps as points at their depths, on the first surface or behind it.
     fn lamps_of(
         &self,
@@ -364,9 +378,13 @@ impl Imaging {
     ) -> Vec<Point> {
         let columns = self.raster.columns;
         let of = |lamp: &Lamp| {
-            let coordinate = coordinates.samples()[lamp.row * columns + lamp.column];
-            let depth = self.scene.layers.layer_and_dioptres_at(coordinate);
-            Point::of_lamp(lamp, &self.raster, map, (depth, is_first))
+            let at = |coordinates: &LayerCoordinates| coordinates.samples()[lamp.row * columns + lamp.column];
+            let depth = self.scene.layers.layer_and_dioptres_at(at(coordinates));
+            let before = (!is_first).then(|| {
+                let coordinate = at(&self.scene.coordinates);
+                Before { coordinate, dioptres: self.scene.layers.layer_and_dioptres_at(coordinate).1 }
+            });
+            Point::of_lamp(lamp, &self.raster, map, (depth, before))
         };
         lamps.iter().filter_map(of).collect()
     }

@@ -16,7 +16,7 @@ use crate::{
     rectangle::Rectangle,
     surface::LayerCoordinates,
     tile::film_pixels,
-    visible::{SeenPoint, Visible},
+    visible::{Before, SeenPoint, Visible},
 };
 
 /// A point as a band shows it.
@@ -33,6 +33,8 @@ pub(crate) struct Point {
     light: f64,
     /// Whether it is a part of the first surface.
     is_of_surface: bool,
+    /// The first surface where it lies, if it lies behind that.
+    before: Option<Before>,
 }
 
 /// A point beside the scene, as it lies among its layers.
@@ -43,71 +45,62 @@ pub(crate) struct Beside {
     tan2: f64,
     dioptres: f64,
     layer: usize,
-    /// Whether it lies behind the first surface, and whether that has its own layer: then all of it is hidden.
-    is_behind: bool,
-    is_hidden: bool,
+    /// The first surface where it lies, if it lies behind that.
+    before: Option<Before>,
 }
 
 /// How much farther than the first surface a point may lie that is not behind it: depth maps are that exact.
 const AT_SURFACE: f64 = 1.01;
 
 impl Beside {
-    /// Places the points of a scene by the map of a band.
+    /// Places the points of a scene before a film by the map of a band.
     pub(crate) fn all(
         scene: &SceneGeometry<'_>,
-        map: &FilmMap,
+        (film, map): (&Film, &FilmMap),
         raster: &SceneRaster,
-        (coordinates, coordinate_of, hides): (&LayerCoordinates, &dyn Fn(f32) -> f32, bool),
+        (coordinates, coordinate_of): (&LayerCoordinates, &dyn Fn(f32) -> f32),
     ) -> Vec<Option<Self>> {
         let of = |point: &PointLight| {
             let field_tan = match point.place {
                 PointPlace::Field { tan_x, tan_y } => DVec2::new(tan_x, tan_y),
-                PointPlace::Film { x_mm, y_mm } => map.field_tan(DVec2::new(x_mm, y_mm))?,
+                // Of the film that this one is a part of.
+                PointPlace::Film { x_mm, y_mm } => map.field_tan(DVec2::new(x_mm, y_mm) - film.center_mm)?,
             };
-            let coordinate = coordinate_of(point.depth_m as f32);
             let seen_at = raster.position_of(field_tan.x, field_tan.y);
-            let (is_behind, is_hidden) = if raster.is_within(seen_at) {
+            let before = raster.is_within(seen_at).then(|| {
                 let at = seen_at.map(|position| position.round().max(0.0) as usize);
                 let at = (at[0].min(raster.rows - 1), at[1].min(raster.columns - 1));
-                let surface = coordinates.samples()[at.0 * raster.columns + at.1];
-                let is_behind = point.depth_m > AT_SURFACE * f64::from(scene.depth.z_m()[at]);
-                (is_behind, is_behind && (!hides || coordinate - surface < 1.0))
-            } else {
-                (false, false)
-            };
+                let depth_m = f64::from(scene.depth.z_m()[at]);
+                let coordinate = coordinates.samples()[at.0 * raster.columns + at.1];
+                (point.depth_m > AT_SURFACE * depth_m).then_some(Before { dioptres: 1.0 / depth_m, coordinate })
+            });
             // Radiance times tan² is the irradiance of a star over cos³, the intensity of a lamp over z² cos.
             let per_cos = (1.0 + field_tan.length_squared()).sqrt();
             let tan2 = match point.light {
                 PointBrightness::Irradiance(_) => per_cos.powi(3),
                 PointBrightness::Intensity(_) => per_cos / (point.depth_m * point.depth_m),
             };
-            Some(Self {
-                field_tan,
-                tan2,
-                dioptres: 1.0 / point.depth_m,
-                layer: coordinate as usize,
-                is_behind,
-                is_hidden,
-            })
+            let layer = coordinate_of(point.depth_m as f32) as usize;
+            Some(Self { field_tan, tan2, dioptres: 1.0 / point.depth_m, layer, before: before.flatten() })
         };
         scene.points.iter().map(of).collect()
     }
 
     /// Whether it lies behind the first surface.
     pub(crate) fn is_behind(&self) -> bool {
-        self.is_behind
+        self.before.is_some()
     }
 
     /// Returns it with its brightness in a band; `None` where it cannot be seen.
     pub(crate) fn lit(&self, brightness: f32, (map, pitch_mm): (&FilmMap, f64)) -> Option<Point> {
-        if self.is_hidden || brightness <= 0.0 {
+        if brightness <= 0.0 {
             return None;
         }
         let place_mm = map.place_mm(self.field_tan)?;
         let light =
             f64::from(brightness) * self.tan2 * map.jacobian_mm(place_mm).determinant().abs() / (pitch_mm * pitch_mm);
-        let Self { dioptres, layer, .. } = *self;
-        Some(Point { place_mm, dioptres, layer, width_mm: 0.0, light, is_of_surface: false })
+        let Self { dioptres, layer, before, .. } = *self;
+        Some(Point { place_mm, dioptres, layer, width_mm: 0.0, light, is_of_surface: false, before })
     }
 }
 
@@ -122,18 +115,26 @@ impl Point {
         self.light
     }
 
-    /// Returns a lamp among the samples of a scene, at a depth, on the first surface or behind it.
+    /// Returns a lamp among the samples of a scene, at a depth, on the first surface or behind that.
     pub(crate) fn of_lamp(
         lamp: &Lamp,
         raster: &SceneRaster,
         (map, pitch_mm): (&FilmMap, f64),
-        ((layer, dioptres), is_of_surface): ((usize, f64), bool),
+        ((layer, dioptres), before): ((usize, f64), Option<Before>),
     ) -> Option<Self> {
         let (tan_x, tan_y) = raster.view.tan_at(lamp.row as f64, lamp.column as f64);
         let place_mm = map.place_mm(DVec2::new(tan_x, tan_y))?;
         let area_mm2 = map.jacobian_mm(place_mm).determinant().abs() / raster.view.focal_px.powi(2);
         let light = f64::from(lamp.radiance) * area_mm2 / (pitch_mm * pitch_mm);
-        Some(Self { place_mm, dioptres, layer, width_mm: area_mm2.sqrt(), light, is_of_surface })
+        Some(Self {
+            place_mm,
+            dioptres,
+            layer,
+            width_mm: area_mm2.sqrt(),
+            light,
+            is_of_surface: before.is_none(),
+            before,
+        })
     }
 }
 
@@ -147,11 +148,17 @@ pub(crate) struct Drawing<'a> {
     pub(crate) hides: bool,
 }
 
+/// How far beside each other, pixels, rays through different parts of the pupil must meet the film to be told apart, beside what aberrations do.
+const PART_OF_PIXEL: f64 = 0.3;
+/// The share of a surface before a point that must be laid to tell how much of the pupil it leaves; of less, it leaves none.
+const LEAST_LAID: f32 = 0.05;
 /// What a surface that spans ten layers leaves open of a pixel before the last of them: less is left by others.
 const OWN_SURFACE: f32 = 0.1;
 /// Points no farther apart than this share a kernel, pixels; of more than so many kernels, twice as far, and so on.
 const APART_PX: f64 = 16.0;
 const MOST_KERNELS: usize = 256;
+/// Kernels that are drawn at once.
+const AT_ONCE: usize = 8;
 /// Change of blur radius between points that share a kernel, pixels.
 const BLUR_STEP_PX: f64 = 0.5;
 /// Blur radius of kernels on samples of a quarter pixel, pixels; wider ones are on samples in proportion.
@@ -162,12 +169,15 @@ impl Drawing<'_> {
     pub(crate) fn add(&self, points: &[Point], picture: &Composite, sums: &mut [f32]) {
         let film = film_pixels(self.film);
         let groups = self.groups(points);
-        let patches: Vec<(Rectangle, Vec<f32>)> =
-            groups.par_iter().filter_map(|group| self.patch(group, picture, &film)).collect();
-        for (at, light) in patches {
-            let lines = sums[at.offset_in(&film)..].chunks_mut(film.columns);
-            for (line, light) in lines.zip(light.chunks_exact(at.columns)) {
-                line.iter_mut().zip(light).for_each(|(sum, light)| *sum += light);
+        // Some at once: each may be as large as the film.
+        for groups in groups.chunks(AT_ONCE) {
+            let patches: Vec<(Rectangle, Vec<f32>)> =
+                groups.par_iter().filter_map(|group| self.patch(group, picture, &film)).collect();
+            for (at, light) in patches {
+                let lines = sums[at.offset_in(&film)..].chunks_mut(film.columns);
+                for (line, light) in lines.zip(light.chunks_exact(at.columns)) {
+                    line.iter_mut().zip(light).for_each(|(sum, light)| *sum += light);
+                }
             }
         }
     }
@@ -204,6 +214,8 @@ impl Drawing<'_> {
         let dioptres = group.iter().map(|point| point.dioptres).sum::<f64>() / n;
         let pitch_mm = self.pitch_mm();
         let spread_px = self.lens.spread_mm(place_mm, dioptres, self.wavelength_nm) / pitch_mm;
+        let blur_px = self.lens.blur_radius_mm(place_mm, dioptres, self.wavelength_nm) / pitch_mm;
+        let unclear_px = PART_OF_PIXEL + (spread_px * spread_px - blur_px * blur_px).max(0.0).sqrt();
         let cell_px = 0.25 * (spread_px / QUARTER_BLUR_PX).log2().ceil().max(0.0).exp2();
         let query =
             FilmQuery { place_mm, dioptres, wavelength_nm: self.wavelength_nm, pitch_um: cell_px * self.film.pitch_um };
@@ -221,6 +233,8 @@ impl Drawing<'_> {
             let seen = SeenPoint {
                 layer: point.layer,
                 dioptres,
+                before: point.before,
+                unclear_px: unclear_px as f32,
                 place_px: (place[0] as f32, place[1] as f32),
                 width_px: width_px as f32,
             };
@@ -249,10 +263,17 @@ impl Drawing<'_> {
         (picture, film): (&Composite, &Rectangle),
     ) -> f32 {
         if !self.hides {
-            return 1.0;
+            return if point.before.is_some() { 0.0 } else { 1.0 };
         }
         let at = ((pixel.0 - film.first_row) as usize, (pixel.1 - film.first_column) as usize);
-        let open = picture.open_well_before(point.layer, at);
+        let open = match point.before {
+            None => picture.open_well_before(point.layer, at),
+            Some(before) => {
+                // Of the surface that it lies behind, a part may be in layers that are not laid yet.
+                let laid = (point.layer as f32 - before.coordinate).clamp(0.0, 1.0);
+                if laid > LEAST_LAID { (1.0 - (1.0 - picture.open(at)) / laid).max(0.0) } else { 0.0 }
+            }
+        };
         match self.visible.filter(|visible| visible.has_edges(pixel)) {
             Some(visible) => visible.part_of_point(seen, pixel, open),
             // Nearer parts of its own surface hide nothing of it.

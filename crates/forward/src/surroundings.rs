@@ -13,7 +13,7 @@ use crate::{
 
 /// The most pixels beside a film that are looked at, and the pixels in all up to which there are as many; of larger films, as many pixels around as within.
 const MOST_BESIDE: f64 = 256.0;
-const AMPLE_PIXELS: f64 = 360_000.0;
+const AMPLE_PIXELS: f64 = 100_000.0;
 
 /// Returns how far beside a film is looked, pixels.
 pub(crate) fn beside(film: &Film) -> usize {

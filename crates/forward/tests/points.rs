@@ -109,3 +109,17 @@ fn surfaces_hide_points() {
     // From the middle of the edge half of the pupil sees the star.
     assert!((found[2] - 0.5).abs() < 0.05, "{found:?}");
 }
+
+/// A wall that is hardly out of focus hides what lies behind it too, far from its edge and whatever the layers are.
+#[test]
+fn walls_near_the_focus_hide_points() {
+    for (near_m, far_m) in [(1.8, 2.4), (1.95, 2.1), (1.6, 3.0), (2.0, 100.0)] {
+        let mut edge = flat(1, far_m);
+        edge.slice_mut(s![.., ..SIDE / 2]).fill(near_m);
+        for depth_m in [1.1, 1.3, 2.0, 1e9].map(|times| times * f64::from(near_m)) {
+            let behind = star([-0.02, 0.0], depth_m, 1e-6);
+            let light = picture(flat(1, 0.0), edge.clone(), &behind).sum() / (1e-6 * FOCAL_PX * FOCAL_PX);
+            assert!(light < 1e-3, "{near_m} m before {depth_m} m: {light}");
+        }
+    }
+}

@@ -248,6 +248,12 @@ pub enum OpticsError {
         /// What it could mean, each by a name that means it alone.
         candidates: Vec<String>,
     },
+    /// A lens that cannot be made larger or smaller.
+    #[error("the lens cannot be scaled: {reason}")]
+    Scale {
+        /// Why not.
+        reason: String,
+    },
     /// A lens that a file format cannot hold.
     #[error("{format} cannot hold this lens: {reason}")]
     CannotWrite {

@@ -17,6 +17,7 @@ mod pbrt_list;
 mod prescription;
 mod read;
 mod rii_yaml;
+mod scale;
 mod seq;
 mod shapes;
 mod system;

@@ -2,6 +2,7 @@
 
 mod changes;
 mod media;
+mod scale;
 
 use glam::DVec2;
 

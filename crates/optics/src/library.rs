@@ -1,6 +1,6 @@
 //! The built-in lenses.
 
-use crate::{Lens, OpticsError, formats::lens_from_ron};
+use crate::{Lens, LensFile, OpticsError, SchematicEye, formats::lens_from_ron};
 
 /// Names the lenses whose files lie in `data/lenses`.
 macro_rules! lenses {
@@ -88,8 +88,8 @@ impl IdealLens {
 }
 
 impl Lens {
-    /// Returns the built-in lens of this name; [`built_in_names`](Self::built_in_names) lists those of glass, and
-    /// [`IdealLens::PATTERNS`] has those that are named by their numbers.
+    /// Returns the built-in lens of this name; [`built_in_names`](Self::built_in_names) lists those of glass,
+    /// [`IdealLens::PATTERNS`] has those that are named by their numbers and [`SchematicEye::PATTERNS`] eyes.
     ///
     /// # Errors
     /// When there is none of that name.
@@ -103,6 +103,19 @@ impl Lens {
     }
 }
 
+impl LensFile {
+    /// Returns the built-in lens of this name, and how it is used: an eye with its retina for a film.
+    ///
+    /// # Errors
+    /// When there is none of that name.
+    pub fn built_in(name: &str) -> Result<Self, OpticsError> {
+        match SchematicEye::named(name) {
+            Some(eye) => eye?.file(),
+            None => Ok(Self::from(built_in(name)?)),
+        }
+    }
+}
+
 fn names() -> impl Iterator<Item = &'static str> {
     LENSES.iter().map(|(name, _)| *name)
 }
@@ -111,8 +124,12 @@ fn built_in(name: &str) -> Result<Lens, OpticsError> {
     if let Some(ideal) = IdealLens::named(name) {
         return ideal?.lens();
     }
+    if let Some(eye) = SchematicEye::named(name) {
+        return Ok(eye?.file()?.lens);
+    }
     let Some((_, text)) = LENSES.iter().find(|(known, _)| *known == name) else {
-        let known = format!("built in are {}, {}", names().collect::<Vec<_>>().join(", "), IdealLens::PATTERNS);
+        let names = names().collect::<Vec<_>>().join(", ");
+        let known = format!("built in are {names}, {}, {}", IdealLens::PATTERNS, SchematicEye::PATTERNS);
         return Err(OpticsError::Unknown { kind: "lens", name: name.to_owned(), known });
     };
     lens_from_ron(text).map_err(|error| OpticsError::File {

@@ -53,6 +53,9 @@ pub struct Seidel {
     pub total: SeidelSums,
     /// The Lagrange invariant n (u ȳ − ū y), mm.
     pub lagrange_mm: f64,
+    /// How high the marginal and the chief ray meet each surface and, last, the paraxial image plane where there is one, mm.
+    #[serde(skip)]
+    pub heights_mm: Vec<[f64; 2]>,
 }
 
 /// For which rays and wavelengths Seidel sums are wanted.
@@ -131,13 +134,14 @@ impl Lens {
         let mut chief = settings.chief_ray(&mono);
         let lagrange_mm = index_before * (marginal.u * chief.y - chief.u * marginal.y);
 
-        let (mut per_surface, mut total) = (Vec::new(), SeidelSums::default());
+        let (mut per_surface, mut total, mut heights_mm) = (Vec::new(), SeidelSums::default(), Vec::new());
         let steps = mono.steps();
         for (i, step) in steps.iter().enumerate() {
             if i > 0 {
                 let gap = step.vertex_z - steps[i - 1].vertex_z;
                 (marginal, chief) = (marginal.moved(gap), chief.moved(gap));
             }
+            heights_mm.push([marginal.y, chief.y]);
             let colors = [&short.steps()[i], &long.steps()[i]];
             let index_difference = difference(colors.map(|s| [s.index_before, s.index_after]));
             let [of_short, of_long] = colors.map(|s| s.phase.as_ref().map_or(0.0, Phase::power));
@@ -148,7 +152,11 @@ impl Lens {
             total += sums;
             (marginal, chief) = (marginal.refracted(step), chief.refracted(step));
         }
-        Ok(Seidel { per_surface, total, lagrange_mm })
+        let image_z_mm = mono.conjugate(settings.object_distance_mm).image_z_mm;
+        if image_z_mm.is_finite() {
+            heights_mm.push([marginal, chief].map(|ray| ray.moved(image_z_mm).y));
+        }
+        Ok(Seidel { per_surface, total, lagrange_mm, heights_mm })
     }
 }
 

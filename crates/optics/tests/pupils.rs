@@ -6,8 +6,8 @@ use std::path::PathBuf;
 
 use counted::{axial_spot_rms_mm, beam_radius_mm, cross_section_mm2};
 use dioptric_optics::{
-    CoordinateBreak, Glass, Interface, Lens, LensFile, MissingGlass, MonoLens, ObjectPoint, PupilBoundary, PupilRegion,
-    ReadOptions, Surface,
+    Aperture, CoordinateBreak, Glass, Interface, Lens, LensFile, MissingGlass, MonoLens, ObjectPoint, Outline,
+    PupilBoundary, PupilRegion, ReadOptions, Shape, Surface,
     analysis::{Autofocus, PupilLight, PupilRule, field_limit_deg, projected_solid_angle},
     glam::{DVec2, DVec3},
 };
@@ -256,4 +256,51 @@ fn the_last_light_of_a_tilted_lens_is_found() {
     assert!(steps.windows(2).all(|pair| pair[1] <= pair[0] + 1e-6), "{steps:?}");
     assert!(steps[0] > 0.0 && steps[199] < 1e-2 * steps[0], "{} {}", steps[0], steps[199]);
     assert!(seen_mm2(86.582_519_531_25) < 1e-6);
+}
+
+/// A stop of 5 mm and, 100 mm behind it, a window of 8 mm that is 30 mm off the axis in one of forty directions: light through both is that
+/// through two discs that overlap, by their closed form.
+#[test]
+fn windows_in_all_directions_have_the_light_of_overlapping_discs() {
+    let overlap_mm2 = |distance_mm: f64| -> f64 {
+        let (r, large) = (5.0_f64, 8.0_f64);
+        if distance_mm >= r + large {
+            return 0.0;
+        }
+        if distance_mm <= large - r {
+            return std::f64::consts::PI * r * r;
+        }
+        let square = distance_mm * distance_mm;
+        let half = |own: f64, other: f64| ((square + own * own - other * other) / (2.0 * distance_mm * own)).acos();
+        let segment = |own: f64, half: f64| own * own * (half - 0.5 * (2.0 * half).sin());
+        segment(r, half(r, large)) + segment(large, half(large, r))
+    };
+    (0..40).into_par_iter().for_each(|i| {
+        let direction = DVec2::from_angle(std::f64::consts::TAU * f64::from(i) / 40.0);
+        let plane = |semi_aperture_mm, thickness_after_mm| Interface {
+            surface: Surface::plane(semi_aperture_mm),
+            medium_after: Glass::Air,
+            thickness_after_mm,
+        };
+        let lens = Surface { shape: Shape::ThinLens { power_per_mm: 0.01 }, ..Surface::plane(60.0) };
+        let sides = vec![plane(5.0, 100.0), plane(60.0, 5.0), Interface { surface: lens, ..plane(60.0, 0.0) }];
+        // Light of a point on one side of the axis falls on the other.
+        let window = Aperture {
+            surface: 1,
+            outline: Outline::Circle { radius_mm: 8.0 },
+            center_mm: (direction * -30.0).to_array(),
+            is_obscuration: false,
+        };
+        let lens = Lens::new_with_apertures("window", "test", sides, 0, vec![window]).unwrap().at(550.0).unwrap();
+        for half_degrees in 19..46 {
+            let field_deg = 0.5 * f64::from(half_degrees);
+            let point = ObjectPoint::far(field_deg.to_radians(), direction);
+            let expected_mm2 = overlap_mm2((100.0 * field_deg.to_radians().tan() - 30.0).abs());
+            let found_mm2 = PupilRegion::find(&lens, &point, 96).map_or(0.0, |region| region.area_mm2());
+            assert!(
+                (found_mm2 - expected_mm2).abs() < 2e-3 * expected_mm2 + 1e-9,
+                "{i} {field_deg}: {found_mm2} {expected_mm2}"
+            );
+        }
+    });
 }

@@ -37,6 +37,34 @@ pub fn parse_numbers(what: &'static str, text: &str) -> Result<Vec<f64>, Pipelin
     Ok(numbers)
 }
 
+/// Returns the angles of a list of directions, degrees: as [`parse_pairs`] has them, or `ANGLE@AZIMUTH`, so far from the axis in that
+/// direction from +x, as the angles along x and y that the x–z and the y–z plane see.
+///
+/// # Errors
+/// When an item is none, or an angle of 90° has no such angles.
+pub fn parse_directions(what: &'static str, text: &str) -> Result<Vec<[f64; 2]>, PipelineError> {
+    let mut directions = Vec::new();
+    for item in text.split(',') {
+        let Some((angle, azimuth)) = item.split_once('@') else {
+            directions.extend(parse_pairs(what, item)?);
+            continue;
+        };
+        let number = |text: &str| text.trim().parse::<f64>().ok().filter(|v| v.is_finite());
+        let wrong = || PipelineError::List { what, item: item.trim().to_owned() };
+        let (angle_deg, azimuth_deg) = number(angle).zip(number(azimuth)).ok_or_else(wrong)?;
+        let ((sine, z), (up, right)) = (angle_deg.to_radians().sin_cos(), azimuth_deg.to_radians().sin_cos());
+        // Right angles leave rounding, which is no direction.
+        let across = [right, up].map(|part| if part.abs() < 1e-15 { 0.0 } else { sine * part });
+        let is_alone = across.contains(&0.0);
+        if z.abs() < 1e-12 && !is_alone {
+            return Err(wrong());
+        }
+        let of = |across: f64| if across == 0.0 { 0.0 } else { across.atan2(z).to_degrees() };
+        directions.push(across.map(of));
+    }
+    Ok(directions)
+}
+
 /// Returns the pairs of a list: `x/y`, or numbers and ranges as [`parse_numbers`] reads them, which are y with x = 0.
 ///
 /// # Errors
@@ -113,6 +141,23 @@ mod tests {
         assert_eq!(found, [[0.0, 0.0], [5.0, 10.0], [-2.0, -1.5], [0.0, 10.0], [0.0, 20.0]]);
         for item in ["1/x", "1/2/3", "/"] {
             assert!(parse_pairs("fields", item).unwrap_err().to_string().contains(item));
+        }
+    }
+
+    #[test]
+    fn directions_are_seen_by_two_planes() {
+        let found = parse_directions("fields", "30@90, 100@0,5/10, 110@-90,3").unwrap();
+        let expected = [[0.0, 30.0], [100.0, 0.0], [5.0, 10.0], [0.0, -110.0], [0.0, 3.0]];
+        assert_eq!(found.len(), expected.len());
+        for (found, expected) in found.iter().flatten().zip(expected.iter().flatten()) {
+            assert!((found - expected).abs() < 1e-12, "{found} {expected}");
+        }
+        // tan 104.0° = tan 100° · cos 45°, as both planes see 100° between them.
+        let [[x, y]] = parse_directions("fields", "100@45").unwrap()[..] else { panic!("one") };
+        assert!((x.to_radians().tan() / (100f64.to_radians().tan() * 0.5f64.sqrt()) - 1.0).abs() < 1e-12 && x > 90.0);
+        assert!((x - y).abs() < 1e-12);
+        for item in ["90@45", "1@", "@2", "1@2@3", "inf@0"] {
+            assert!(parse_directions("fields", item).unwrap_err().to_string().contains(item), "{item}");
         }
     }
 

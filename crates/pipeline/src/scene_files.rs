@@ -67,7 +67,8 @@ impl SceneRequest {
         let grid = self.wavelengths_nm.clone().map(WavelengthGrid::new).transpose()?;
         let mut scene = self.scene.look(grid.as_ref())?;
         if let Some(crop) = self.crop {
-            let (rows, columns) = (crop.y..crop.y + crop.rows, crop.x..crop.x + crop.columns);
+            let rows = crop.y..crop.y.saturating_add(crop.rows);
+            let columns = crop.x..crop.x.saturating_add(crop.columns);
             scene = scene.cropped(rows, columns)?;
         }
         if self.bin != 1 {
@@ -83,6 +84,10 @@ impl SceneRequest {
     pub fn describe(&self, picture: Option<&Path>) -> Result<SceneInfo, PipelineError> {
         let scene = self.open()?;
         if let Some(path) = picture {
+            if path.extension().is_some_and(|ending| !ending.eq_ignore_ascii_case("png")) {
+                let reason = format!("{}: the picture is written as PNG, expected the ending .png", path.display());
+                return Err(PipelineError::Unsuitable { what: "output", reason });
+            }
             write_preview_png(path, &scene.radiance, white_of(&scene))?;
         }
         Ok(SceneInfo::of(&scene))
@@ -96,8 +101,13 @@ impl SceneRequest {
     pub fn convert(&self, output: &Path, samples: Option<ExrSamples>) -> Result<SceneInfo, PipelineError> {
         let is_mat = output.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("mat"));
         if is_mat && samples.is_some() {
-            let reason = format!("{} is no EXR file, expected it without --exr-samples", output.display());
-            return Err(PipelineError::Unsuitable { what: "samples of an EXR file", reason });
+            return Err(no_exr_samples(output));
+        }
+        let is_other = output.extension().is_some_and(|ending| !ending.eq_ignore_ascii_case("exr")) && !is_mat;
+        if is_other {
+            let reason =
+                format!("{}: a scene is written as .exr or .mat, expected one of these endings", output.display());
+            return Err(PipelineError::Unsuitable { what: "output", reason });
         }
         let scene = self.open()?;
         if is_mat {
@@ -107,6 +117,11 @@ impl SceneRequest {
         }
         Ok(SceneInfo::of(&scene))
     }
+}
+
+pub(crate) fn no_exr_samples(output: &Path) -> PipelineError {
+    let reason = format!("{} is no EXR file, expected it without --exr-samples", output.display());
+    PipelineError::Unsuitable { what: "samples of an EXR file", reason }
 }
 
 impl SceneInfo {

@@ -2,7 +2,6 @@
 
 use std::path::Path;
 
-use dioptric_scene::read_exr_light;
 use dioptric_sensor::{
     Developed, ElectronRate, ExitPupil, ExposureControl, Illumination, Noise, NoiseSources, OpticalFilter, Processing,
     Sensor,
@@ -113,7 +112,7 @@ impl SenseRequest {
             None => sensor,
         };
         // One that states no distance between its samples has one a pixel.
-        let irradiance = Irradiance::read_exr(image, Some(sensor.pixel_pitch_um))?;
+        let (irradiance, stated, mut notes) = Irradiance::read(image, Some(sensor.pixel_pitch_um))?;
         let (sample_um, pixel_um) = (irradiance.pitch_um(), sensor.pixel_pitch_um);
         let (rows, columns) = irradiance.size();
         let (light, sensor) = if (sample_um / pixel_um - 1.0).abs() < 1e-6 {
@@ -125,11 +124,7 @@ impl SenseRequest {
             let covering = sensor.with_size(covered(rows, sensor.rows), covered(columns, sensor.columns));
             (Illumination::with_pitch_um(&irradiance, sample_um), covering)
         };
-        let illuminant = match &self.illuminant {
-            Some(light) => Some(light.clone()),
-            None => stated_light(image)?,
-        };
-        let mut notes = Vec::new();
+        let illuminant = self.illuminant.clone().or(stated);
         if !(0.5..=2.0).contains(&(sample_um / pixel_um)) {
             notes.push(format!(
                 "the image has a sample every {} µm and the sensor a pixel every {} µm: samples are laid over pixels by area",
@@ -182,14 +177,4 @@ impl SenseRequest {
         };
         Some(ExitPupil { f_number: f_number.unwrap_or(f64::INFINITY), ..ExitPupil::centered(distance_mm) })
     }
-}
-
-/// Returns the light on the scene that a file of irradiance states, as those of a run do.
-fn stated_light(image: &Path) -> Result<Option<Illuminant>, PipelineError> {
-    let Some(text) = read_exr_light(image)? else { return Ok(None) };
-    let wrong = |reason: String| PipelineError::Read { path: image.to_owned(), reason };
-    let light: Illuminant =
-        ron::from_str(&text).map_err(|e| wrong(format!("its light, '{text}', cannot be read: {e}")))?;
-    light.check().map_err(|e| wrong(e.to_string()))?;
-    Ok(Some(light))
 }

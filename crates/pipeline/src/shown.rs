@@ -2,7 +2,7 @@
 
 use std::{fs, path::Path};
 
-use dioptric_scene::{DisplayModel, ExrSamples, Scene, write_scene_exr};
+use dioptric_scene::{DisplayModel, ExrSamples, Scene, read_iset_display, write_scene_exr};
 use dioptric_spectrum::{Observer, WavelengthGrid, Xyz};
 use ron::extensions::Extensions;
 use serde::Serialize;
@@ -12,14 +12,18 @@ use crate::PipelineError;
 /// The bands of a display's light where nothing else is asked for, nm: first, last and step.
 const USUAL_BANDS_NM: (f64, f64, f64) = (400.0, 700.0, 10.0);
 
-/// Returns the display of a name or a RON file, which may state another name.
+/// Returns the display of a name, of a RON file, which may state another name, or of a MATLAB file of `ISETCam`; and what of that is not used,
+/// a sentence each.
 ///
 /// # Errors
 /// When there is none of that name, or the file cannot be read or its numbers make no sense.
-pub fn open_display(text: &str) -> Result<DisplayModel, PipelineError> {
+pub fn open_display(text: &str) -> Result<(DisplayModel, Vec<String>), PipelineError> {
     let path = Path::new(text);
     if path.extension().is_none() && !path.exists() {
-        return Ok(DisplayModel::built_in(text)?);
+        return Ok((DisplayModel::built_in(text)?, vec![]));
+    }
+    if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("mat")) {
+        return Ok(read_iset_display(path)?);
     }
     let read =
         fs::read_to_string(path).map_err(|e| PipelineError::Read { path: path.to_owned(), reason: e.to_string() })?;
@@ -31,7 +35,7 @@ pub fn open_display(text: &str) -> Result<DisplayModel, PipelineError> {
         reason: e.code.to_string(),
     })?;
     display.check()?;
-    Ok(display)
+    Ok((display, vec![]))
 }
 
 /// How a picture is viewed.

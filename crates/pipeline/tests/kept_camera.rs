@@ -96,6 +96,39 @@ fn stop_resolves_the_lens_and_keeps_the_scene() {
 #[test]
 fn brighter_scene_keeps_the_plan() {
     check(|camera| camera.scene.mean_luminance_cd_m2 = Some(300.0), [0, 1, 0, 0, 0, 1, 1, 1, 1]);
+    check(|camera| camera.scene.mean_lux = Some(300.0), [0, 0, 0, 0, 0, 1, 1, 1, 1]);
+}
+
+/// All that is stated of the light follows the level that the film is brought to, in memory, in a file and photodiode by photodiode.
+#[test]
+fn film_is_brought_to_its_level() {
+    let kept = KeptCamera::new(small());
+    let own = capture(&kept);
+    let own_lux = own.irradiance.summary.mean_lux;
+    let wanted = |camera: &mut Camera| camera.scene.mean_lux = Some(2.0 * own_lux);
+    let twice = capture(&kept.with(wanted));
+    assert_eq!(twice.irradiance.summary.mean_lux, 2.0 * own_lux);
+    assert_eq!(twice.scene.mean_luminance_cd_m2, 2.0 * own.scene.mean_luminance_cd_m2);
+    let doubled: Vec<u32> = bits(&own).0.iter().map(|&sample| (2.0 * f32::from_bits(sample)).to_bits()).collect();
+    assert_eq!(bits(&twice).0, doubled);
+    let in_file = capture(&KeptCamera::new(small()).with(wanted).with_memory_bytes(1000));
+    assert_eq!(bits(&in_file), bits(&twice));
+    let halves = kept.with(|camera| camera.dual_pixel = Some("left-right".parse().unwrap()));
+    let halves_lux = capture(&halves).irradiance.summary.mean_lux;
+    let parts = capture(&halves.with(wanted)).irradiance.clone();
+    let sum: f64 = parts.photodiodes().iter().map(|part| part.summary.mean_lux).sum();
+    // Sums of single floats.
+    assert!((sum / (2.0 * own_lux) - 1.0).abs() < 1e-5 && halves_lux > 0.0, "{sum} of {}", 2.0 * own_lux);
+    let message = kept
+        .with(|camera| {
+            camera.scene.mean_lux = Some(1.0);
+            camera.wavelengths = WavelengthSpec::ListNm(vec![900.0, 950.0, 1000.0]);
+        })
+        .capture(&Silent, &Cancel::new())
+        .map(|_| ())
+        .unwrap_err()
+        .to_string();
+    assert!(message.contains("mean_lux"), "{message}");
 }
 
 #[test]

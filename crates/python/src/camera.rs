@@ -130,6 +130,8 @@ impl Camera {
     /// axes, no_data, depth, depth_unit, depth_kind, view, panorama
     /// illuminant, illuminance_lux, scene_light, mean_luminance_cd_m2
     ///     Of the scene, as of `Scene.read`.
+    /// mean_lux : float
+    ///     Scales the light of the scene so that the film gets this illuminance on average, lux.
     /// wavelengths_nm : list of float, or "scene"
     ///     The bands that are simulated.
     /// exposure_s : float, or "auto"

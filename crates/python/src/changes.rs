@@ -81,6 +81,7 @@ const ALL: &[&str] = &[
     "illuminance_lux",
     "scene_light",
     "mean_luminance_cd_m2",
+    "mean_lux",
     "wavelengths_nm",
     "exposure_s",
     "analog_gain",
@@ -236,6 +237,10 @@ fn set_film(camera: &mut Camera, given: &GivenParts, key: &str, value: &Bound<'_
             let expected = "four whole numbers: the first column and row, columns and rows";
             let (x, y, columns, rows) = value.extract().map_err(|_| wrong_type(key, type_name(value), expected))?;
             camera.crop = Some(Crop { x, y, columns, rows });
+        }
+        "mean_lux" => {
+            camera.scene.mean_lux = Some(number(key, value)?);
+            camera.scene.mean_luminance_cd_m2 = None;
         }
         "dual_pixel" => {
             let found = word(key, value)?;

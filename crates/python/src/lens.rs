@@ -121,10 +121,10 @@ fn range_of(glass_range: &str) -> PyResult<GlassRange> {
 
 #[pymethods]
 impl Lens {
-    /// Returns the names of the built-in lenses.
+    /// Returns the names of the built-in lenses, relaxed eyes among them.
     #[staticmethod]
     fn names() -> Vec<&'static str> {
-        dioptric_optics::Lens::built_in_names().collect()
+        dioptric_optics::Lens::built_in_names().chain(dioptric_optics::SchematicEye::NAMES).collect()
     }
 
     /// Returns the built-in lenses as a list of dictionaries: ``name``, ``efl_mm`` and ``f_number`` at 550 nm wide open,
@@ -134,7 +134,8 @@ impl Lens {
         guarded(|| to_python(py, &built_in_lenses().map_err(exception)?))
     }
 
-    /// Returns a built-in lens, or an ideal one by its numbers: "thin:50mm:f2", "thin:50mm:25mm", "pinhole:0.1mm".
+    /// Returns a built-in lens, or an ideal one by its numbers: "thin:50mm:f2", "thin:50mm:25mm", "pinhole:0.1mm", or a schematic
+    /// eye, accommodated by dioptres: "eye:navarro", "eye:navarro:4D", "eye:arizona:2.5D", "eye:legrand", "eye:legrand:7.05D".
     #[staticmethod]
     fn built_in(name: &str) -> PyResult<Self> {
         guarded(|| Self::of_choice(LensSpec::BuiltIn(name.to_owned()), LensReadOptions::default()))
@@ -158,8 +159,10 @@ impl Lens {
     /// configuration : int, optional
     ///     Which configuration of a file that has several, as the positions of a zoom lens, counted from 1; without it the one that the file
     ///     has in use.
+    /// lens_scale : float, optional
+    ///     How many times as large the lens is as the file has it, in all its lengths.
     #[staticmethod]
-    #[pyo3(signature = (path, *, glasses=None, missing_glass="refuse", glass_range="refuse", slope_per_nm=None, configuration=None))]
+    #[pyo3(signature = (path, *, glasses=None, missing_glass="refuse", glass_range="refuse", slope_per_nm=None, configuration=None, lens_scale=None))]
     fn read(
         path: PathBuf,
         glasses: Option<Vec<PathBuf>>,
@@ -167,6 +170,7 @@ impl Lens {
         glass_range: &str,
         slope_per_nm: Option<f64>,
         configuration: Option<usize>,
+        lens_scale: Option<f64>,
     ) -> PyResult<Self> {
         let missing_glass = match missing_glass {
             "refuse" => MissingGlass::Refuse,
@@ -182,6 +186,7 @@ impl Lens {
             glass_range,
             slope_per_nm,
             configuration,
+            lens_scale,
             ..LensReadOptions::default()
         };
         guarded(|| Self::of_choice(LensSpec::File(path), reading))
@@ -422,12 +427,13 @@ impl Lens {
     /// field_y_deg : float
     ///     How far above the axis all of them lie. Default 0.
     /// distance_mm : float or list of float
-    ///     Of the points before the first vertex; ``inf`` for a star. Default ``inf``.
+    ///     Of the points before the first vertex; ``inf`` for a star. Default: that of the lens's file, else ``inf``.
     /// wavelengths_nm : float or list of float
     ///     Default 550.
     /// focus_mm, film_mm : float
-    ///     The film: in focus for an object at this distance, or this far behind the last vertex. Default: in focus for the first
-    ///     of ``distance_mm``.
+    ///     The film: in focus for an object at this distance, or this far behind the last vertex. Default: where the lens's file has it,
+    ///     else in focus for the first of ``distance_mm``. Of a lens that sends light off in parallel it is behind an ideal lens of
+    ///     1000 mm: 1 µm is then 1 µrad.
     /// pixel_um : float
     ///     Side of a pixel. Default 1.
     /// shape : int
@@ -446,7 +452,7 @@ impl Lens {
     /// Sums are at most 1: the share of the light entering the pupil that reaches the pixels.
     #[pyo3(signature = (**options))]
     fn psf<'py>(&self, py: Python<'py>, options: Option<&Bound<'py, PyDict>>) -> PyResult<Bound<'py, PyAny>> {
-        let asked = PsfOptions::read("psf", options)?;
+        let asked = PsfOptions::read("psf", options, &self.used())?;
         let set = asked.compute(py, &self.file.lens)?;
         let (n, n_points) = (asked.request.size.unwrap_or(1), set.pictures.len());
         let mut samples: Vec<f32> = Vec::with_capacity(n_points * n * n);
@@ -466,7 +472,7 @@ impl Lens {
     /// ``mtf_per_mm`` lists spatial frequencies, the MTF. Arguments as of `psf`; fields outermost, then distances, then wavelengths.
     #[pyo3(signature = (**options))]
     fn psf_table<'py>(&self, py: Python<'py>, options: Option<&Bound<'py, PyDict>>) -> PyResult<Bound<'py, PyAny>> {
-        let set = PsfOptions::read("psf_table", options)?.compute(py, &self.file.lens)?;
+        let set = PsfOptions::read("psf_table", options, &self.used())?.compute(py, &self.file.lens)?;
         to_python(py, &set.rows)
     }
 

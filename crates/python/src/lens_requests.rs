@@ -1,11 +1,14 @@
 //! What is asked of a lens, from keyword arguments.
 
-use dioptric_analysis::{AnalysisFields, AnalysisFilm, AnalysisRequest, LensDefaults, PsfRequest, PsfSampling, PsfSet};
+use dioptric_analysis::{
+    AfocalView, AnalysisFields, AnalysisFilm, AnalysisRequest, FilmUse, LensDefaults, PsfRequest, PsfSampling, PsfSet,
+};
 use dioptric_optics::Lens;
 use dioptric_pipeline::{Diffraction, PipelineError, REFERENCE_WAVELENGTH_NM};
 use pyo3::{prelude::*, types::PyDict};
 
 use crate::{
+    errors::exception,
     input::{is_single, number, numbers},
     options::{count, diffraction, each_option, with_gamma},
     worker::{Follower, run},
@@ -63,10 +66,11 @@ pub(crate) struct PsfOptions {
 }
 
 impl PsfOptions {
-    pub(crate) fn read(function: &str, options: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+    /// Reads what is asked for of a lens; what is left out of the film and the object is that of its file.
+    pub(crate) fn read(function: &str, options: Option<&Bound<'_, PyDict>>, used: &LensDefaults) -> PyResult<Self> {
         let mut request = PsfRequest {
             fields_deg: Vec::new(),
-            distances_mm: vec![f64::INFINITY],
+            distances_mm: vec![used.distance_mm],
             wavelengths_nm: vec![REFERENCE_WAVELENGTH_NM],
             film: AnalysisFilm::BestFocus,
             focus_nm: Vec::new(),
@@ -120,7 +124,17 @@ impl PsfOptions {
             *jitter = !is_exact_grid;
         }
         request.fields_deg = fields_deg.into_iter().map(|field_deg| [field_deg, field_y_deg]).collect();
-        request.film = film.unwrap_or(AnalysisFilm::FocusMm(request.distances_mm[0]));
+        request.film = match (film, used.film(), request.distances_mm.first()) {
+            (Some(film), ..) | (None, film @ AnalysisFilm::OfFile(_), _) => film,
+            (None, _, Some(&distance_mm)) => {
+                let film = AnalysisFilm::FocusMm(distance_mm);
+                let reference_nm = request.reference_nm(&used.lens).map_err(exception)?;
+                let of = FilmUse { wavelengths_nm: &request.wavelengths_nm, reference_nm, distance_mm };
+                let view = AfocalView::of(&used.lens, AnalysisFilm::BestFocus, &of).map_err(exception)?;
+                view.map_or(film, |_| AnalysisFilm::Afocal)
+            }
+            (None, film, None) => film,
+        };
         Ok(Self { request, is_single: single })
     }
 

@@ -32,7 +32,7 @@ pub struct DisplayModel {
 }
 
 /// From codes of 0–1 to the share of full drive.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum DisplayCurve {
     /// The curve of sRGB (IEC 61966-2-1).
     Srgb,
@@ -40,16 +40,25 @@ pub enum DisplayCurve {
     Gamma(f64),
     /// None: codes are drive.
     Linear,
+    /// Tables of red, green and blue: the drive at codes that are evenly spaced from 0 to 1, in straight lines between them.
+    Tables([Vec<f64>; 3]),
 }
 
 impl DisplayCurve {
-    /// Returns the drive of a code; codes beyond 0–1 are clipped.
-    pub fn decode(self, code: f64) -> f64 {
+    /// Returns the drive of a code of red (0), green (1) or blue (2); codes beyond 0–1 are clipped.
+    pub fn decode(&self, primary: usize, code: f64) -> f64 {
         let code = code.clamp(0.0, 1.0);
         match self {
             Self::Srgb => srgb_decode(code),
-            Self::Gamma(exponent) => code.powf(exponent),
+            Self::Gamma(exponent) => code.powf(*exponent),
             Self::Linear => code,
+            Self::Tables(tables) => {
+                let table = &tables[primary];
+                let at = code * (table.len() - 1) as f64;
+                let below = (at as usize).min(table.len() - 2);
+                let part = at - below as f64;
+                (1.0 - part) * table[below] + part * table[below + 1]
+            }
         }
     }
 }
@@ -163,10 +172,20 @@ impl DisplayModel {
         if !is_positive(self.pixel_pitch_um) {
             return wrong("pixel_pitch_um of the display", self.pixel_pitch_um, "a number above 0");
         }
-        if let DisplayCurve::Gamma(exponent) = self.curve
-            && !is_positive(exponent)
-        {
-            return wrong("curve: Gamma of the display", exponent, "a number above 0");
+        match &self.curve {
+            DisplayCurve::Gamma(exponent) if !is_positive(*exponent) => {
+                return wrong("curve: Gamma of the display", *exponent, "a number above 0");
+            }
+            DisplayCurve::Tables(tables) => {
+                if let Some(short) = tables.iter().find(|table| table.len() < 2) {
+                    return wrong("the numbers in a table of the display", short.len() as f64, "two or more");
+                }
+                let is_drive = |drive: &&f64| (0.0..=1.0 + 1e-6).contains(*drive);
+                if let Some(drive) = tables.iter().flatten().find(|drive| !is_drive(drive)) {
+                    return wrong("a drive in a table of the display", *drive, "a number from 0 to 1");
+                }
+            }
+            _ => {}
         }
         if let Some(white) = self.white_cd_m2
             && !is_positive(white)
@@ -225,7 +244,7 @@ impl DisplayModel {
     /// Returns the share of full drive of each code, black being lifted to its luminance.
     pub fn drive(&self, codes: [f64; 3]) -> [f64; 3] {
         let black = self.black_cd_m2 / self.white_xyz().0[1];
-        codes.map(|code| black + (1.0 - black) * self.curve.decode(code))
+        [0, 1, 2].map(|primary| black + (1.0 - black) * self.curve.decode(primary, codes[primary]))
     }
 
     /// Returns the matrix from drive to linear sRGB as an eye sees it that takes the display's white for white.

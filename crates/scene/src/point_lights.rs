@@ -66,7 +66,7 @@ impl PointLight {
             return wrong("the place of a point", format!("{x}, {y}"), "finite numbers");
         }
         let is_lamp = matches!(self.light, PointBrightness::Intensity(_));
-        if !(self.depth_m > 0.0) || (is_lamp && self.depth_m.is_infinite()) {
+        if self.depth_m.is_nan() || self.depth_m <= 0.0 || (is_lamp && self.depth_m.is_infinite()) {
             let expected = if is_lamp {
                 "a finite number above 0: its brightness is an intensity"
             } else {

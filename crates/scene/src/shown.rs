@@ -98,9 +98,12 @@ impl DisplayModel {
 
     /// Returns the share of full drive of codes.
     fn drives(&self, codes: &Array3<f32>) -> Array3<f32> {
-        let black = self.drive([0.0; 3])[0];
         let mut drives = codes.as_standard_layout().into_owned();
-        drives.par_mapv_inplace(|code| (black + (1.0 - black) * self.curve.decode(f64::from(code))) as f32);
+        let pixels = drives.as_slice_mut().expect("an array in standard layout is contiguous").par_chunks_exact_mut(3);
+        pixels.for_each(|pixel| {
+            let drive = self.drive([0, 1, 2].map(|i| f64::from(pixel[i])));
+            pixel.iter_mut().zip(drive).for_each(|(value, drive)| *value = drive as f32);
+        });
         drives
     }
 }

@@ -21,6 +21,9 @@ pub struct SmoothReflectance {
 }
 
 impl SmoothReflectance {
+    /// The wavelengths between which it was fitted, nm.
+    pub const FITTED_NM: [f64; 2] = [380.0, 780.0];
+
     /// Returns the reflectance at wavelengths, nm.
     pub fn at<const N: usize>(&self, wavelengths_nm: &[f32; N]) -> [f32; N] {
         let [c0, c1, c2] = self.c;

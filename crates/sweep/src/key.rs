@@ -75,7 +75,7 @@ impl ItemKey {
             of(&(&camera.lens, &camera.lens_reading, camera.stop, camera.movements)),
             of(&((camera.focus, camera.film, camera.crop), sensor, camera.diffraction)),
             of(&(camera.blur, camera.border, &camera.light_field)),
-            of(&(&scene.illuminant, scene.illuminance_lux, &scene.light, scene.mean_luminance_cd_m2)),
+            of(&(&scene.illuminant, scene.illuminance_lux, &scene.light, (scene.mean_luminance_cd_m2, scene.mean_lux))),
             of(&(&camera.sensor, &camera.filters)),
             of(&(camera.exposure, camera.noise, &camera.frames, camera.seed, camera.chip_seed)),
         ];

@@ -101,6 +101,15 @@ impl SpectralCurve {
         lanes(|lane| largest * share[lane] * white[lane])
     }
 
+    /// Whether it is lifted from a color, which tells nothing beyond what is seen; grays are the same everywhere.
+    pub(crate) fn is_of_color(&self) -> bool {
+        let is_gray = || {
+            let [low, high] = self.at(&[450.0, 650.0]);
+            (low - high).abs() <= 1e-4 * low.abs().max(high.abs())
+        };
+        matches!(self.kind, Kind::Smooth(_)) && !is_gray()
+    }
+
     fn of(kind: Kind) -> Self {
         let curve = Self { kind, scale: 1.0, mean: 0.0 };
         let mean = (0..=60).map(|i| curve.at(&[400.0 + 5.0 * i as f32])[0]).sum::<f32>() / 61.0;

@@ -130,6 +130,17 @@ impl Texture {
     }
 }
 
+impl Texture {
+    /// Whether it has reflectances that are lifted from colors.
+    pub(crate) fn has_colors(&self) -> bool {
+        match self {
+            Self::Curve(curve) => curve.is_of_color(),
+            Self::Image { .. } | Self::VertexColors => true,
+            _ => false,
+        }
+    }
+}
+
 /// Looks textures up.
 #[derive(Clone, Copy)]
 pub(crate) struct Textures<'a>(pub(crate) &'a [Texture]);

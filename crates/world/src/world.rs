@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use dioptric_spectrum::lanes;
+use dioptric_spectrum::{SmoothReflectance, lanes};
 use glam::{DAffine3, DVec3, Vec2, Vec3};
 
 use crate::{
@@ -263,6 +263,18 @@ impl World {
     /// What of a file wasn't understood, and what stands in its place; a sentence each.
     pub fn notes(&self) -> &[String] {
         &self.notes
+    }
+
+    /// Returns in a sentence that bands reach beyond the wavelengths between which colors tell what reflects them, where the world has reflectances
+    /// that are lifted from colors.
+    pub fn note_on_bands(&self, first_nm: f64, last_nm: f64) -> Option<String> {
+        let [low_nm, high_nm] = SmoothReflectance::FITTED_NM;
+        let is_beyond = first_nm < low_nm || last_nm > high_nm;
+        (is_beyond && self.textures.iter().any(Texture::has_colors)).then(|| {
+            format!(
+                "what its colors reflect beyond {low_nm} to {high_nm} nm is not known: their spectra go on as they were fitted"
+            )
+        })
     }
 
     /// Every file that the world was read from, pictures included, in the order in which they were read.

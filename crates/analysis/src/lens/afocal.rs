@@ -7,6 +7,7 @@ use dioptric_pipeline::PipelineError;
 use serde::Serialize;
 
 use super::film::{AnalysisFilm, FilmUse, IDEAL_MM};
+use crate::{LineChart, Series};
 
 /// How far away an image counts as infinitely far, over the front rim's radius.
 const PARALLEL: f64 = 1e5;
@@ -74,6 +75,27 @@ impl AfocalView {
             "the light is looked at through an ideal lens of {IDEAL_MM} mm right behind the last surface: on its film 1 µm is 1 µrad, \
              cycles/mm are cycles/mrad, and 1 mm of focus is 1/1000 dioptre{magnification}"
         )
+    }
+
+    /// Returns the label of an axis in the units of light that leaves in parallel: on the ideal lens's film 1 µm is 1 µrad and 1 mm
+    /// 1 mrad, along the axis 1 mm is 1/1000 dioptre.
+    pub fn in_angles(label: &str) -> String {
+        let across = ["x, mm", "y, mm", "cycles"].iter().any(|start| label.starts_with(start));
+        let label = label.replace("µm", "µrad").replace("/mm", "/mrad").replace("per mm", "per mrad");
+        label.replace("mm", if across { "mrad" } else { "mD" })
+    }
+
+    /// Returns a chart with its words in these units.
+    pub(crate) fn chart_in_angles(chart: LineChart) -> LineChart {
+        let series = chart.series.into_iter();
+        let series = series.map(|line| Series { label: line.label.as_deref().map(Self::in_angles), ..line });
+        LineChart {
+            title: Self::in_angles(&chart.title),
+            x_label: Self::in_angles(&chart.x_label),
+            y_label: Self::in_angles(&chart.y_label),
+            series: series.collect(),
+            ..chart
+        }
     }
 
     /// Returns the angle from the axis, degrees, of light that lands at this height on the ideal lens's film, mm.

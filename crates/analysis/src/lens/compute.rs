@@ -160,8 +160,9 @@ impl Bench {
         mut self,
         request: &AnalysisRequest,
         lens: &Lens,
-        (fields, notes): (Vec<Field>, Vec<String>),
+        (fields, mut notes): (Vec<Field>, Vec<String>),
     ) -> Result<LensAnalysis, PipelineError> {
+        notes.extend(self.note_on_chief_rays(lens, &fields));
         let paraxial = self.reference().film_distance_mm_for(request.distance_mm);
         let axis = self.point_of_tan(DVec2::ZERO);
         let on_axis =
@@ -231,6 +232,27 @@ impl Bench {
             grid: straight.map_or_else(Vec::new, |straight| self.grid(&fields, &straight)),
             fields: field_rows(&fields),
             curves: field_rows(&curve_fields),
+        })
+    }
+
+    /// Returns a sentence on lit fields whose chief ray a rim or an opening stops; that it is stopped by an obscuration goes without saying.
+    fn note_on_chief_rays(&self, lens: &Lens, fields: &[Field]) -> Option<String> {
+        if lens.apertures().iter().any(|aperture| aperture.is_obscuration) {
+            return None;
+        }
+        let mono = self.reference();
+        let is_stopped = |field: &&Field| {
+            let point = self.point(field);
+            let mut chief = PupilCoordinates::stop(mono).rays(mono, &point, &[DVec2::ZERO]);
+            mono.trace(&mut chief, Vignetting::On);
+            chief.n_in_flight() == 0 && PupilLight::to_film(mono, &point, self.film_distance_mm, self.rule).is_some()
+        };
+        let labels: Vec<String> = fields.iter().filter(is_stopped).map(|field| field.place.label()).collect();
+        (!labels.is_empty()).then(|| {
+            format!(
+                "the chief ray of {} is stopped: heights, path differences and wavefronts are about where it would land",
+                labels.join(", ")
+            )
         })
     }
 

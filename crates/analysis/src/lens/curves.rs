@@ -3,12 +3,13 @@
 
 use dioptric_diffraction::{PupilGrid, Wavefront, WavefrontReference};
 use dioptric_optics::{
-    Lens, MonoLens, PupilRegion,
+    Lens, MonoLens, PupilRegion, SeidelSettings,
     analysis::{PupilLight, PupilRule},
 };
 use rayon::prelude::*;
 
 use super::{
+    afocal::AfocalView,
     request::Field,
     rows::{FieldPlace, LensAnalysis},
 };
@@ -26,6 +27,8 @@ const FOCUS_STEPS: i32 = 16;
 /// Rings of the rays that stand for the light, and azimuths of the outline of a pupil.
 const RINGS: usize = 8;
 const AZIMUTHS: usize = 96;
+/// The widest field whose chief ray first-order theory is asked for, degrees.
+const WIDEST_CHIEF_DEG: f64 = 45.0;
 
 /// Curves of a lens that was analyzed, each with the name that its file has.
 #[derive(Clone, Debug, PartialEq)]
@@ -41,14 +44,23 @@ impl LensAnalysis {
         let reference = lens.at(self.reference_nm)?;
         let dioptres = 1e3 / (self.distance_mm + reference.projection_center_z_mm());
         let bench = Bench { analysis: self, lens, lenses, reference, dioptres };
-        Ok(LensCurves(vec![
+        let mut curves = vec![
             ("chromatic_focal_shift", bench.chromatic_focal_shift()),
             ("rms_over_field", bench.spots_over_field()),
             ("wavefront_over_field", bench.wavefronts_over_field()),
             ("rms_over_focus", bench.spots_over_focus()),
             ("rms_over_wavelength", bench.spots_over_wavelength()),
             ("vignetting", bench.vignetting()),
-        ]))
+        ];
+        curves.extend(bench.y_ybar().map(|chart| ("y_ybar", chart)));
+        if self.afocal.is_some() {
+            let in_angles = |(name, chart)| match name {
+                "y_ybar" => (name, chart),
+                _ => (name, AfocalView::chart_in_angles(chart)),
+            };
+            curves = curves.into_iter().map(in_angles).collect();
+        }
+        Ok(LensCurves(curves))
     }
 }
 
@@ -165,6 +177,31 @@ impl Bench<'_> {
         }
         let x = ("wavelength, nm", (wavelengths_nm[0], wavelengths_nm[WAVELENGTHS]));
         chart("RMS spot radius over wavelength", x, "rms radius, µm", series)
+    }
+
+    /// The heights of the marginal over those of the chief ray at each surface and at the image, to first order (Delano's diagram); `None` of
+    /// lenses without third-order sums.
+    fn y_ybar(&self) -> Option<LineChart> {
+        let widest_deg = self.analysis.fields.iter().map(|row| row.place.field_deg).fold(0.0, f64::max);
+        let field_deg = if widest_deg > 0.0 { widest_deg.min(WIDEST_CHIEF_DEG) } else { 1.0 };
+        let nm = self.analysis.reference_nm;
+        let settings = SeidelSettings {
+            wavelength_nm: nm,
+            colors_nm: [nm; 2],
+            object_distance_mm: self.analysis.distance_mm,
+            chief_slope: field_deg.to_radians().tan(),
+        };
+        let heights_mm = self.lens.seidel(&settings).ok()?.heights_mm;
+        let points: Vec<(f64, f64)> = heights_mm.iter().map(|&[marginal, chief]| (chief, marginal)).collect();
+        if !points.iter().all(|(x, y)| x.is_finite() && y.is_finite()) {
+            return None;
+        }
+        let (low, high) =
+            points.iter().fold((0.0_f64, 0.0_f64), |ends, point| (ends.0.min(point.0), ends.1.max(point.0)));
+        let room = 0.05 * (high - low).max(1e-9);
+        let title = format!("y–ȳ diagram, chief ray of {field_deg:.1}°");
+        let x = ("chief ray, mm", (low - room, high + room));
+        Some(chart(&title, x, "marginal ray, mm", vec![line(None, palette::line(0), points)]))
     }
 
     /// The area of the pupil that each field sees, over that of the axis: rims and obscurations, and how the pupil is foreshortened.

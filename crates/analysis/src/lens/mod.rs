@@ -1,11 +1,13 @@
 //! Lenses as tables: first-order data, surfaces, glasses, explicit rays, and an analysis by real rays.
 
 mod afocal;
+mod comparison;
 mod compute;
 mod convert;
 mod curves;
 mod defaults;
 mod film;
+mod footprint;
 mod glass_table;
 mod modulation;
 mod page_data;
@@ -17,11 +19,13 @@ mod table;
 mod trace_table;
 
 pub use afocal::AfocalView;
+pub use comparison::{ComparedLens, ComparisonRow, LensComparison};
 pub use compute::GRID_LINES;
 pub use convert::{ConvertedLens, convert_lens};
 pub use curves::{LensCurves, ends_of};
 pub use defaults::LensDefaults;
 pub use film::{AnalysisFilm, FilmPlace, FilmUse};
+pub use footprint::Footprint;
 pub use glass_table::{GlassData, GlassRow, glass_data, glass_rows};
 pub use modulation::LensModulation;
 pub use page_data::LensPageData;

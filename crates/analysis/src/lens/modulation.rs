@@ -6,6 +6,7 @@ use dioptric_diffraction::{TransferFunction, TransferQuality};
 use dioptric_optics::{Lens, MonoLens, glam::DVec2};
 use rayon::prelude::*;
 
+use super::afocal::AfocalView;
 use super::{
     request::Field,
     rows::{FieldPlace, LensAnalysis},
@@ -64,11 +65,14 @@ impl LensAnalysis {
         }
         let reach_per_mm = reach_per_mm(&at_fields);
         let frequencies = round_frequencies(reach_per_mm);
-        Ok(LensModulation {
-            over_frequency: bench.over_frequency(&fields, &at_fields, reach_per_mm),
-            over_field: bench.over_field(frequencies),
-            through_focus: bench.through_focus(&fields, frequencies[1]),
-        })
+        let charts = [
+            bench.over_frequency(&fields, &at_fields, reach_per_mm),
+            bench.over_field(frequencies),
+            bench.through_focus(&fields, frequencies[1]),
+        ];
+        let [over_frequency, over_field, through_focus] =
+            if self.afocal.is_some() { charts.map(AfocalView::chart_in_angles) } else { charts };
+        Ok(LensModulation { over_frequency, over_field, through_focus })
     }
 }
 

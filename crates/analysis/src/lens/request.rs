@@ -69,13 +69,16 @@ pub(super) struct Field {
 impl Field {
     fn of_angles(angles_deg: [f64; 2]) -> Self {
         let FieldAngles { angle_deg, direction } = FieldAngles::of_deg(angles_deg);
-        let place = FieldPlace { field_deg: angle_deg, field_xy_deg: angles_deg, object_mm: None };
+        let direction_xy = direction.to_array();
+        let place =
+            FieldPlace { field_deg: angle_deg, field_xy_deg: angles_deg, direction: direction_xy, object_mm: None };
         Self { place, angle_rad: angle_deg.to_radians(), direction }
     }
 
     /// Returns the field of this name.
     pub(super) fn of_place(place: &FieldPlace) -> Self {
-        Self { place: *place, ..Self::of_angles(place.field_xy_deg) }
+        let direction = DVec2::from_array(place.direction);
+        Self { place: *place, angle_rad: place.field_deg.to_radians(), direction }
     }
 
     /// Returns the field at this angle in a direction, a unit vector.
@@ -84,9 +87,9 @@ impl Field {
             (true, _) => Self::of_angles([0.0, direction.y * field_deg]),
             (_, true) => Self::of_angles([direction.x * field_deg, 0.0]),
             (false, false) => {
-                let tan = direction * field_deg.to_radians().tan();
-                let field_xy_deg = tan.to_array().map(|tan| tan.atan().to_degrees());
-                let place = FieldPlace { field_deg, field_xy_deg, object_mm: None };
+                let (sine, cosine) = field_deg.to_radians().sin_cos();
+                let field_xy_deg = direction.to_array().map(|part| (sine * part).atan2(cosine).to_degrees());
+                let place = FieldPlace { field_deg, field_xy_deg, direction: direction.to_array(), object_mm: None };
                 Self { place, angle_rad: field_deg.to_radians(), direction }
             }
         }

@@ -78,6 +78,9 @@ pub struct FieldPlace {
     pub field_deg: f64,
     /// Angles in the x–z and in the y–z plane, degrees.
     pub field_xy_deg: [f64; 2],
+    /// The unit vector from the axis to the point, which the angles do not tell at 90°.
+    #[serde(skip)]
+    pub direction: [f64; 2],
     /// The object point, mm from the axis, where it was asked for so.
     pub object_mm: Option<[f64; 2]>,
 }

@@ -1,7 +1,8 @@
 //! A lens described in numbers.
 
 use dioptric_optics::{
-    C_LINE_NM, F_LINE_NM, FirstOrder, Lens, LensFile, MonoLens, SeidelSettings, SeidelSums, analysis::field_limits_deg,
+    C_LINE_NM, F_LINE_NM, FirstOrder, Lens, LensFile, MonoLens, SchematicEye, SeidelSettings, SeidelSums,
+    analysis::field_limits_deg,
 };
 use serde::Serialize;
 
@@ -318,7 +319,9 @@ pub struct LensRow {
 /// # Errors
 /// Never; the built-in lenses are held to by tests.
 pub fn built_in_lenses() -> Result<Vec<LensRow>, PipelineError> {
+    // Eyes are named by their accommodation; relaxed ones stand for them.
     Lens::built_in_names()
+        .chain(SchematicEye::NAMES)
         .map(|name| {
             let lens = Lens::built_in(name)?;
             let first = lens.at(dioptric_pipeline::REFERENCE_WAVELENGTH_NM)?.first_order();

@@ -6,7 +6,9 @@ mod dual_pixel;
 mod pixel_optics;
 mod statistics;
 
-use dioptric_pipeline::{AberrationSummary, Camera, Capture, FilmPart, PipelineError, Quality, SceneSource};
+use dioptric_pipeline::{
+    AberrationSummary, Camera, Capture, FilmPart, PipelineError, SceneSource, display::LEAST_DARK_FRACTION, number,
+};
 use dioptric_psf::{Diffraction, LensImageModel};
 use dioptric_scene::{Pattern, SceneLight};
 use dioptric_spectrum::{ColorTemperature, DepthMap};
@@ -179,16 +181,36 @@ fn note_on_coarse_samples(run: &Run<'_>) -> Option<String> {
         SceneSource::Target { pattern, .. } => *pattern == Pattern::Uniform,
         SceneSource::File(_) | SceneSource::StillLife { .. } => false,
     };
-    if is_computed || capture.quality != Quality::Full {
+    if is_computed {
         return None;
     }
-    let sample_um = 1e3 * capture.lens.reference.first_order().efl_mm.abs() * capture.scene.sample_tangent?;
-    let pixels = sample_um / capture.place.pitch_um;
+    // Of a preview that has fewer of both, those of the full picture.
+    let tangent = capture.scene.sample_tangent? / capture.scene.binning as f64;
+    let sample_um = 1e3 * capture.lens.reference.first_order().efl_mm.abs() * tangent;
+    let pixels = sample_um / capture.place.pixel_pitch_um();
     (pixels > COARSE_PIXELS && pixels.is_finite()).then(|| {
         format!(
             "{}: its samples are {pixels:.1} pixels apart, which sets how sharp the picture can be: more of them, or a narrower field of view, \
              show what the lens does",
             capture.scene.name
+        )
+    })
+}
+
+/// Returns in a sentence where the picture of a panorama ends, where the film is dark beyond.
+fn note_on_panorama(run: &Run<'_>) -> Option<String> {
+    let capture = run.capture;
+    let dark = capture.irradiance.summary.dark_fraction();
+    let understood = capture.scene.notes.first()?;
+    let is_panorama = capture.camera.scene.reading.panorama.is_some() || understood.contains(" of a panorama of ");
+    let fov_deg = capture.camera.scene.field_of_view_deg?;
+    (is_panorama && dark > LEAST_DARK_FRACTION).then(|| {
+        format!(
+            "{}: what is seen of the panorama ends {} degrees to either side of the axis, and {:.1} % of the film are dark: a larger field of \
+             view, below 180 degrees, shows more; a lens that sees behind itself takes it as a sky (dioptric render WORLD --sky FILE)",
+            capture.scene.name,
+            number(0.5 * fov_deg),
+            100.0 * dark
         )
     })
 }
@@ -243,7 +265,7 @@ impl RunReport {
                     let narrow = narrow.and_then(|narrow| narrow.note());
                     let points = capture.irradiance.summary.unseen_points.and_then(|points| points.note());
                     let notes = scene.notes.iter().cloned().chain(narrow).chain(points);
-                    notes.chain(note_on_coarse_samples(run)).collect()
+                    notes.chain(note_on_coarse_samples(run)).chain(note_on_panorama(run)).collect()
                 },
             },
             irradiance: IrradianceData {

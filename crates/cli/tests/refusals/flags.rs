@@ -108,7 +108,7 @@ pub(crate) const LINES: &[(&str, &str)] = &[
     ("psf dgauss-50mm --focus-mm -5", "--focus-mm is -5, expected "),
     (
         "psf dgauss-50mm --focus-mm 2000 --fields-deg 91",
-        "psf: fields_deg is 91, expected angles of up to 120 degrees along",
+        "psf: fields_deg is 91, expected angles of up to 120 degrees from the axis",
     ),
     ("psf dgauss-50mm --distances-mm inf --fields-deg 121", "psf: fields_deg is 121, expected angles of up to 120 deg"),
     ("psf dgauss-50mm --distances-mm inf --mode paper --fields-deg 95", "below 90 degrees in the paper mode"),

@@ -74,6 +74,13 @@ impl LensFile {
             "len" => len::lens_from_len(&text, &name, &glasses),
             "zmx" => zmx::lens_from_zmx(&text, &name, glasses),
             "seq" => seq::lens_from_seq(&text, &name, glasses),
+            "zar" | "zos" => {
+                let reason = format!(
+                    "the layout of .{extension} files is not published: save the lens as .zmx (of an archive, \
+                     Extract Archive) and read that, its glasses with --glasses"
+                );
+                return Err(OpticsError::Io { path: path.to_owned(), reason });
+            }
             _ => {
                 let expected = "expected .ron, .dat, .txt, .json, .zmx, .seq, .len or .lens";
                 let reason = format!("the extension '.{extension}' is no lens format; {expected}");

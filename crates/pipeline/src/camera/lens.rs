@@ -3,7 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use dioptric_optics::{
-    GlassCatalogue, GlassRange, IdealLens, Lens, LensFile, MissingGlass, ReadOptions, SeqNumbers, SurfaceChange,
+    GlassCatalogue, GlassRange, IdealLens, Lens, LensFile, MissingGlass, ReadOptions, SchematicEye, SeqNumbers,
+    SurfaceChange,
 };
 use dioptric_sensor::Sensor;
 use serde::{Deserialize, Serialize};
@@ -33,8 +34,9 @@ impl LensSpec {
             Some(Err(_)) if !Path::new(text).exists() => return Self::BuiltIn(text.to_owned()),
             _ => {}
         }
-        // Names such as fisheye-12.5mm look as though they had an extension.
-        let is_built_in = Lens::built_in_names().any(|name| name == text);
+        // Names such as fisheye-12.5mm and eye:arizona:2.5D look as though they had an extension.
+        let is_eye = SchematicEye::named(text).is_some() && !Path::new(text).exists();
+        let is_built_in = is_eye || Lens::built_in_names().any(|name| name == text);
         if !is_built_in && is_path(text) { Self::File(PathBuf::from(text)) } else { Self::BuiltIn(text.to_owned()) }
     }
 
@@ -83,7 +85,7 @@ impl LensSpec {
         let options = reading.options()?;
         let mut file = match self {
             Self::File(path) => LensFile::read(path, &options)?,
-            Self::BuiltIn(name) => LensFile::from(Lens::built_in(name)?),
+            Self::BuiltIn(name) => LensFile::built_in(name)?,
             Self::Thin { focal_length_mm, diameter_mm } => LensFile::from(Lens::thin(*focal_length_mm, *diameter_mm)?),
             Self::Pinhole { diameter_mm } => LensFile::from(Lens::pinhole(*diameter_mm)?),
             Self::Changed { lens, surfaces } => {
@@ -95,6 +97,9 @@ impl LensSpec {
         // A file has chosen already, and names itself where it cannot.
         if let (Some(number), false) = (reading.configuration, matches!(self, Self::File(_))) {
             file = file.with_configuration(number)?;
+        }
+        if let Some(factor) = reading.lens_scale {
+            file = file.scaled(factor)?;
         }
         let lenses = file.configurations.iter_mut().map(|configuration| &mut configuration.lens);
         for lens in lenses.chain([&mut file.lens]) {
@@ -173,6 +178,9 @@ pub struct LensReadOptions {
     pub glass_range: GlassRange,
     /// The change of index a nanometre, about [`REFERENCE_WAVELENGTH_NM`], of the media of which only one index is stated.
     pub slope_per_nm: Option<f64>,
+    /// How many times as large the lens is as its prescription has it, in all its lengths; `None` for as large. What is changed of a lens
+    /// ([`LensSpec::Changed`]) is changed of the larger one.
+    pub lens_scale: Option<f64>,
     /// What the numbers of surfaces are in a CODE V file that says neither radii nor curvatures; `None` for what is plausible.
     pub seq_numbers: Option<SeqNumbers>,
     /// Which configuration of a lens file that has several, as the positions of a zoom lens, counted from 1; `None` for the one that the

@@ -385,6 +385,9 @@ impl Camera {
         if let Some(slope_per_nm) = self.lens_reading.slope_per_nm {
             checker.number("slope_per_nm", slope_per_nm)?;
         }
+        if let Some(lens_scale) = self.lens_reading.lens_scale {
+            checker.number("lens_scale", lens_scale)?;
+        }
         match self.stop {
             StopSpec::FNumber(n) => checker.number("FNumber", n)?,
             StopSpec::DiameterMm(d) => checker.number("DiameterMm", d)?,

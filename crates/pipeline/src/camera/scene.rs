@@ -67,6 +67,10 @@ pub struct SceneSpec {
     /// Scales the radiance to this mean luminance, cd/m²; nothing is scaled unless this is given.
     #[serde(default)]
     pub mean_luminance_cd_m2: Option<f64>,
+    /// Scales the light of the scene so that the illuminance of what is simulated of the film is this on average, lux; of any scene,
+    /// worlds too.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mean_lux: Option<f64>,
 }
 
 /// Whether nothing is said of a file.
@@ -164,6 +168,7 @@ impl SceneSpec {
             illuminance_lux: None,
             light: None,
             mean_luminance_cd_m2: None,
+            mean_lux: None,
         }
     }
 
@@ -176,6 +181,13 @@ impl SceneSpec {
         }
         if let Some(luminance) = self.mean_luminance_cd_m2 {
             checker.number("mean_luminance_cd_m2", luminance)?;
+        }
+        if let Some(lux) = self.mean_lux {
+            checker.number("mean_lux", lux)?;
+        }
+        if self.mean_lux.is_some() && self.mean_luminance_cd_m2.is_some() {
+            let found = "a level of the film beside one of the scene";
+            checker.wrong("mean_lux", found, "one of mean_lux and mean_luminance_cd_m2: either sets the other")?;
         }
         if let Some(level) = self.white_level {
             checker.number("white_level", level)?;

@@ -13,7 +13,7 @@ use super::{
     band_store::BandKeeping,
     bank,
     electrons::{self, PixelRates},
-    film::{self, FilmPlace},
+    film::{self, FilmPlace, Outline},
     frames::{self, FrameSet, MovedLight},
     irradiance::{self, Irradiance, Keeping},
     lens::{self, ResolvedLens, check_glasses},
@@ -87,13 +87,13 @@ impl Chain<'_> {
     }
 
     pub(super) fn summary(&self, inputs: &SceneInputs) -> Result<Arc<SceneSummary>, PipelineError> {
-        self.kept.summary.get_or_make(inputs.clone(), |inputs| SceneSummary::of(&self.scene(inputs)?.scene))
+        self.kept.summary.get_or_make(inputs.clone(), |inputs| SceneSummary::of(&*self.scene(inputs)?))
     }
 
     pub(super) fn film(&self, inputs: &FilmInputs, scene: &SceneInputs) -> Result<Arc<FilmPlace>, PipelineError> {
         self.kept.film.get_or_make(inputs.clone(), |inputs| {
-            let scene = self.scene(scene)?;
-            film::place(inputs, &*self.lens(&inputs.lens)?, &scene)
+            let resolved = self.scene(scene)?;
+            film::place(inputs, &*self.lens(&inputs.lens)?, &Outline::of(&resolved.scene)?, resolved.binning)
         })
     }
 
@@ -134,27 +134,32 @@ impl Chain<'_> {
     }
 
     pub(super) fn irradiance(&self, inputs: &IrradianceInputs) -> Result<Arc<Irradiance>, PipelineError> {
-        self.kept.irradiance.get_or_make(inputs.clone(), |inputs| {
-            if let Some(spec) = inputs.dual_pixel {
-                let irradiance = self.irradiance_of_photodiodes(inputs, spec)?;
-                self.make_room_for_film(inputs, &irradiance)?;
-                return Ok(irradiance);
-            }
-            if let Some(effort) = inputs.effort {
-                let place = self.film(&inputs.plan.bank.film, &inputs.scene)?;
-                let n_bands = self.summary(&inputs.scene)?.wavelengths_nm.len();
-                self.budget.map_or(Ok(()), |budget| budget.check_rendering_on(&place, n_bands))?;
-                let picture = self.world_render(inputs)?.render(effort, &self.watch)?;
-                return Ok(Irradiance::of_image(picture, place.pitch_um));
-            }
-            if inputs.micro_array.is_some() {
-                let reason = "only rays from the film go through its array, expected a world with method: Backward";
-                return Err(PipelineError::Unsuitable { what: "light_field", reason: reason.to_owned() });
-            }
-            let irradiance = self.imaged(inputs)?;
+        self.kept
+            .irradiance
+            .get_or_make(inputs.clone(), |inputs| self.irradiance_as_lit(inputs)?.with_mean_lux(inputs.mean_lux))
+    }
+
+    /// Returns the irradiance under the light that the scene has.
+    fn irradiance_as_lit(&self, inputs: &IrradianceInputs) -> Result<Irradiance, PipelineError> {
+        if let Some(spec) = inputs.dual_pixel {
+            let irradiance = self.irradiance_of_photodiodes(inputs, spec)?;
             self.make_room_for_film(inputs, &irradiance)?;
-            Ok(irradiance)
-        })
+            return Ok(irradiance);
+        }
+        if let Some(effort) = inputs.effort {
+            let place = self.film(&inputs.plan.bank.film, &inputs.scene)?;
+            let n_bands = self.summary(&inputs.scene)?.wavelengths_nm.len();
+            self.budget.map_or(Ok(()), |budget| budget.check_rendering_on(&place, n_bands))?;
+            let picture = self.world_render(inputs)?.render(effort, &self.watch)?;
+            return Ok(Irradiance::of_image(picture, place.pitch_um));
+        }
+        if inputs.micro_array.is_some() {
+            let reason = "only rays from the film go through its array, expected a world with method: Backward";
+            return Err(PipelineError::Unsuitable { what: "light_field", reason: reason.to_owned() });
+        }
+        let irradiance = self.imaged(inputs)?;
+        self.make_room_for_film(inputs, &irradiance)?;
+        Ok(irradiance)
     }
 
     /// Lets go of plans, then of scenes but for the depth, where the budget does not hold them beside what becomes of the irradiance.

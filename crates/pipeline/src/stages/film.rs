@@ -1,19 +1,46 @@
 //! Where the film is, and how large it is.
 
+use std::borrow::Cow;
+
 use dioptric_forward::Film;
 use dioptric_optics::{MonoLens, ObjectPoint, Vignetting, glam::DVec2, rays_towards};
-use dioptric_scene::{Scene, View};
+use dioptric_scene::{Scene, View, flat_size_of};
+use dioptric_spectrum::DepthMap;
 use serde::{Deserialize, Serialize};
 
 use super::{
     lens::ResolvedLens,
-    scene::ResolvedScene,
     spec::{FilmInputs, Raster},
 };
-use crate::{Crop, FocusSpec, Movements, PipelineError, Quality, display::level_at};
+use crate::{Crop, FocusSpec, Movements, PipelineError, Quality, SceneSource, SceneSpec, display::level_at};
 
 /// The share of the scene's samples that may be nearer than the near object.
 const NEAR_SHARE: f64 = 0.02;
+
+/// What decides how large a film a scene fills: how many samples it has, where they lie and how far away they are.
+pub(super) struct Outline<'a> {
+    rows: usize,
+    columns: usize,
+    view: View,
+    depth: Cow<'a, DepthMap>,
+}
+
+impl<'a> Outline<'a> {
+    pub(super) fn of(scene: &'a Scene) -> Result<Self, PipelineError> {
+        let (view, depth) = (scene.require_view()?, Cow::Borrowed(scene.require_depth()?));
+        Ok(Self { rows: scene.rows(), columns: scene.columns(), view, depth })
+    }
+
+    /// Returns that of a flat scene, as large and as far away as its file and its choice tell without its samples; `None` where they do not.
+    pub(super) fn of_flat(choice: &SceneSpec) -> Result<Option<Outline<'static>>, PipelineError> {
+        let SceneSource::File(path) = &choice.source else { return Ok(None) };
+        let (Some(fov_deg), Some(depth_m)) = (choice.field_of_view_deg, choice.depth_m) else { return Ok(None) };
+        let Some((rows, columns)) = flat_size_of(path, &choice.reading) else { return Ok(None) };
+        let view = View::from_horizontal_fov_deg(fov_deg, columns, rows)?;
+        let depth = DepthMap::flat(1, 1, depth_m).map_err(dioptric_scene::SceneError::from)?;
+        Ok(Some(Outline { rows, columns, view, depth: Cow::Owned(depth) }))
+    }
+}
 
 /// The film behind the lens.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -97,18 +124,19 @@ impl FilmPlace {
     }
 }
 
-/// Places the film and chooses its samples.
+/// Places the film and chooses its samples; `scene_binning` samples of the source are one of the scene, each way.
 pub(super) fn place(
     inputs: &FilmInputs,
     lens: &ResolvedLens,
-    resolved: &ResolvedScene,
+    scene: &Outline<'_>,
+    scene_binning: usize,
 ) -> Result<FilmPlace, PipelineError> {
-    let (reference, scene) = (&lens.reference, &resolved.scene);
+    let reference = &lens.reference;
     let film_distance_mm = place_film(inputs.focus, reference, scene)?;
     let (film, binning) = match inputs.raster {
         Raster::Pixels(full) => binned(&full, inputs.geometry.quality),
         // As coarse as the scene is by now.
-        Raster::Scene => (size_film(reference, film_distance_mm, scene)?, resolved.binning),
+        Raster::Scene => (size_film(reference, film_distance_mm, scene)?, scene_binning),
         Raster::Field(sensor) => {
             let covered = size_film(reference, film_distance_mm, scene)?;
             binned(&covered_pixels(&sensor, &covered), inputs.geometry.quality)
@@ -155,12 +183,12 @@ fn covered_pixels(sensor: &Film, covered: &Film) -> Film {
     Film::centered(count(covered.rows, sensor.rows), count(covered.columns, sensor.columns), sensor.pitch_um)
 }
 
-fn place_film(focus: FocusSpec, lens: &MonoLens, scene: &Scene) -> Result<f64, PipelineError> {
+fn place_film(focus: FocusSpec, lens: &MonoLens, scene: &Outline<'_>) -> Result<f64, PipelineError> {
     match focus {
         FocusSpec::FilmMm(film_distance_mm) => Ok(film_distance_mm),
         FocusSpec::DistanceMm(distance_mm) => Ok(lens.film_distance_mm_for(distance_mm)?),
         FocusSpec::NearObject => {
-            let z_mm = 1e3 * near_depth_m(scene)?;
+            let z_mm = 1e3 * level_at(&[scene.depth.z_m()], NEAR_SHARE);
             Ok(lens.film_distance_mm_for(z_mm - lens.projection_center_z_mm())?)
         }
     }
@@ -178,15 +206,10 @@ pub(super) fn film_distances_mm(focus: FocusSpec, lens: &MonoLens) -> Result<[f6
     }
 }
 
-/// Returns the depth that a small share of the samples do not reach.
-fn near_depth_m(scene: &Scene) -> Result<f64, PipelineError> {
-    Ok(level_at(&[scene.require_depth()?.z_m()], NEAR_SHARE))
-}
-
 /// Returns as many pixels as the scene has samples about the axis, of such a pitch that they see the scene's field.
-fn size_film(lens: &MonoLens, film_distance_mm: f64, scene: &Scene) -> Result<Film, PipelineError> {
-    let view = scene.require_view()?;
-    let (rows, columns) = seen_evenly(&view, scene.rows(), scene.columns())?;
+fn size_film(lens: &MonoLens, film_distance_mm: f64, scene: &Outline<'_>) -> Result<Film, PipelineError> {
+    let view = scene.view;
+    let (rows, columns) = seen_evenly(&view, scene.rows, scene.columns)?;
     let (half_rows, half_columns) = (0.5 * rows as f64, 0.5 * columns as f64);
     let half = DVec2::new(half_columns, half_rows);
     let seen_um = match lens.is_rotational() {
@@ -194,7 +217,7 @@ fn size_film(lens: &MonoLens, film_distance_mm: f64, scene: &Scene) -> Result<Fi
         false => seen_pitch_of_any_um(lens, film_distance_mm, &view, half),
     };
     // Blur mixes the rim of the scene with the dark beyond.
-    let half_um = seen_um * half_rows.min(half_columns) - 1e3 * widest_blur_mm(lens, film_distance_mm, scene)?;
+    let half_um = seen_um * half_rows.min(half_columns) - 1e3 * widest_blur_mm(lens, film_distance_mm, &scene.depth);
     let pitch_um = half_um / half_rows.min(half_columns);
     if !(pitch_um.is_finite() && pitch_um > 0.0) {
         let reason = format!("the film at {film_distance_mm} mm sees no upright picture of the scene");
@@ -264,16 +287,16 @@ fn chief_ray_mm(lens: &MonoLens, field_tan: DVec2, film_distance_mm: f64) -> Opt
 }
 
 /// Returns the radius of the largest blur of the scene on the axis, mm, by first order.
-fn widest_blur_mm(lens: &MonoLens, film_distance_mm: f64, scene: &Scene) -> Result<f64, PipelineError> {
+fn widest_blur_mm(lens: &MonoLens, film_distance_mm: f64, depth: &DepthMap) -> f64 {
     let first = lens.first_order();
-    let (near_m, far_m) = scene.require_depth()?.range_m();
+    let (near_m, far_m) = depth.range_m();
     let focus_dioptres = match lens.object_distance_mm_for(film_distance_mm) {
         Ok(distance_mm) => 1e3 / (distance_mm + lens.projection_center_z_mm()),
-        Err(_) => return Ok(0.0),
+        Err(_) => return 0.0,
     };
     let farthest = [1.0 / near_m, 1.0 / far_m].map(|d| (d - focus_dioptres).abs()).into_iter().fold(0.0, f64::max);
     let radius_mm = 0.5e-3 * first.entrance_pupil_diameter_mm * farthest * height_per_tan_mm(lens, film_distance_mm);
-    Ok(if radius_mm.is_finite() { radius_mm } else { 0.0 })
+    if radius_mm.is_finite() { radius_mm } else { 0.0 }
 }
 
 #[cfg(test)]

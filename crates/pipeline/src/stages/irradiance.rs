@@ -9,7 +9,9 @@ use std::{
 };
 
 use dioptric_forward::{ImagingPlan, ImagingTimes, Source};
-use dioptric_scene::{ExrSamples, Scene, SpectralHead, read_spectral_exr};
+use dioptric_scene::{
+    ExrSamples, IsetIrradiance, Scene, SpectralHead, read_exr_light, read_iset_irradiance, read_spectral_exr,
+};
 use dioptric_spectrum::{Bands, Illuminant, Observer, Quantity, SpectralImage, SpectrumError, WavelengthGrid};
 use ndarray::{Array2, Array3, ArrayView3, Axis, s};
 
@@ -46,6 +48,8 @@ pub struct Irradiance {
     size: (usize, usize),
     pitch_um: f64,
     planes: Planes,
+    /// What samples of a file of bands are multiplied by.
+    file_factor: f32,
     /// What falls on each of the photodiodes that it is the sum of; none for whole pixels.
     photodiodes: Vec<Self>,
     /// The file that it was read from as it was then, and how that holds its samples.
@@ -79,6 +83,8 @@ pub struct IrradianceSummary {
     pub seen: LinearRgb,
     /// The sum of all bands; without pixels where it is that of a photodiode.
     total: Array2<f32>,
+    /// How many times as strong the light of the scene is as its source has it, for the mean illuminance that was asked for; 1 where none was.
+    pub factor: f64,
     /// Surfaces narrower than the pupil, where the scene has any and was imaged in layers of depth.
     pub narrow_surfaces: Option<NarrowSurfaces>,
     /// Of points beside the scene those that no pixel sees.
@@ -89,6 +95,15 @@ impl IrradianceSummary {
     /// Returns the share of the film's samples that get next to nothing of the mean light, visible or not.
     pub fn dark_fraction(&self) -> f64 {
         dark_fraction(&self.total)
+    }
+
+    fn brighten(&mut self, factor: f64) {
+        let of_samples = factor as f32;
+        self.mean.iter_mut().chain(&mut self.max).for_each(|number| *number *= factor);
+        self.mean_lux *= factor;
+        self.seen.planes.iter_mut().for_each(|plane| *plane *= of_samples);
+        self.total *= of_samples;
+        self.factor *= factor;
     }
 }
 
@@ -143,7 +158,7 @@ impl Irradiance {
             }
         }
         let planes = if is_kept { Planes::Memory(cube) } else { Planes::Sums };
-        Ok(Self { grid, size, pitch_um, planes, photodiodes, stored: None, summary: summing.summary })
+        Ok(Self { grid, size, pitch_um, planes, file_factor: 1.0, photodiodes, stored: None, summary: summing.summary })
     }
 
     /// The distance between samples on the film, µm.
@@ -217,7 +232,8 @@ impl Irradiance {
             }
             Planes::File(file) => {
                 let mut file = file.lock().unwrap_or_else(PoisonError::into_inner);
-                read_rows(&mut file, band, rows, self.size).map_err(|error| error.to_string())
+                let samples = read_rows(&mut file, band, rows, self.size).map_err(|error| error.to_string())?;
+                Ok(samples.into_iter().map(|sample| self.file_factor * sample).collect())
             }
             Planes::Sums => {
                 let mut sums = vec![0.0; rows.len() * self.size.1];
@@ -228,6 +244,22 @@ impl Irradiance {
                 Ok(sums)
             }
         }
+    }
+
+    /// Reads it from a spectral EXR, as [`read_exr`](Self::read_exr) does, or from an optical image of `ISETCam` (`.mat`); with the light on the
+    /// scene where the file states it, and what it says of how it was read, a sentence each.
+    ///
+    /// # Errors
+    /// When the file cannot be read, or holds no irradiance.
+    pub fn read(path: &Path, pitch_um: Option<f64>) -> Result<(Self, Option<Illuminant>, Vec<String>), PipelineError> {
+        if !path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("mat")) {
+            return Ok((Self::read_exr(path, pitch_um)?, stated_light(path)?, vec![]));
+        }
+        let IsetIrradiance { image, light, notes } = read_iset_irradiance(path)?;
+        let pitch_um = image.pitch_um().or(pitch_um);
+        let reason = "it states no distance between its samples".to_owned();
+        let pitch_um = pitch_um.ok_or(PipelineError::Read { path: path.to_owned(), reason })?;
+        Ok((Self::of_image(image, pitch_um), light.map(|light| light.illuminant), notes))
     }
 
     /// Reads it from a spectral EXR; one without a distance between samples has that of the film given.
@@ -245,6 +277,35 @@ impl Irradiance {
         let pitch_um = image.pitch_um().or(pitch_um);
         let pitch_um = pitch_um.ok_or_else(|| in_file("it states no distance between its samples".to_owned()))?;
         Ok(Self::of_image(image, pitch_um))
+    }
+
+    /// Returns the irradiance of a scene that is so many times as bright that this is its mean illuminance, lux; as it is where none is asked for.
+    ///
+    /// # Errors
+    /// When nobody sees the light on the film, which no factor makes brighter.
+    pub(super) fn with_mean_lux(mut self, wanted_lux: Option<f64>) -> Result<Self, PipelineError> {
+        let Some(wanted_lux) = wanted_lux else { return Ok(self) };
+        let factor = wanted_lux / self.summary.mean_lux;
+        if !(factor.is_finite() && factor > 0.0 && (factor as f32).is_normal()) {
+            let reason = format!(
+                "is to be {wanted_lux} lx, but the film has {} lx of visible light: expected a scene that lights it in visible bands",
+                self.summary.mean_lux
+            );
+            return Err(PipelineError::Unsuitable { what: "mean_lux", reason });
+        }
+        self.brighten(factor);
+        Ok(self)
+    }
+
+    fn brighten(&mut self, factor: f64) {
+        let of_samples = factor as f32;
+        match &mut self.planes {
+            Planes::Memory(cube) => cube.par_mapv_inplace(|sample| of_samples * sample),
+            Planes::File(_) => self.file_factor *= of_samples,
+            Planes::Sums => {}
+        }
+        self.photodiodes.iter_mut().for_each(|part| part.brighten(factor));
+        self.summary.brighten(factor);
     }
 
     /// Returns it with the surfaces that are narrower than the pupil.
@@ -281,6 +342,7 @@ impl Irradiance {
             size,
             pitch_um,
             planes: Planes::Memory(cube),
+            file_factor: 1.0,
             photodiodes: Vec::new(),
             stored: None,
             summary: summing.summary,
@@ -314,11 +376,23 @@ impl Bands for Irradiance {
             Planes::File(file) => {
                 let mut file = file.lock().unwrap_or_else(PoisonError::into_inner);
                 let plane = read_plane(&mut file, band, self.size);
-                plane.map(Cow::Owned).map_err(|error| SpectrumError::Band { band, reason: error.to_string() })
+                plane
+                    .map(|plane| Cow::Owned(plane * self.file_factor))
+                    .map_err(|error| SpectrumError::Band { band, reason: error.to_string() })
             }
             Planes::Sums => sum_of(&self.photodiodes, band).map(Cow::Owned),
         }
     }
+}
+
+/// Returns the light on the scene that a file of irradiance states, as those of a run do.
+fn stated_light(image: &Path) -> Result<Option<Illuminant>, PipelineError> {
+    let Some(text) = read_exr_light(image)? else { return Ok(None) };
+    let wrong = |reason: String| PipelineError::Read { path: image.to_owned(), reason };
+    let light: Illuminant =
+        ron::from_str(&text).map_err(|e| wrong(format!("its light, '{text}', cannot be read: {e}")))?;
+    light.check().map_err(|e| wrong(e.to_string()))?;
+    Ok(Some(light))
 }
 
 /// Returns the sum of a band of several irradiances.
@@ -389,8 +463,16 @@ pub(super) fn image(
     }
     let file = file.or(store.filter(|_| is_spilled).map(BandStore::into_file));
     let planes = file.map_or(Planes::Memory(cube), |file| Planes::File(Mutex::new(file)));
-    let photodiodes = Vec::new();
-    Ok(Irradiance { grid, size, pitch_um: place.pitch_um, planes, photodiodes, stored: None, summary: summing.summary })
+    Ok(Irradiance {
+        grid,
+        size,
+        pitch_um: place.pitch_um,
+        planes,
+        file_factor: 1.0,
+        photodiodes: Vec::new(),
+        stored: None,
+        summary: summing.summary,
+    })
 }
 
 /// Sums up bands as they come.
@@ -409,6 +491,7 @@ impl Summing {
             mean_lux: 0.0,
             seen: LinearRgb::black(rows, columns),
             total: Array2::zeros((rows, columns)),
+            factor: 1.0,
             narrow_surfaces: None,
             unseen_points: None,
         };

@@ -13,7 +13,7 @@ use super::{
     capture::Capture,
     chain::Chain,
     electrons,
-    film::{FilmPlace, binned, film_distances_mm},
+    film::{self, FilmPlace, Outline, binned, film_distances_mm},
     film_reach::FilmReach,
     given::GivenParts,
     irradiance::Irradiance,
@@ -22,7 +22,7 @@ use super::{
     painting::PaintReach,
     results::{KeptResults, StageCounts},
     scene::ResolvedScene,
-    spec::{IrradianceInputs, PictureInputs, Raster},
+    spec::{FilmInputs, IrradianceInputs, PictureInputs, Raster},
 };
 use crate::{Camera, PaintingFolder, PipelineError, Progress, Quality, SceneSource, Stage};
 
@@ -173,6 +173,10 @@ impl KeptCamera {
         let irradiance = chain.irradiance(irradiance_inputs)?;
         let place = chain.film(&irradiance_inputs.plan.bank.film, &irradiance_inputs.scene)?;
         let scene = chain.summary(&irradiance_inputs.scene)?;
+        let scene = match irradiance.summary.factor {
+            1.0 => scene,
+            factor => Arc::new(scene.brightened(factor)),
+        };
         let rates = chain.electrons(electron_inputs)?;
         let sensor = electrons::read_out(electron_inputs, &place);
         let frames = chain.frames(frame_inputs)?;
@@ -290,14 +294,29 @@ impl KeptCamera {
         chain.irradiance(&inputs)
     }
 
-    /// Returns the width and the height of the film, mm; of a film that has the scene's size, the scene is opened for it.
+    /// Returns the width and the height of the whole film, mm; of a film that has the scene's size, the scene is opened for it, of a flat
+    /// one in a file its header alone where that tells the size.
     ///
     /// # Errors
     /// As [`capture`](Self::capture) has them before it traces the lens.
     pub fn film_size_mm(&self, progress: &dyn Progress, cancel: &Cancel) -> Result<[f64; 2], PipelineError> {
-        let film = match self.irradiance_inputs()?.plan.bank.film.raster {
+        let inputs = self.irradiance_inputs()?;
+        let (chain, place) = (self.chain(progress, cancel), &inputs.plan.bank.film);
+        let film = match place.raster {
             Raster::Pixels(film) => film,
-            Raster::Scene | Raster::Field(_) => self.lens_and_film(progress, cancel)?.1.film(),
+            Raster::Scene | Raster::Field(_) => {
+                let whole = FilmInputs { crop: None, ..place.clone() };
+                let lens = chain.lens(&whole.lens)?;
+                let mut choice = inputs.scene.choice();
+                if choice.flat.is_some() {
+                    choice = choice.seen_from(lens.reference.projection_center_z_mm())?;
+                }
+                let outline = if self.given.scene.is_none() { Outline::of_flat(&choice)? } else { None };
+                match outline {
+                    Some(outline) => film::place(&whole, &lens, &outline, 1)?.film(),
+                    None => chain.film(&whole, &inputs.scene)?.film(),
+                }
+            }
         };
         Ok([film.columns, film.rows].map(|n| 1e-3 * film.pitch_um * n as f64))
     }

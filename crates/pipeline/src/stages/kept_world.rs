@@ -34,6 +34,15 @@ impl KeptCamera {
     pub fn world_render(&self, progress: &dyn Progress, cancel: &Cancel) -> Result<WorldRender, PipelineError> {
         self.camera.validate()?;
         let inputs = self.irradiance_inputs()?;
+        if inputs.mean_lux.is_some() {
+            let reason = "is of a picture that 'run' takes: rays that are added up bring the light that the world has"
+                .to_owned();
+            return Err(PipelineError::Unsuitable { what: "mean_lux", reason });
+        }
+        if self.camera.scene.points.is_some() {
+            let reason = "are met by no ray from the film, expected none: 'run' images them".to_owned();
+            return Err(PipelineError::Unsuitable { what: "points", reason });
+        }
         let chain = self.chain(progress, cancel);
         let resolved = chain.scene(&inputs.scene)?;
         let lens = chain.lens(&inputs.plan.bank.film.lens)?;

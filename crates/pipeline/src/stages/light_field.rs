@@ -75,6 +75,15 @@ impl KeptCamera {
             let reason = "it is no world, of which a raster of cameras could see more than one side".to_owned();
             return Err(PipelineError::Unsuitable { what: "scene", reason });
         };
+        if self.camera().scene.mean_lux.is_some() {
+            let reason = "would give each camera another light: expected none with a raster of cameras".to_owned();
+            return Err(PipelineError::Unsuitable { what: "mean_lux", reason });
+        }
+        if self.camera().scene.points.is_some() {
+            let reason = "lie in directions, which are others from each camera: expected none with a raster of cameras"
+                .to_owned();
+            return Err(PipelineError::Unsuitable { what: "points", reason });
+        }
         // Where focus and film are those of the camera in the middle.
         let (lens, place) = self.lens_and_film(progress, cancel)?;
         let of = rows * columns;

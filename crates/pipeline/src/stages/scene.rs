@@ -38,13 +38,20 @@ pub struct SceneSummary {
     /// The tangent between two samples, where it is a picture of samples.
     #[serde(default)]
     pub sample_tangent: Option<f64>,
+    /// Samples of its source that are one of it, each way.
+    #[serde(default = "one")]
+    pub binning: usize,
     /// What was done to its samples to make it, a sentence each: depths filled, bands resampled.
     #[serde(default)]
     pub notes: Vec<String>,
 }
 
+fn one() -> usize {
+    1
+}
+
 impl SceneSummary {
-    pub(super) fn of(scene: &Scene) -> Result<Self, PipelineError> {
+    pub(super) fn of(ResolvedScene { scene, binning }: &ResolvedScene) -> Result<Self, PipelineError> {
         let (near_m, far_m) = scene.require_depth()?.range_m();
         Ok(Self {
             name: scene.name.clone(),
@@ -56,8 +63,24 @@ impl SceneSummary {
             light: scene.light.clone(),
             wavelengths_nm: scene.radiance.grid().centers_nm().to_vec(),
             sample_tangent: scene.view.map(|view| 1.0 / view.focal_px),
+            binning: *binning,
             notes: scene.notes.clone(),
         })
+    }
+
+    /// Returns that of the scene under light that is so many times as strong.
+    pub(super) fn brightened(&self, factor: f64) -> Self {
+        let mut brighter = self.clone();
+        brighter.mean_luminance_cd_m2 *= factor;
+        if let Some(lux) = brighter.light.as_mut().and_then(|light| light.illuminance_lux.as_mut()) {
+            *lux *= factor;
+        }
+        let note = format!(
+            "its light is multiplied by {factor:.4e}, to {:.4} cd/m² on average, for the mean illuminance asked for on the film",
+            brighter.mean_luminance_cd_m2
+        );
+        brighter.notes.push(note);
+        brighter
     }
 
     /// The bands.

@@ -166,6 +166,8 @@ pub(crate) struct IrradianceInputs {
     pub(crate) micro_array: Option<MicroArray>,
     /// The photodiodes whose irradiances it is the sum of; none for whole pixels.
     pub(crate) dual_pixel: Option<DualPixelSpec>,
+    /// The mean illuminance that it is brought to, lux.
+    pub(crate) mean_lux: Option<f64>,
     /// How well a world is rendered by rays from the film; none where its view is blurred, or there is no world.
     pub(crate) effort: Option<RenderEffort>,
 }
@@ -293,6 +295,8 @@ impl SceneInputs {
             light: self.light.clone(),
             illuminance_lux: self.illuminance_lux,
             mean_luminance_cd_m2: self.mean_luminance_cd_m2,
+            // Of what the film gets, not of the scene.
+            mean_lux: None,
         }
     }
 
@@ -362,7 +366,8 @@ impl IrradianceInputs {
             _ => None,
         };
         let plan = PlanInputs { bank, blur: camera.blur, border: camera.border, photodiode: None };
-        Self { plan, scene, micro_array, dual_pixel: camera.dual_pixel, effort }
+        let mean_lux = camera.scene.mean_lux;
+        Self { plan, scene, micro_array, dual_pixel: camera.dual_pixel, mean_lux, effort }
     }
 }
 

@@ -136,6 +136,10 @@ impl KeptCamera {
         let Some(spec) = self.camera().video else {
             return refused("video", "is not in the camera, expected its frames and its motion".to_owned());
         };
+        if self.camera().scene.mean_lux.is_some() {
+            let reason = "is that of one picture, of which a video has many: expected mean_luminance_cd_m2".to_owned();
+            return refused("mean_lux", reason);
+        }
         let inputs = self.picture_inputs()?;
         let FrameLayout { mut frame, film_margin, mut samples_per_tan, path } = self.layout(spec, progress, cancel)?;
         if inputs.frames.electrons.sensor.split_pixel.is_some() {

@@ -155,7 +155,10 @@ pub(super) fn view(
         None if spec.is_still_life() => Some(still_life::light()?),
         None => light_on(world, &pinhole)?,
     };
-    let scene = Scene { depth: Some(first.depth), view: Some(view), hidden, light, ..Scene::new(name, first.radiance) };
+    let (first_nm, last_nm) = first.radiance.grid().range_nm();
+    let notes = world.note_on_bands(first_nm, last_nm).map(|note| format!("{name}: {note}")).into_iter().collect();
+    let scene =
+        Scene { depth: Some(first.depth), view: Some(view), hidden, light, notes, ..Scene::new(name, first.radiance) };
     Ok(ResolvedScene { scene, binning })
 }
 

@@ -48,6 +48,9 @@ impl LensPage<'_> {
                     (along x): solid and dashed where they share a plot. Each spot has its own scale; the gray circle is Airy's \
                     first zero.";
         body += &section("Spots, fans and curves over field", &(self.plots.page_svg() + &note(fans)));
+        let beams =
+            "Edges of the light of each field, in the frame of the surface; dashed: rims, openings and obscurations.";
+        body += &section("Footprints", &(self.plots.footprints_svg(&self.shown.footprints) + &note(beams)));
         body += &section("Spot diagrams", &self.plots.spots_svg());
         body += &section("Optical path differences", &self.plots.opd_svg());
         body += &section("Distortion", &self.plots.grid_svg());
@@ -59,7 +62,7 @@ impl LensPage<'_> {
     }
 
     /// Draws the lens with the rays of the fields, as far as a drawing shows them.
-    fn drawing(&self) -> Result<String, PipelineError> {
+    pub(super) fn drawing(&self) -> Result<String, PipelineError> {
         let analysis = self.plots.0;
         let steepest_deg = if analysis.distance_mm.is_finite() { 89.0 } else { *Layout::WIDEST_FIELDS_DEG.end() };
         let mut fields_deg: Vec<f64> = analysis.fields.iter().map(|row| row.place.field_xy_deg[1]).collect();

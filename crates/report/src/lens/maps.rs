@@ -81,7 +81,7 @@ impl AnalysisPlots<'_> {
                 .chain(lines("#2166ac", MarkKind::Line, &found))
                 .collect(),
         };
-        sheet.panel(&panel, [MARGIN_PX, HEAD_PX, GRID_PX, GRID_PX]);
+        sheet.panel(&self.in_units(panel), [MARGIN_PX, HEAD_PX, GRID_PX, GRID_PX]);
         sheet.to_svg((2.0 * MARGIN_PX + GRID_PX).max(900.0), HEAD_PX + GRID_PX + MARGIN_PX)
     }
 }

@@ -3,7 +3,7 @@
 use dioptric_optics::wavelength_color;
 
 use crate::{panel::Mark, panel::MarkKind, panel::Panel, panel::Sheet};
-use dioptric_analysis::{FanRow, FieldRow, LensAnalysis, SpotRow};
+use dioptric_analysis::{AfocalView, FanRow, FieldPlace, FieldRow, Footprint, LensAnalysis, SpotRow, line_color};
 
 /// Margin of a page, and the room for its words above, px.
 pub(super) const MARGIN_PX: f64 = 24.0;
@@ -33,13 +33,13 @@ impl AnalysisPlots<'_> {
             let panels = [self.spot_panel(spots)].into_iter().chain(fan_panels(fans, &ranges));
             for (column, panel) in panels.enumerate() {
                 let x = MARGIN_PX + SMALL_PX[0] * column as f64;
-                sheet.panel(&panel, [x, y, SMALL_PX[0], SMALL_PX[1]]);
+                sheet.panel(&self.in_units(panel), [x, y, SMALL_PX[0], SMALL_PX[1]]);
             }
         }
         let y = HEAD_PX + SMALL_PX[1] * spots.len() as f64 + 12.0;
-        for (column, panel) in self.field_panels().iter().enumerate() {
+        for (column, panel) in self.field_panels().into_iter().enumerate() {
             let x = MARGIN_PX + LARGE_PX[0] * column as f64;
-            sheet.panel(panel, [x, y, LARGE_PX[0], LARGE_PX[1]]);
+            sheet.panel(&self.in_units(panel), [x, y, LARGE_PX[0], LARGE_PX[1]]);
         }
         sheet.to_svg(2.0 * MARGIN_PX + 5.0 * SMALL_PX[0], y + LARGE_PX[1] + MARGIN_PX)
     }
@@ -55,11 +55,71 @@ impl AnalysisPlots<'_> {
             let mut panel = self.spot_panel(std::slice::from_ref(spot));
             panel.title = format!("{}, {:.0} nm{}", spot.place.label(), spot.wavelength_nm, rms_words(spot));
             let (x, y) = (MARGIN_PX + SIDE_PX[0] * place[0], HEAD_PX + SIDE_PX[1] * place[1]);
-            sheet.panel(&panel, [x, y, SIDE_PX[0], SIDE_PX[1]]);
+            sheet.panel(&self.in_units(panel), [x, y, SIDE_PX[0], SIDE_PX[1]]);
         }
         let rows = self.0.spots.len().div_ceil(n_wavelengths) as f64;
         let width = (2.0 * MARGIN_PX + SIDE_PX[0] * n_wavelengths as f64).max(760.0);
         sheet.to_svg(width, HEAD_PX + SIDE_PX[1] * rows + MARGIN_PX)
+    }
+
+    /// Returns the footprints of the fields on the surfaces as SVG, with the rims: a plot a surface, each to its own scale.
+    pub fn footprints_svg(&self, footprints: &[Footprint]) -> String {
+        const SIDE_PX: [f64; 2] = [250.0, 248.0];
+        const COLUMNS: usize = 5;
+        let mut sheet = Sheet::default();
+        self.head(&mut sheet, "footprints at the reference wavelength");
+        let mut x = MARGIN_PX;
+        for (i, row) in self.0.fields.iter().enumerate() {
+            let label = row.place.label();
+            sheet.text((x, HEAD_PX + 6.0), 12.5, (&line_color(i), "bold"), &format!("— {label}"));
+            x += 34.0 + 8.2 * label.chars().count() as f64;
+        }
+        let top = HEAD_PX + 20.0;
+        for (i, footprint) in footprints.iter().enumerate() {
+            let place = [(i % COLUMNS) as f64, (i / COLUMNS) as f64];
+            let rectangle = [MARGIN_PX + SIDE_PX[0] * place[0], top + SIDE_PX[1] * place[1], SIDE_PX[0], SIDE_PX[1]];
+            sheet.panel(&self.footprint_panel(footprint), rectangle);
+        }
+        let rows = footprints.len().div_ceil(COLUMNS) as f64;
+        let width = (2.0 * MARGIN_PX + SIDE_PX[0] * COLUMNS.min(footprints.len()) as f64).max(760.0);
+        sheet.to_svg(width, top + SIDE_PX[1] * rows + MARGIN_PX)
+    }
+
+    fn footprint_panel(&self, footprint: &Footprint) -> Panel {
+        let line = |color: &str, kind: MarkKind, points: &[(f64, f64)]| Mark {
+            color: color.to_owned(),
+            kind,
+            points: points.to_vec(),
+        };
+        let color_of = |place: &FieldPlace| {
+            line_color(self.0.fields.iter().position(|row| row.place == *place).unwrap_or_default())
+        };
+        let rims = footprint.rims_mm.iter().map(|rim| line("#777777", MarkKind::Dashed, rim));
+        let edges = footprint.edges_mm.iter().map(|(place, edge)| line(&color_of(place), MarkKind::Line, edge));
+        let marks: Vec<Mark> = rims.chain(edges).collect();
+        let half_mm = half_range(marks.iter().flat_map(|mark| &mark.points).flat_map(|p| [p.0, p.1]));
+        Panel {
+            title: format!("surface {}: to {:.0} % of the rim", footprint.surface, 100.0 * footprint.share_of_rim()),
+            x_label: "x, mm".to_owned(),
+            y_label: "y, mm".to_owned(),
+            x_range: (-half_mm, half_mm),
+            y_range: (-half_mm, half_mm),
+            is_to_scale: true,
+            marks,
+        }
+    }
+
+    /// Returns a plot in the units of what is analyzed: angles, of light that leaves in parallel.
+    pub(super) fn in_units(&self, panel: Panel) -> Panel {
+        match self.0.afocal {
+            Some(_) => Panel {
+                title: AfocalView::in_angles(&panel.title),
+                x_label: AfocalView::in_angles(&panel.x_label),
+                y_label: AfocalView::in_angles(&panel.y_label),
+                ..panel
+            },
+            None => panel,
+        }
     }
 
     /// Writes what is analyzed, and what colors mean.
@@ -79,10 +139,18 @@ impl AnalysisPlots<'_> {
             self.0.film_radius_mm.map_or(String::new(), |radius_mm| format!(", curved by R = {radius_mm:.2} mm"));
         let along_x =
             self.0.x_plane.map_or(String::new(), |x| format!(" (along x {:.3} mm · f/{:.2})", x.efl_mm, x.f_number));
-        let words = format!(
-            "f = {:.3} mm · f/{:.2}{along_x}{aperture} · {object}{medium} · film {:.4} mm behind the last vertex{film}",
-            self.0.efl_mm, self.0.f_number, self.0.film_distance_mm
-        );
+        let words = match self.0.afocal {
+            Some(view) => format!(
+                "afocal{} · exit pupil {:.3} mm across, {:.3} mm behind the last vertex · {object}{medium} · as angles",
+                view.angular_magnification.map_or(String::new(), |m| format!(", {m:.3}×")),
+                view.exit_pupil_diameter_mm,
+                view.exit_pupil_z_mm
+            ),
+            None => format!(
+                "f = {:.3} mm · f/{:.2}{along_x}{aperture} · {object}{medium} · film {:.4} mm behind the last vertex{film}",
+                self.0.efl_mm, self.0.f_number, self.0.film_distance_mm
+            ),
+        };
         sheet.text((MARGIN_PX, 52.0), 12.5, ("#333", "normal"), &words);
         let mut x = MARGIN_PX;
         for &nm in &self.0.wavelengths_nm {

@@ -42,6 +42,14 @@ pub(super) fn planes(
     Ok((0..sides[b]).map(plane).collect())
 }
 
+/// Returns in a sentence which axis is taken for bands, where two are as long as there are bands and nothing is told.
+pub(super) fn note(sides: &[usize], told: Option<&str>, n_bands: Option<usize>) -> Option<String> {
+    let &[a, b, c] = sides else { return None };
+    let is_open = told.is_none() && a == c && c > 1 && n_bands == Some(c);
+    is_open
+        .then(|| format!("its sides are {a} × {b} × {c}, of which the last is taken for bands: --axes says otherwise"))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

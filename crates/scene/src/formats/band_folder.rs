@@ -109,14 +109,20 @@ fn wavelengths_of(folder: &Path, pictures: &[(f64, PathBuf)]) -> Result<Vec<f64>
     })
 }
 
-/// Reads a gray picture, white being 1; of a colored one the green channel, which a gray one saved as RGB repeats.
+/// Reads a gray picture, white being 1, which may be saved as RGB.
 fn gray(path: &Path) -> Result<Array2<f32>, SceneError> {
     let picture = decode(path, 4)?;
     let (columns, rows) = (picture.width() as usize, picture.height() as usize);
     let samples: Vec<f32> = match picture {
         DynamicImage::ImageLuma8(p) => p.into_raw().into_iter().map(|v| f32::from(v) / 255.0).collect(),
         DynamicImage::ImageLuma16(p) => p.into_raw().into_iter().map(|v| f32::from(v) / 65535.0).collect(),
-        other => other.into_rgb16().pixels().map(|p| f32::from(p.0[1]) / 65535.0).collect(),
+        other => {
+            let picture = other.into_rgb16();
+            if picture.pixels().any(|p| p.0[0] != p.0[1] || p.0[2] != p.0[1]) {
+                return Err(unreadable(path, "it has colors, expected gray pictures, one a band"));
+            }
+            picture.pixels().map(|p| f32::from(p.0[1]) / 65535.0).collect()
+        }
     };
     Array2::from_shape_vec((rows, columns), samples).map_err(|error| unreadable(path, error))
 }
@@ -183,5 +189,9 @@ mod tests {
         let folder = folder_of(&["a_400.png"]);
         save(&ImageBuffer::from_pixel(9, 9, Luma([1_u8])).into(), &folder.path().join("a_500.png")).unwrap();
         assert!(read_band_folder(folder.path(), None).unwrap_err().to_string().contains("rows of a band"));
+        let folder = folder_of(&["a_400.png"]);
+        let colored = ImageBuffer::from_pixel(4, 3, image::Rgb([200_u8, 20, 100]));
+        save(&colored.into(), &folder.path().join("a_500.png")).unwrap();
+        assert!(read_band_folder(folder.path(), None).unwrap_err().to_string().contains("it has colors"));
     }
 }

@@ -281,6 +281,8 @@ fn of_json(path: &Path, text: &str) -> Result<CameraData, String> {
         if m.len() != 9 {
             return Err(format!("its intrinsic_matrix has {} numbers, expected 9", m.len()));
         }
+        let rest = [m[1], m[3], m[if a == 2 { 6 } else { 2 }], m[if a == 2 { 7 } else { 5 }], m[8] - 1.0];
+        check_matrix("intrinsic_matrix", &rest)?;
         (fx, fy, cx, cy) = (Some(first), Some(m[4]), Some(m[a]), Some(m[b]));
     }
     let missing = |name: &str| format!("missing {name}: expected width, height, fx_px, fy_px, cx_px and cy_px");
@@ -385,6 +387,14 @@ fn of_colmap(path: &Path, text: &str) -> Result<CameraData, String> {
     })
 }
 
+/// Checks that of a camera matrix nothing is left out: what must be 0, for it to be that of a camera whose rows and columns are at right angles.
+fn check_matrix(name: &str, rest: &[f64]) -> Result<(), String> {
+    match rest.iter().all(|number| number.abs() < 1e-9) {
+        true => Ok(()),
+        false => Err(format!("its {name} has a skew or a last row other than 0, 0, 1, expected none")),
+    }
+}
+
 /// Reads `OpenCV`'s YAML of a calibration: `camera_matrix`, `distortion_coefficients`, `image_width`, `image_height`.
 fn of_opencv(path: &Path, text: &str) -> Result<CameraData, String> {
     // `key: value` lines, in which the `data: [...]` of a matrix belongs to the key above; lists may run over lines.
@@ -423,7 +433,10 @@ fn of_opencv(path: &Path, text: &str) -> Result<CameraData, String> {
     };
     let names = ["camera_matrix", "Camera_Matrix", "K", "cameraMatrix"];
     let m = list(keys.take_any(&names).ok_or("it has no camera_matrix")?)?;
-    let &[fx, _, cx, _, fy, cy, ..] = &m[..] else { return Err("its camera_matrix has not 9 numbers".to_owned()) };
+    let &[fx, skew, cx, below, fy, cy, left, right, last] = &m[..] else {
+        return Err("its camera_matrix has not 9 numbers".to_owned());
+    };
+    check_matrix("camera_matrix", &[skew, below, left, right, last - 1.0])?;
     let names = ["distortion_coefficients", "Distortion_Coefficients", "distCoeffs", "D"];
     let k = keys.take_any(&names).map(list).transpose()?.unwrap_or_default();
     let side = |text: Option<String>| text.and_then(|text| text.parse::<usize>().ok());
@@ -550,6 +563,8 @@ mod tests {
                 741,
                 "OPENCV_FISHEYE",
             ),
+            (r#"{"width":741,"height":500,"intrinsic_matrix":[525.0,0,0,5,526.0,0,319.5,239.5,1]}"#, 500, 741, "skew"),
+            (r#"{"K":[[525.0,0,319.5],[0,526.0,239.5],[0,0,0]]}"#, 500, 741, "skew"),
             ("{", 500, 741, "EOF"),
             ("[3]", 500, 741, "expected JSON"),
             ("1 FISHEYE 3 4 5", 500, 741, "FISHEYE"),

@@ -112,7 +112,7 @@ impl Contents {
             ("a unit (--unit)", reading.unit.is_some(), !matches!(self.heeds, Heeds::Unit | Heeds::Cube)),
             ("a quantity (--quantity)", reading.quantity.is_some(), !self.heeds_quantity(reading.quantity)),
             ("a white level (--white-level)", options.white_level.is_some(), self.heeds != Heeds::Cube),
-            ("wavelengths (--wavelengths-nm)", reading.wavelengths_nm.is_some(), self.heeds != Heeds::Cube),
+            ("wavelengths (--scene-wavelengths-nm)", reading.wavelengths_nm.is_some(), self.heeds != Heeds::Cube),
             ("a variable (--variable)", reading.variable.is_some(), !is_of(path, &["mat", "h5", "hdf5", "npz"])),
             ("an order of axes (--axes)", reading.axes.is_some(), !is_of(path, &["npy", "npz", "mat", "h5", "hdf5"])),
         ];
@@ -145,6 +145,10 @@ pub(super) fn is_of(path: &Path, endings: &[&str]) -> bool {
     path.extension().is_some_and(|own| endings.iter().any(|ending| own.eq_ignore_ascii_case(ending)))
 }
 
+/// Numbers beyond are no wavelengths in nm, but micrometres, or bands that are counted.
+const SHORTEST_NM: f64 = 10.0;
+const LONGEST_NM: f64 = 1e6;
+
 /// A cube of plain numbers, and what its file says of them.
 pub(super) struct Cube {
     /// The planes of the bands, in the order of the file.
@@ -170,6 +174,10 @@ impl Cube {
         let Self { planes, top, wavelengths_nm, quantity, mut notes } = self;
         let reading = &options.reading;
         let wavelengths_nm = match (&reading.wavelengths_nm, wavelengths_nm) {
+            (Some(told), Some(own)) if *told != own => {
+                let reason = "it states its wavelengths: --scene-wavelengths-nm says something else";
+                return Err(unreadable(path, reason));
+            }
             (Some(told), _) => told.clone(),
             (None, Some(own)) => own,
             // Bands that are asked for are the file's own where there are as many.
@@ -178,7 +186,7 @@ impl Cube {
                 None => {
                     let n = planes.len();
                     let reason = format!(
-                        "it does not tell the wavelengths of its {n} bands: expected --wavelengths-nm, {n} numbers"
+                        "it does not tell the wavelengths of its {n} bands: expected --scene-wavelengths-nm, {n} numbers"
                     );
                     return Err(unreadable(path, reason));
                 }
@@ -186,6 +194,10 @@ impl Cube {
         };
         if wavelengths_nm.len() != planes.len() {
             let reason = format!("{} bands, but {} wavelengths", planes.len(), wavelengths_nm.len());
+            return Err(unreadable(path, reason));
+        }
+        if let Some(nm) = wavelengths_nm.iter().find(|nm| !(SHORTEST_NM..=LONGEST_NM).contains(*nm)) {
+            let reason = format!("a band lies at {nm} nm: expected wavelengths in nm, or --scene-wavelengths-nm");
             return Err(unreadable(path, reason));
         }
         let told_unit = reading.unit.as_deref().map(light_unit).transpose()?;

@@ -10,6 +10,7 @@ use ndarray::Array2;
 
 use super::{
     camera::beside,
+    mat::{Plane, read_plane},
     npy::read_npy,
     pfm::read_pfm,
     picture::decode,
@@ -66,13 +67,15 @@ pub(super) fn files_beside(picture: &Path) -> Vec<PathBuf> {
 /// Returns files beside a picture that look like its depth but have other names than are looked for.
 pub(super) fn likely_beside(picture: &Path) -> Vec<String> {
     let stem = picture.file_stem().unwrap_or_default().to_string_lossy().to_lowercase();
+    // Hypersim has `frame.0000.depth_meters.hdf5` beside `frame.0000.color.hdf5`.
+    let stem = stem.trim_end_matches(".color").to_owned();
     let folder = picture.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let Ok(entries) = fs::read_dir(folder) else { return vec![] };
     let known = files_beside(picture);
     let is_likely = |path: &PathBuf| {
         let name = name_of(path).to_lowercase();
         let ending = name.rsplit('.').next().unwrap_or_default();
-        let is_map = ["png", "tif", "tiff", "exr", "pfm", "npy", "dpt"].contains(&ending);
+        let is_map = ["png", "tif", "tiff", "exr", "pfm", "npy", "dpt", "h5", "hdf5", "mat"].contains(&ending);
         let rest =
             name.strip_prefix(&stem).or_else(|| name.strip_suffix(ending)?.trim_end_matches('.').strip_suffix(&stem));
         let says = |rest: &str| ["depth", "disp"].iter().any(|word| rest.contains(word));
@@ -84,7 +87,21 @@ pub(super) fn likely_beside(picture: &Path) -> Vec<String> {
     names
 }
 
-/// Reads a file of depth: a gray picture of 8 or 16 bits, a TIFF of floats, PFM, EXR or an array of `NumPy`.
+/// Returns the last code of whole numbers whose largest is this: 255 and 65535 of bytes and of words, 0 of others, none of floats.
+fn codes_of_top(top: Option<f64>) -> Option<u16> {
+    top.map(|top| match top {
+        _ if top <= 255.0 => u16::from(u8::MAX),
+        65535.0 => u16::MAX,
+        _ => 0,
+    })
+}
+
+/// Whether a file is a `frame.0000.depth_meters.hdf5` of Hypersim, whose depths are distances from the camera.
+fn is_of_hypersim(path: &Path) -> bool {
+    name_of(path).to_lowercase().ends_with(".depth_meters.hdf5")
+}
+
+/// Reads a file of depth: a gray picture of 8 or 16 bits, a TIFF of floats, PFM, EXR, an array of `NumPy`, MATLAB or HDF5.
 ///
 /// Codes of 16 bits are millimetres, floats metres, unless something says otherwise; codes of 8 bits and the floats of a PFM, which
 /// may be disparities, need their unit or kind.
@@ -104,11 +121,15 @@ pub(super) fn read_depth(path: &Path, words: DepthWords<'_>) -> Result<RawDepth,
             let &[rows, columns] = &sides[..] else {
                 return Err(wrong(format!("its sides are {:?}, expected rows and columns", array.sides)));
             };
-            let top = array.top.filter(|top| *top == 65535.0).map(|_| u16::MAX);
-            let is_codes = array.top.is_some_and(|top| top <= 255.0);
             let values =
                 Array2::from_shape_vec((rows, columns), array.values).map_err(|error| wrong(error.to_string()))?;
-            (values, if is_codes { Some(u16::from(u8::MAX)) } else { top.or_else(|| array.top.map(|_| 0)) })
+            (values, codes_of_top(array.top))
+        }
+        "mat" | "h5" | "hdf5" => {
+            let Plane { name, values, top, notes: more } = read_plane(path)?;
+            from = format!("'{name}' of {from}");
+            notes.extend(more);
+            (values, codes_of_top(top))
         }
         "exr" => {
             let (name, plane, others) = depth_channel(read_planes_exr(path)?).ok_or_else(|| {
@@ -146,7 +167,8 @@ pub(super) fn read_depth(path: &Path, words: DepthWords<'_>) -> Result<RawDepth,
         }
     };
     // Distances that are counted from the camera say so by the name of their channel.
-    let kind = if from.contains("'distance'") { DepthKind::Radial } else { DepthKind::Axial };
+    let is_distance = from.contains("'distance'") || is_of_hypersim(path);
+    let kind = if is_distance { DepthKind::Radial } else { DepthKind::Axial };
     let is_told =
         words.unit.is_some() || words.kind.is_some_and(|kind| kind != DepthKind::Axial && kind != DepthKind::Radial);
     let is_codes = top.is_some();

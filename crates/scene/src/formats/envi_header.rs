@@ -371,7 +371,7 @@ impl Entries<'_> {
                     return plain(1.0);
                 }
                 let reason = "the header does not say their unit, and they are no likely nm or µm: expected 'wavelength units' in \
-                              the header, or --wavelengths-nm";
+                              the header, or --scene-wavelengths-nm";
                 Err(self.wrong("wavelength", reason.to_owned()))
             }
             Some(other) => Err(self.wrong("wavelength units", format!("'{}', expected nm or µm", shown(other)))),
@@ -466,7 +466,7 @@ mod tests {
         assert_eq!(read("wavelength units = Index", "{1, 2}").unwrap(), None);
         assert_eq!(read("wavelength units = Wavenumber", "{20000, 10000}").unwrap(), Some(vec![500.0, 1000.0]));
         for list in ["{1, 2}", "{0, 1}", "{30, 40}", "{0.5, 600}"] {
-            assert!(read("", list).unwrap_err().to_string().contains("--wavelengths-nm"), "{list}");
+            assert!(read("", list).unwrap_err().to_string().contains("--scene-wavelengths-nm"), "{list}");
         }
     }
 

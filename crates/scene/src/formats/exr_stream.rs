@@ -109,6 +109,13 @@ pub fn read_exr_light(path: &Path) -> Result<Option<String>, SceneError> {
     })
 }
 
+/// Whether an EXR file states that its light is irradiance; not where it cannot be read.
+pub fn is_irradiance_exr(path: &Path) -> bool {
+    let Ok(meta) = MetaData::read_from_file(path, false) else { return false };
+    let unit = |header: &Header| exr_attributes::from_layer(&header.own_attributes).unit;
+    meta.headers.iter().any(|header| matches!(unit(header), Ok(Some(unit)) if unit.quantity == Quantity::Irradiance))
+}
+
 /// The name of the channel of depth.
 const DEPTH: &str = "Z";
 

@@ -40,7 +40,7 @@ fn gains_of_a_header_are_obeyed() {
 fn pages_of_a_tiff_are_bands() {
     let Some(path) = input("pages.tif") else { return };
     let message = read_scene(&path, &usual()).unwrap_err().to_string();
-    assert!(message.contains("31 bands") && message.contains("--wavelengths-nm"), "{message}");
+    assert!(message.contains("31 bands") && message.contains("--scene-wavelengths-nm"), "{message}");
     let grid = WavelengthGrid::uniform(400.0, 700.0, 10.0).unwrap();
     let scene = read(&path, &ReadOptions { grid: Some(grid.clone()), ..usual() });
     assert_eq!((scene.radiance.grid(), scene.rows(), scene.columns()), (&grid, 24, 32));
@@ -171,7 +171,7 @@ fn what_does_not_apply_is_refused() {
         (reading(FileReading { scale: Some(2.0), ..none() }), "--scale"),
         (reading(FileReading { unit: Some("W/m^2/sr/nm".to_owned()), ..none() }), "--unit"),
         (reading(FileReading { quantity: Some(FileQuantity::Photons), ..none() }), "--quantity"),
-        (reading(FileReading { wavelengths_nm: Some(vec![500.0]), ..none() }), "--wavelengths-nm"),
+        (reading(FileReading { wavelengths_nm: Some(vec![500.0]), ..none() }), "--scene-wavelengths-nm"),
         (reading(FileReading { variable: Some("x".to_owned()), ..none() }), "--variable"),
         (reading(FileReading { depth_unit: Some("mm".to_owned()), ..none() }), "--depth FILE"),
     ] {

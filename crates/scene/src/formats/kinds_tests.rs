@@ -1,7 +1,4 @@
-//! Cubes as every program writes them, with their truth beside: each type, order of axes, order of bytes and unit, and words that nobody
-//! knows.
-//!
-//! `DIOPTRIC_FUZZ_CASES=1000000 cargo test --release --workspace --lib -- unknown_words` makes that many files a format.
+//! Cubes as every program writes them, with their truth beside: each type, order of axes, order of bytes and unit.
 
 use std::{
     fs,
@@ -10,10 +7,6 @@ use std::{
 };
 
 use dioptric_spectrum::Illuminant;
-use exr::prelude::{
-    AnyChannel, AnyChannels, AttributeValue, Encoding, FlatSamples, Image, Layer, LayerAttributes, SmallVec, Text,
-    WritableImage,
-};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -23,11 +16,12 @@ use super::{
     npy::tests::npy,
     photons::joules_per_photon,
     read_scene,
+    word_tests::n_cases,
 };
 
-const ROWS: usize = 3;
-const COLUMNS: usize = 4;
-const WAVE_NM: [f64; 5] = [450.0, 500.0, 560.0, 600.0, 650.0];
+pub(super) const ROWS: usize = 3;
+pub(super) const COLUMNS: usize = 4;
+pub(super) const WAVE_NM: [f64; 5] = [450.0, 500.0, 560.0, 600.0, 650.0];
 /// What a perfect white has.
 const WHITE: f64 = 200.0;
 
@@ -37,7 +31,7 @@ fn truth(row: usize, column: usize, band: usize) -> f64 {
 }
 
 /// Returns all numbers in the order of axes that a text says, the last the fastest.
-fn in_order(axes: &str) -> Vec<f64> {
+pub(super) fn in_order(axes: &str) -> Vec<f64> {
     let size = |axis: char| match axis {
         'y' => ROWS,
         'x' => COLUMNS,
@@ -56,7 +50,7 @@ fn in_order(axes: &str) -> Vec<f64> {
     values
 }
 
-fn sides(axes: &str) -> Vec<usize> {
+pub(super) fn sides(axes: &str) -> Vec<usize> {
     axes.chars()
         .map(|axis| match axis {
             'y' => ROWS,
@@ -92,7 +86,7 @@ fn check(path: &Path, options: &ReadOptions, watts: Option<&dyn Fn(f64) -> f64>,
 }
 
 /// What is said of a cube that says nothing.
-fn told(quantity: Option<FileQuantity>, axes: Option<&str>, with_waves: bool) -> ReadOptions {
+pub(super) fn told(quantity: Option<FileQuantity>, axes: Option<&str>, with_waves: bool) -> ReadOptions {
     let reading = FileReading {
         quantity,
         axes: axes.map(str::to_owned),
@@ -117,14 +111,14 @@ fn watts_of(of: Option<fn(f64) -> f64>) -> Option<Box<dyn Fn(f64) -> f64>> {
     of.map(|of| Box::new(of) as Box<dyn Fn(f64) -> f64>)
 }
 
-fn folder_and(name: &str) -> (tempfile::TempDir, PathBuf) {
+pub(super) fn folder_and(name: &str) -> (tempfile::TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(name);
     (folder, path)
 }
 
 /// Bytes of whole numbers as a type of `NumPy`.
-fn bytes_as(descr: &str, values: &[f64]) -> Vec<u8> {
+pub(super) fn bytes_as(descr: &str, values: &[f64]) -> Vec<u8> {
     let is_big = descr.starts_with('>');
     values
         .iter()
@@ -150,12 +144,12 @@ fn bytes_as(descr: &str, values: &[f64]) -> Vec<u8> {
 
 const TYPES: [&str; 9] = ["|u1", "<u2", ">u2", "<i2", ">i4", "<f4", ">f4", "<f8", "<i8"];
 
-fn npy_of(descr: &str, axes: &str) -> Vec<u8> {
+pub(super) fn npy_of(descr: &str, axes: &str) -> Vec<u8> {
     let shape = format!("({})", sides(axes).iter().map(ToString::to_string).collect::<Vec<_>>().join(", "));
     npy(descr, false, &shape, &bytes_as(descr, &in_order(axes)))
 }
 
-fn zip_of(entries: &[(&str, Vec<u8>)], is_deflated: bool) -> Vec<u8> {
+pub(super) fn zip_of(entries: &[(&str, Vec<u8>)], is_deflated: bool) -> Vec<u8> {
     let mut writer = zip::ZipWriter::new(std::io::Cursor::new(vec![]));
     let method = if is_deflated { zip::CompressionMethod::Deflated } else { zip::CompressionMethod::Stored };
     let how = zip::write::SimpleFileOptions::default().compression_method(method);
@@ -166,7 +160,7 @@ fn zip_of(entries: &[(&str, Vec<u8>)], is_deflated: bool) -> Vec<u8> {
     writer.finish().unwrap().into_inner()
 }
 
-fn waves_npy() -> Vec<u8> {
+pub(super) fn waves_npy() -> Vec<u8> {
     npy("<f8", false, "(5,)", &bytes_as("<f8", &WAVE_NM))
 }
 
@@ -275,97 +269,6 @@ fn envi_files_of_every_kind_are_right() {
                 check(&path, &ReadOptions::default(), Some(&|_| 2e-3), &what);
             }
         }
-    }
-}
-
-fn n_cases() -> usize {
-    std::env::var("DIOPTRIC_FUZZ_CASES").map_or(100, |text| text.parse().unwrap())
-}
-
-/// A word of which no format knows.
-fn word(rng: &mut ChaCha8Rng) -> String {
-    let tail: String = (0..rng.random_range(2..9)).map(|_| rng.random_range('a'..='z')).collect();
-    format!("zq{tail}")
-}
-
-/// Checks that a word in a file is named, or the file refused by its name.
-fn check_named(path: &Path, options: &ReadOptions, word: &str) {
-    match read_scene(path, options) {
-        Ok(scene) => assert!(scene.notes.iter().any(|note| note.contains(word)), "{word}: {:?}", scene.notes),
-        Err(error) => {
-            let message = error.to_string();
-            assert!(
-                message.contains(&*path.file_name().unwrap().to_string_lossy()) && !message.contains('\n'),
-                "{message}"
-            );
-            panic!("a word that nobody knows closes the file: {message}");
-        }
-    }
-}
-
-#[test]
-fn unknown_words_of_arrays_are_named() {
-    let mut rng = ChaCha8Rng::seed_from_u64(11);
-    let (_a, packed) = folder_and("a.npz");
-    let (_b, mat) = folder_and("a.mat");
-    let (_c, h5) = folder_and("a.h5");
-    for _ in 0..n_cases() {
-        let word = word(&mut rng);
-        let options = told(Some(FileQuantity::Reflectance), Some("yxb"), false);
-        let one = npy("<f8", false, "(1,)", &1.0_f64.to_le_bytes());
-        let bytes = zip_of(&[("cube", npy_of("<f4", "yxb")), ("wave", waves_npy()), (&word, one)], false);
-        fs::write(&packed, bytes).unwrap();
-        check_named(&packed, &options, &word);
-        let turned = in_order("bxy");
-        let cube = variable_of("cube", &sides("yxb"), 6, &turned);
-        let others = [variable_of("wave", &[5, 1], 6, &WAVE_NM), variable_of(&word, &[1, 2], 7, &[1.0, 2.0])];
-        fs::write(&mat, mat_file(&[vec![cube], others.to_vec()].concat())).unwrap();
-        check_named(&mat, &options, &word);
-        let mut file = hdf5_pure::FileBuilder::new();
-        file.create_dataset("cube").with_data(&in_order("yxb")).with_shape(&[3, 4, 5]);
-        file.create_dataset("wave").with_data(&WAVE_NM).with_shape(&[5]);
-        file.create_dataset(&word).with_data(&[1.0, 2.0]).with_shape(&[2]);
-        fs::write(&h5, file.finish().unwrap()).unwrap();
-        check_named(&h5, &options, &word);
-    }
-}
-
-#[test]
-fn unknown_words_of_headers_are_named() {
-    let mut rng = ChaCha8Rng::seed_from_u64(12);
-    let (_a, envi) = folder_and("a.hdr");
-    let (_b, exr) = folder_and("a.exr");
-    fs::write(envi.with_extension("raw"), bytes_as("<f4", &in_order("byx"))).unwrap();
-    for case in 0..n_cases() {
-        let word = word(&mut rng);
-        let waves = WAVE_NM.map(|nm| nm.to_string()).join(", ");
-        let value = ["1", "{1, 2, 3}", "some words", "{\n a,\n b}"][case % 4];
-        let mut lines: Vec<String> = [
-            format!("samples = {COLUMNS}"),
-            format!("lines = {ROWS}"),
-            "bands = 5".to_owned(),
-            "data type = 4".to_owned(),
-            "interleave = bsq".to_owned(),
-            "byte order = 0".to_owned(),
-            format!("wavelength = {{{waves}}}"),
-        ]
-        .to_vec();
-        lines.insert(rng.random_range(0..=lines.len()), format!("{word} = {value}"));
-        fs::write(&envi, format!("ENVI\n{}\n", lines.join("\n"))).unwrap();
-        check_named(&envi, &told(Some(FileQuantity::Reflectance), None, false), &word);
-        // An attribute of the header, or a channel.
-        let samples = || FlatSamples::F32(vec![0.5; 4]);
-        let mut channels: Vec<_> = ["R", "G", "B"].map(|name| AnyChannel::new(name, samples())).to_vec();
-        let mut attributes = LayerAttributes::default();
-        if case % 2 == 0 {
-            channels.push(AnyChannel::new(word.as_str(), samples()));
-        } else {
-            attributes.other.insert(Text::from(word.as_str()), AttributeValue::Text(Text::from("x")));
-        }
-        let list: SmallVec<[_; 4]> = channels.into_iter().collect();
-        let layer = Layer::new((2, 2), attributes, Encoding::FAST_LOSSLESS, AnyChannels::sort(list));
-        Image::from_layer(layer).write().to_file(&exr).unwrap();
-        check_named(&exr, &ReadOptions::default(), &word);
     }
 }
 

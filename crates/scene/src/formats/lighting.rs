@@ -2,13 +2,13 @@
 
 use std::path::Path;
 
-use dioptric_spectrum::{Display, Illuminant, Quantity, SpectralImage, Spectrum, WavelengthGrid};
+use dioptric_spectrum::{Display, Illuminant, Quantity, SmoothReflectance, SpectralImage, Spectrum, WavelengthGrid};
 use ndarray::Array2;
 
 use super::{
     contents::{Contents, Image},
     no_data::mend,
-    picture::{lifted, lifted_codes, linear_srgb, note_beyond},
+    picture::{BEYOND, lifted, lifted_codes, linear_srgb, note_beyond},
     read_options::ReadOptions,
     reading::FileQuantity,
     smooth_lift::{Colors, SmoothLift},
@@ -18,8 +18,6 @@ use crate::{SceneError, SceneLight, resampled};
 
 /// The illuminance on reflectances, and on a white of ordinary pictures, lx.
 const USUAL_LUX: f64 = 1000.0;
-/// Between these wavelengths colors tell what reflects them, nm.
-const LIFTED_NM: [f64; 2] = [380.0, 780.0];
 
 /// Returns the bands of a picture without a spectrum.
 fn picture_bands(options: &ReadOptions) -> Result<WavelengthGrid, SceneError> {
@@ -69,6 +67,11 @@ pub(super) fn lit(
                 }
                 Image::Linear { mut planes, .. } => {
                     prepare_colors(path, &mut planes, options, notes)?;
+                    let n = planes[0].len();
+                    let is_beyond = |i: &usize| {
+                        planes.iter().any(|plane| plane.as_slice().is_some_and(|own| f64::from(own[*i]) < -BEYOND))
+                    };
+                    notes.extend(note_beyond(path, (0..n).filter(is_beyond).count() as f64 / n.max(1) as f64));
                     lifted(&planes, &basis, &grid)?
                 }
                 Image::Spectral(image) => image,
@@ -109,11 +112,12 @@ fn reflecting(
     light.illuminant.check()?;
     notes.extend(beyond_table(&light.illuminant, &grid));
     let (first, last) = grid.range_nm();
-    if first < LIFTED_NM[0] || last > LIFTED_NM[1] {
+    if first < SmoothReflectance::FITTED_NM[0] || last > SmoothReflectance::FITTED_NM[1] {
         let name = name_of(path);
         notes.push(format!(
             "{name}: what its colors reflect beyond {} to {} nm is not known",
-            LIFTED_NM[0], LIFTED_NM[1]
+            SmoothReflectance::FITTED_NM[0],
+            SmoothReflectance::FITTED_NM[1]
         ));
     }
     let lift = SmoothLift::new(&grid, &light.illuminant)?;

@@ -7,6 +7,7 @@ mod belonging;
 mod camera;
 mod chart_table;
 mod contents;
+mod cube_folder;
 mod depth;
 mod envi;
 mod envi_data;
@@ -17,6 +18,7 @@ mod exr_stream;
 #[cfg(test)]
 mod exr_tests;
 mod exr_write;
+mod flat_size;
 #[cfg(test)]
 mod input_tests;
 #[cfg(test)]
@@ -35,6 +37,7 @@ mod photons;
 mod picture;
 mod point_table;
 mod primaries;
+mod radiance_header;
 mod raw_depth;
 mod read_options;
 mod read_scene;
@@ -47,6 +50,8 @@ mod tiff_file;
 mod understood;
 mod unmeasured;
 mod unusable;
+#[cfg(test)]
+mod word_tests;
 
 pub(crate) use picture::decode as decode_picture;
 pub(crate) use unusable::{check_made, unwritable};
@@ -54,9 +59,13 @@ pub(crate) use unusable::{check_made, unwritable};
 pub use belonging::may_be_read_with;
 pub use envi::envi_bytes;
 pub use exr_samples::ExrSamples;
-pub use exr_stream::{SpectralHead, read_exr_light};
+pub use exr_stream::{SpectralHead, is_irradiance_exr, read_exr_light};
 pub use exr_write::{ExrParts, write_planes_exr, write_scene_exr, write_spectral_exr};
-pub use mat::write_iset_scene;
+pub use flat_size::flat_size_of;
+pub use mat::{
+    IsetIrradiance, holds_iset_irradiance, read_iset_display, read_iset_irradiance, write_iset_irradiance,
+    write_iset_scene,
+};
 pub use photons::joules_per_photon;
 pub use picture::{PictureSamples, notes_on_samples, read_picture, read_picture_samples};
 pub use point_table::PointTable;

@@ -14,7 +14,7 @@ use super::{
     mat::WAVES,
     npy::{NpyArray, parse},
     read_options::ReadOptions,
-    stated::{note_of, short},
+    stated::{name_of, note_of, short},
     unusable::{check_memory, unreadable},
 };
 use crate::SceneError;
@@ -82,7 +82,9 @@ pub(super) fn read_npz(path: &Path, options: &ReadOptions) -> Result<Cube, Scene
     let planes = axes::planes(&array.sides, reading.axes.as_deref(), n_bands, true, at).map_err(wrong)?;
     let unused: Vec<String> =
         names.iter().filter(|name| **name != chosen && Some(*name) != list.as_ref()).map(|name| bare(name)).collect();
-    let notes = note_of(path, "array", &unused).into_iter().collect();
+    let ambiguous = axes::note(&array.sides, reading.axes.as_deref(), n_bands);
+    let ambiguous = ambiguous.map(|note| format!("{}: '{}': {note}", name_of(path), bare(&chosen)));
+    let notes = note_of(path, "array", &unused).into_iter().chain(ambiguous).collect();
     Ok(Cube { planes, top: array.top, wavelengths_nm: own, quantity: None, notes })
 }
 

@@ -44,7 +44,9 @@ pub(super) fn look(
     let sphere = Sphere::new(path, kind, rows, columns)?;
     // A film that needs less gets means over blocks; depths stay as they are.
     let coarser = options.finest_tangent.map_or(1, |finest| (finest / sphere.step()) as usize);
-    let divides = |bin: &usize| rows.is_multiple_of(*bin) && columns.is_multiple_of(*bin) && depth.is_none();
+    let divides = |bin: &usize| {
+        sphere.may_be_binned() && rows.is_multiple_of(*bin) && columns.is_multiple_of(*bin) && depth.is_none()
+    };
     let bin = (1..=coarser.clamp(1, 64)).rev().find(divides).unwrap_or(1);
     let sphere = Sphere::new(path, kind, rows / bin, columns / bin)?;
     let half = (0.5 * fov_deg.to_radians()).tan();
@@ -115,6 +117,18 @@ fn means(plane: &Array2<f32>, bin: usize) -> Array2<f32> {
     })
 }
 
+/// How the faces of a cube lie in a picture.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Layout {
+    /// As a cross, 4 × 3.
+    Cross,
+    /// Side by side: right, left, up, down, front, back.
+    Strip,
+    /// Below each other as `OpenEXR` has them (`ImfEnvmap.h`): +X, −X, +Y, −Y, +Z, −Z, the outermost samples on the edges of the cube; +Z lies
+    /// straight ahead and +X to the left.
+    OpenExr,
+}
+
 /// Where in a picture of all directions a direction lies.
 struct Sphere {
     kind: Panorama,
@@ -122,7 +136,7 @@ struct Sphere {
     columns: usize,
     /// Samples along the side of a face of a cube.
     side: usize,
-    is_cross: bool,
+    layout: Layout,
     /// Sines and cosines of where the camera looks: to the right, and up.
     yaw: (f64, f64),
     pitch: (f64, f64),
@@ -133,21 +147,38 @@ const IN_CROSS: [(usize, usize); 6] = [(2, 1), (0, 1), (1, 0), (1, 2), (1, 1), (
 
 impl Sphere {
     fn new(path: &Path, kind: Panorama, rows: usize, columns: usize) -> Result<Self, SceneError> {
-        let (is_cross, is_strip) = (3 * columns == 4 * rows, columns == 6 * rows);
+        let layout = match (3 * columns == 4 * rows, columns == 6 * rows, rows == 6 * columns) {
+            (true, ..) if rows >= 3 => Some(Layout::Cross),
+            (_, true, _) => Some(Layout::Strip),
+            (.., true) if columns >= 2 => Some(Layout::OpenExr),
+            _ => None,
+        };
         let wrong =
             |expected: &str| Err(unreadable(path, format!("it is {columns} × {rows} samples, expected {expected}")));
         match kind {
             Panorama::Equirectangular { .. } if columns.abs_diff(2 * rows) > 1 || rows < 2 => {
                 return wrong("a panorama twice as wide as high");
             }
-            Panorama::Cube { .. } if !(is_strip || is_cross && rows >= 3) => {
-                return wrong("the six faces of a cube as a cross, 4 × 3, or side by side, 6 × 1");
+            Panorama::Cube { .. } if layout.is_none() => {
+                return wrong(
+                    "the six faces of a cube as a cross, 4 × 3, side by side, 6 × 1, or 1 × 6 as OpenEXR has them",
+                );
             }
             _ => {}
         }
         let [yaw, pitch] = kind.looks_deg().map(|deg| deg.to_radians().sin_cos());
-        let side = if is_cross { columns / 4 } else { rows };
-        Ok(Self { kind, rows, columns, side, is_cross, yaw, pitch })
+        let layout = layout.unwrap_or(Layout::Strip);
+        let side = match layout {
+            Layout::Cross => columns / 4,
+            Layout::Strip => rows,
+            Layout::OpenExr => columns,
+        };
+        Ok(Self { kind, rows, columns, side, layout, yaw, pitch })
+    }
+
+    /// Whether means over blocks of its samples lie as its samples do.
+    fn may_be_binned(&self) -> bool {
+        matches!(self.kind, Panorama::Equirectangular { .. }) || self.layout != Layout::OpenExr
     }
 
     /// The tangent between two samples in its middle.
@@ -170,6 +201,7 @@ impl Sphere {
                 let column = (right / TAU + 0.5) * self.columns as f64 - 0.5;
                 ((((0.5 - height / PI) * self.rows as f64) - 0.5) as f32, column as f32)
             }
+            Panorama::Cube { .. } if self.layout == Layout::OpenExr => self.open_exr_place(-x, y, z),
             Panorama::Cube { .. } => {
                 let (ax, ay, az) = (x.abs(), y.abs(), z.abs());
                 // On each face to its right and downwards, −1 to 1.
@@ -182,13 +214,31 @@ impl Sphere {
                 } else {
                     (3, x / ay, -z / ay)
                 };
-                let (left, top) = if self.is_cross { IN_CROSS[face] } else { (face, 0) };
+                let (left, top) = if self.layout == Layout::Cross { IN_CROSS[face] } else { (face, 0) };
                 // Within the samples of its face: beside it in the picture lies another direction.
                 let n = self.side as f64;
                 let within = |at: f64| (0.5 * (at + 1.0) * n - 0.5).clamp(0.0, n - 1.0);
                 (((top * self.side) as f64 + within(down)) as f32, ((left * self.side) as f64 + within(right)) as f32)
             }
         }
+    }
+
+    /// Returns the row and column of a direction in the axes of `OpenEXR`.
+    fn open_exr_place(&self, x: f64, y: f64, z: f64) -> (f32, f32) {
+        let last = self.side as f64 - 1.0;
+        let on = |along: f64, largest: f64| 0.5 * (along / largest + 1.0) * last;
+        let (ax, ay, az) = (x.abs(), y.abs(), z.abs());
+        let (face, row, column) = if ax >= ay && ax >= az {
+            let (p, q) = (on(y, ax), on(z, ax));
+            if x > 0.0 { (0, last - p, q) } else { (1, last - p, last - q) }
+        } else if ay >= az {
+            let (p, q) = (on(x, ay), on(z, ay));
+            if y > 0.0 { (2, last - q, p) } else { (3, q, p) }
+        } else {
+            let (p, q) = (on(x, az), on(y, az));
+            if z > 0.0 { (4, last - q, last - p) } else { (5, last - q, p) }
+        };
+        ((row + (face * self.side) as f64) as f32, column as f32)
     }
 
     /// Returns a sample beside another, round the world where the picture goes round it.
@@ -281,6 +331,40 @@ mod tests {
                     // Straight lines between samples 0.7° apart, at worst half a sample held at the side of a face.
                     assert_abs_diff_eq!(f64::from(found), light(direction), epsilon = 2e-3);
                 }
+            }
+        }
+    }
+
+    /// The faces as `ImfEnvmap.cpp` places positions on them, written down apart from how they are read.
+    #[test]
+    fn cubes_of_openexr_show_what_lies_in_their_directions() {
+        let n = 65;
+        let on = |at: usize| 2.0 * at as f64 / (n - 1) as f64 - 1.0;
+        // What is to the left has the positive x there.
+        let plane = Array2::from_shape_fn((6 * n, n), |(row, column)| {
+            let (u, v) = (on(column), -on(row % n));
+            let [x, y, z] = match row / n {
+                0 => [1.0, v, u],
+                1 => [-1.0, v, -u],
+                2 => [u, 1.0, v],
+                3 => [u, -1.0, -v],
+                4 => [-u, v, 1.0],
+                _ => [u, v, -1.0],
+            };
+            light([-x, y, z]) as f32
+        });
+        let kind = |yaw_deg, pitch_deg| Panorama::Cube { yaw_deg, pitch_deg };
+        for (yaw_deg, pitch_deg) in [(0.0_f64, 0.0_f64), (90.0, 0.0), (-100.0, 30.0), (180.0, -80.0)] {
+            let sphere = Sphere::new(Path::new("a"), kind(yaw_deg, pitch_deg), 6 * n, n).unwrap();
+            let (yaw, pitch) = (yaw_deg.to_radians(), pitch_deg.to_radians());
+            for (tan_x, tan_y) in [(0.0, 0.0), (0.9, -0.3), (-3.0, 2.0), (0.1, 4.0)] {
+                let right = [yaw.cos(), 0.0, -yaw.sin()];
+                let ahead = [yaw.sin() * pitch.cos(), pitch.sin(), yaw.cos() * pitch.cos()];
+                let up = [-yaw.sin() * pitch.sin(), pitch.cos(), -yaw.cos() * pitch.sin()];
+                let direction = [0, 1, 2].map(|i| ahead[i] + tan_x * right[i] + tan_y * up[i]);
+                let found = sphere.mixed(&plane, sphere.place_of((tan_x, tan_y)));
+                // Straight lines between samples 1.4° apart.
+                assert_abs_diff_eq!(f64::from(found), light(direction), epsilon = 1e-3);
             }
         }
     }

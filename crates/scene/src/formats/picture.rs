@@ -21,7 +21,7 @@ const AT_ONCE: usize = 1 << 13;
 /// What a pixel takes as codes of 16 bits while it is lifted to bands, bytes.
 const CODES_BYTES: u64 = 6;
 /// A color is beyond the display's gamut where it has less of a primary than this share of white below 0.
-const BEYOND: f64 = 0.01;
+pub(super) const BEYOND: f64 = 0.01;
 /// What a pixel takes as planes of single floats beside its codes, bytes.
 const SAMPLES_BYTES: u64 = 15;
 
@@ -50,7 +50,7 @@ pub fn read_picture(
 }
 
 /// Returns the light of a picture of codes: sums of the spectra of red, green and blue of sRGB, `basis`. What would need negative light is 0; the share
-/// of pixels of which a channel is below 0 by more than a hundredth of white comes with it.
+/// of pixels of which a band is below 0 by more than a hundredth of white comes with it.
 pub(super) fn lifted_codes(
     path: &Path,
     picture: DynamicImage,
@@ -73,13 +73,6 @@ pub(super) fn lifted_codes(
             (0..grid.len()).map(at).collect()
         })
     });
-    let beyond_share = colors.map_or(0.0, |colors| {
-        let is_beyond = |codes: &&[u16]| {
-            let light = [0, 1, 2].map(|k| linear[k][usize::from(codes[k])]);
-            colors.to_srgb.iter().any(|row| row.iter().zip(light).map(|(m, v)| m * v).sum::<f64>() < -BEYOND)
-        };
-        picture.as_raw().par_chunks_exact(3).filter(is_beyond).count() as f64 / n.max(1) as f64
-    });
     let basis = own_basis.as_ref().unwrap_or(basis);
     let mut planes: Vec<Array2<f32>> = (0..grid.len()).map(|_| Array2::zeros((rows, columns))).collect();
     // A part of the picture in all bands before the next, while its colors are at hand.
@@ -88,15 +81,19 @@ pub(super) fn lifted_codes(
         let samples = plane.as_slice_mut().expect("a new plane is in standard order");
         parts.iter_mut().zip(samples.chunks_mut(AT_ONCE)).for_each(|(part, samples)| part.push(samples));
     }
-    parts.into_par_iter().zip(picture.as_raw().par_chunks(3 * AT_ONCE)).for_each(|(bands, codes)| {
+    let least: Vec<f64> = (0..grid.len()).map(|band| -BEYOND * (0..3).map(|k| basis[k][band]).sum::<f64>()).collect();
+    let in_part = |(bands, codes): (Vec<&mut [f32]>, &[u16])| {
+        let mut is_beyond = vec![false; codes.len() / 3];
         let colors = [0, 1, 2].map(|color| -> Vec<f64> {
             codes.iter().skip(color).step_by(3).map(|&code| linear[color][usize::from(code)]).collect()
         });
         for (band, samples) in bands.into_iter().enumerate() {
-            lift(&colors, [0, 1, 2].map(|color| basis[color][band]), samples);
+            lift(&colors, [0, 1, 2].map(|color| basis[color][band]), (samples, &mut is_beyond, least[band]));
         }
-    });
-    Ok((SpectralImage::new(Quantity::Radiance, grid.clone(), planes)?, beyond_share))
+        is_beyond.into_iter().filter(|is_beyond| *is_beyond).count()
+    };
+    let n_beyond: usize = parts.into_par_iter().zip(picture.as_raw().par_chunks(3 * AT_ONCE)).map(in_part).sum();
+    Ok((SpectralImage::new(Quantity::Radiance, grid.clone(), planes)?, n_beyond as f64 / n.max(1) as f64))
 }
 
 /// Returns linear sRGB of a picture of codes; what lies beyond sRGB is below 0 or above 1.
@@ -121,10 +118,17 @@ fn srgb_light(code: u16) -> f64 {
     srgb_decode(f64::from(code) / 65535.0)
 }
 
-/// Puts the radiance of colors in a band into `samples`.
-fn lift([red, green, blue]: &[Vec<f64>; 3], [r, g, b]: [f64; 3], samples: &mut [f32]) {
-    for (((sample, red), green), blue) in samples.iter_mut().zip(red).zip(green).zip(blue) {
-        *sample = (r * red + g * green + b * blue).max(0.0) as f32;
+/// Puts the radiance of colors in a band into samples, and marks those that would need less than `least`.
+fn lift(
+    [red, green, blue]: &[Vec<f64>; 3],
+    [r, g, b]: [f64; 3],
+    (samples, is_beyond, least): (&mut [f32], &mut [bool], f64),
+) {
+    let places = samples.iter_mut().zip(is_beyond);
+    for ((((sample, is_beyond), red), green), blue) in places.zip(red).zip(green).zip(blue) {
+        let light = r * red + g * green + b * blue;
+        *is_beyond |= light < least;
+        *sample = light.max(0.0) as f32;
     }
 }
 
@@ -222,7 +226,7 @@ fn stated_colors(path: &Path) -> Result<Option<StatedColors>, SceneError> {
 }
 
 /// Returns the orientation that a picture states.
-fn orientation_of(path: &Path) -> Orientation {
+pub(super) fn orientation_of(path: &Path) -> Orientation {
     let reader = image::ImageReader::open(path).ok().and_then(|reader| reader.with_guessed_format().ok());
     let decoder = reader.and_then(|reader| reader.into_decoder().ok());
     decoder.and_then(|mut decoder| decoder.orientation().ok()).unwrap_or(Orientation::NoTransforms)

@@ -58,8 +58,11 @@ impl PointTable {
     /// # Errors
     /// Names the line and the column that cannot be read.
     pub fn read(path: &Path) -> Result<Self, SceneError> {
-        let text = std::fs::read_to_string(path)
-            .map_err(|error| SceneError::Unreadable { file: path.to_owned(), reason: error.to_string() })?;
+        let unreadable = |reason: String| SceneError::Unreadable { file: path.to_owned(), reason };
+        let bytes = std::fs::read(path).map_err(|error| unreadable(error.to_string()))?;
+        let text = String::from_utf8(bytes).map_err(|_| {
+            unreadable("it is no text in UTF-8, expected a table with commas between columns".to_owned())
+        })?;
         Self::parse(&text).map_err(|reason| SceneError::Unreadable { file: path.to_owned(), reason })
     }
 
@@ -69,7 +72,10 @@ impl PointTable {
             csv::ReaderBuilder::new().comment(Some(b'#')).trim(csv::Trim::All).from_reader(text.as_bytes());
         let mut columns = BTreeMap::new();
         for (number, name) in reader.headers().map_err(|error| error.to_string())?.iter().enumerate() {
-            let name = name.to_ascii_lowercase();
+            let name = name.trim_matches(['"', ' ']).to_ascii_lowercase();
+            if name.contains([';', '\t']) {
+                return Err("line 1: expected commas between columns".to_owned());
+            }
             let is_known = PLACES.as_flattened().iter().chain(&AMOUNTS).chain(&OTHERS).any(|known| *known == name);
             if !is_known {
                 let known = [PLACES.as_flattened(), &AMOUNTS, &OTHERS].concat().join(", ");
@@ -111,6 +117,9 @@ impl PointTable {
             };
             let depth_m = if cell("depth_m").is_some() { number("depth_m")? } else { f64::INFINITY };
             let value = number(amount)?;
+            if amount != "magnitude" && !(value.is_finite() && value >= 0.0) {
+                return Err(format!("line {line}: {amount} is {value}, expected a finite number of 0 or more"));
+            }
             let amount = match amount {
                 "magnitude" => Amount::Magnitude(value),
                 "lux" => Amount::Lux(value),
@@ -154,7 +163,10 @@ impl Color {
                 false => Err(format!("light is '{text}', expected a wavelength of 100 nm to 100000 nm")),
             };
         }
-        Illuminant::parse(text).map(Self::Of).map_err(|error| format!("light is '{text}': {error}"))
+        Illuminant::parse(text).map(Self::Of).map_err(|_| {
+            let names = Illuminant::NAMES.join(", ");
+            format!("light is '{text}', expected {names}, a temperature (3000K), a chromaticity (\"0.46,0.414\") or a line (589nm)")
+        })
     }
 
     /// Returns the spectrum, per nm, of which 1 nm by 1 nm from 360 nm to 830 nm the luminous part is 1 lm, on bands.
@@ -286,7 +298,7 @@ mod tests {
             ("x_deg,lux\n0,1\n", "y_deg"),
             ("x_deg,y_deg,lux,color\n0,0,1,red\n", "'color' is not known"),
             ("x_deg,y_deg,lux\n0,0,1\n0,up,1\n", "line 3: y_deg is 'up'"),
-            ("x_deg,y_deg,lux\n0,0,-1\n", "line 2: the brightness"),
+            ("x_deg,y_deg,lux\n0,0,-1\n", "line 2: lux is -1"),
             ("x_deg,y_deg,lux\n95,0,1\n", "beside the camera"),
             ("x_deg,y_deg,candela\n0,0,1\n", "line 2: the depth"),
             ("x_deg,y_deg,candela,depth_m\n0,0,1,-2\n", "line 2: the depth"),
@@ -294,6 +306,8 @@ mod tests {
             ("x_deg,y_deg,lux,light\n0,0,1,950nm\n", "no eye sees"),
             ("x_deg,y_deg,lux,light\n0,0,1,D99\n", "line 2: light is 'D99'"),
             ("x_deg,y_deg,lux\n", "no point"),
+            ("x_deg;y_deg;lux\n1;2;3\n", "commas"),
+            ("x_deg,y_deg,lux\n0,0,inf\n", "line 2: lux is inf"),
             ("x_deg,y_deg,lux\n1,2\n", "fields"),
         ] {
             let found = PointTable::parse(text).unwrap_err();

@@ -4,12 +4,12 @@ use std::path::Path;
 
 use dioptric_files::memory;
 
-use super::{depth::files_beside, read_options::ReadOptions, stated::name_of};
+use super::{depth::files_beside, read_options::ReadOptions, reading::Panorama, stated::name_of};
 
-/// How many times coarser than [`ReadOptions::finest_tangent`] says samples may be where the memory allows no more: two a pixel.
-const COARSEST: f64 = 4.0;
+/// How many times coarser than [`ReadOptions::finest_tangent`] says samples may be where the memory allows no more: one a pixel.
+const COARSEST: f64 = 8.0;
 /// Bytes that a reader may leave free for what follows, as a share of what the program may take.
-const SHARE: u64 = 4;
+const SHARE: u64 = 8;
 
 /// The rows and columns as which a file is read.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -32,15 +32,23 @@ pub(super) fn reduced_size(
     if options.reading.depth.is_some() || !files_beside(path).is_empty() {
         return None;
     }
-    let own = 2.0 * (0.5 * fov_deg.to_radians()).tan() / columns as f64;
+    let own = match options.reading.panorama {
+        None => 2.0 * (0.5 * fov_deg.to_radians()).tan() / columns as f64,
+        Some(Panorama::Equirectangular { .. }) => std::f64::consts::TAU / columns as f64,
+        // Faces keep their places only whole.
+        Some(Panorama::Cube { .. }) => return None,
+    };
     let most = rows.min(columns);
     // Whole numbers of samples, of which some blocks may have one more.
     let finer = ((finest / own) as usize).clamp(1, most);
     let coarsest = ((COARSEST * finest / own) as usize).clamp(1, most);
     let takes = |block: usize| ((rows / block) as u64 * (columns / block) as u64).saturating_mul(bytes_a_sample);
     let allowed = memory::file_bytes(u64::MAX) / SHARE;
-    let block = (finer..=coarsest.max(finer)).find(|block| takes(*block) <= allowed).unwrap_or(finer);
-    let why = if block > finer { "as the memory allows" } else { "finer than those of the film by far" };
+    let block = (finer..=coarsest.max(finer)).find(|block| takes(*block) <= allowed).unwrap_or(coarsest.max(finer));
+    let why = match (block > finer, COARSEST * finest / own / block as f64) {
+        (false, _) => "finer than those of the film by far".to_owned(),
+        (true, a_pixel) => format!("{a_pixel:.1} a pixel of the film, as the memory allows: --memory says how much"),
+    };
     let (name, (new_rows, new_columns)) = (name_of(path), (rows / block, columns / block));
     let note = format!("{name}: its {columns} × {rows} samples are read as {new_columns} × {new_rows} means, {why}");
     (block >= 2).then_some(Reduced { rows: new_rows, columns: new_columns, note })

@@ -98,7 +98,7 @@ pub fn read_spectral_exr(path: &Path) -> Result<SpectralFile, SceneError> {
 fn no_bands(path: &Path) -> SceneError {
     SceneError::NoBands {
         file: path.to_owned(),
-        expected: "channels named like S0.550,000000nm (light) or T.550,000000nm (reflectance)",
+        expected: "channels R, G and B or Y, or named like S0.550,000000nm (light) or T.550,000000nm (reflectance)",
     }
 }
 
@@ -139,11 +139,15 @@ pub(super) fn read_raw_exr(path: &Path) -> Result<RawFile, SceneError> {
     let panorama = match layers.iter().find_map(|layer| layer.attributes.environment) {
         None => None,
         Some(EnvironmentMap::LatitudeLongitude) => Some(Panorama::Equirectangular { yaw_deg: 0.0, pitch_deg: 0.0 }),
-        Some(EnvironmentMap::Cube) => {
-            return Err(unreadable(path, "it is a cube of OpenEXR, expected a panorama by latitude and longitude"));
-        }
+        Some(EnvironmentMap::Cube) => Some(Panorama::Cube { yaw_deg: 0.0, pitch_deg: 0.0 }),
     };
     let mut notes = vec![];
+    if let Some(Panorama::Equirectangular { .. }) = panorama {
+        let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
+        notes.push(format!(
+            "{name}: its pixels are taken as areas of equal angles; envmap of its header puts the outermost on the edges, half a pixel away"
+        ));
+    }
     let index = layers.iter().position(RawLayer::has_bands);
     let mut first = layers.remove(index.unwrap_or(0));
     let (size, position) = (first.size, first.position);
@@ -295,7 +299,7 @@ pub(super) fn depth_channel(planes: Vec<(String, Array2<f32>)>) -> Option<(Strin
 }
 
 /// Returns the matrix from colors of these primaries to linear sRGB, their white adapted to D65 (Bradford).
-fn srgb_from(own: &Chromaticities) -> Option<[[f64; 3]; 3]> {
+pub(super) fn srgb_from(own: &Chromaticities) -> Option<[[f64; 3]; 3]> {
     let xyz = |p: exr::prelude::Vec2<f32>| {
         let (x, y) = (f64::from(p.0), f64::from(p.1));
         let is_color = x.is_finite() && y.is_finite() && y.abs() > 1e-6;

@@ -1,6 +1,6 @@
 //! Errors of files of scenes, by their paths.
 
-use std::{fs::File, path::Path};
+use std::{fs::File, io::Read, path::Path};
 
 use dioptric_files::{Staged, WriteError, memory};
 
@@ -36,4 +36,12 @@ pub(crate) fn check_memory(path: &Path, bytes: u64, length: u64) -> Result<(), S
 /// Checks that what is made of a file fits the memory that the program may take, however small the file.
 pub(crate) fn check_made(path: &Path, bytes: u64) -> Result<(), SceneError> {
     check_memory(path, bytes, u64::MAX)
+}
+
+/// Whether a file begins with these bytes.
+pub(crate) fn starts_with(path: &Path, start: &[u8]) -> Result<bool, SceneError> {
+    let mut bytes = vec![];
+    let file = File::open(path).map_err(|error| unreadable(path, error))?;
+    file.take(start.len() as u64).read_to_end(&mut bytes).map_err(|error| unreadable(path, error))?;
+    Ok(bytes == start)
 }

@@ -80,7 +80,7 @@ fn field_of(error: &PipelineError, camera: &Camera) -> Field {
 
 fn field_of_key(key: &str, camera: &Camera) -> Field {
     match key {
-        "lens" | "focal_length_mm" | "diameter_mm" | "slope_per_nm" => Field::Lens,
+        "lens" | "focal_length_mm" | "diameter_mm" | "slope_per_nm" | "lens_scale" => Field::Lens,
         "FNumber" | "DiameterMm" => Field::Stop,
         "DistanceMm" | "FilmMm" => Field::Focus,
         "tilt_deg" | "swing_deg" | "rise_mm" | "shift_mm" => Field::Movements,

@@ -37,6 +37,7 @@ const PANELS: &[(&str, &[&str])] = &[
     ("configuration", &["LensReadOptions.configuration"]),
     ("catalogues", &["LensReadOptions.glasses"]),
     ("index slope", &["LensReadOptions.slope_per_nm"]),
+    ("lens scale", &["LensReadOptions.lens_scale"]),
     ("seq numbers", &["LensReadOptions.seq_numbers"]),
     ("stop", &["Camera.stop"]),
     ("f-number", &["StopSpec.FNumber"]),
@@ -155,6 +156,7 @@ const PANELS: &[(&str, &[&str])] = &[
     ("illuminance", &["SceneSpec.illuminance_lux"]),
     ("light", &["SceneSpec.illuminant", "Illuminant"]),
     ("mean luminance", &["SceneSpec.mean_luminance_cd_m2"]),
+    ("mean on the film", &["SceneSpec.mean_lux"]),
     ("flat, by its size", &["SceneSpec.flat"]),
     ("flat width", &["FlatSize.width_mm"]),
     ("flat distance", &["FlatSize.distance_mm"]),
@@ -163,6 +165,7 @@ const PANELS: &[(&str, &[&str])] = &[
     ("missing depth", &["SceneSpec.fill_depth"]),
     ("filled depth", &["FillDepth.Metres"]),
     ("hidden file", &["SceneSpec.hidden"]),
+    ("points file", &["SceneSpec.points"]),
     ("method", &["WorldSpec.method"]),
     ("until", &["WorldSpec.effort"]),
     ("samples", &["RenderEffort.Samples"]),
@@ -261,6 +264,7 @@ fn cameras() -> Vec<Camera> {
             scene.flat = Some(FlatSize { width_mm: 10.0, distance_mm: 100.0 });
             camera.lens = LensSpec::File("none.zmx".into());
             camera.lens_reading.slope_per_nm = Some(-1e-4);
+            camera.lens_reading.lens_scale = Some(2.0);
             camera.frames = FramesSpec::Interleaved { ratio: 8.0, period_rows: 2, gain_ratio: 1.0 };
         }),
         world(RenderEffort::Samples(8)),
@@ -319,6 +323,7 @@ fn everything(camera: &mut Camera) {
 fn otherwise(camera: &mut Camera) {
     camera.dual_pixel = Some(DualPixelSpec::of(Photodiodes::LeftRight));
     camera.focus = FocusSpec::FilmMm(50.0);
+    camera.scene.mean_lux = Some(10.0);
     camera.wavelengths = WavelengthSpec::ListNm(vec![450.0, 550.0]);
     camera.frames = FramesSpec::BracketStops(vec![-1.0, 0.0]);
     camera.exposure = with_exposure_s(camera.exposure, 0.01);

@@ -23,6 +23,9 @@ const PEEK_BYTES: usize = 512;
 const MATRIX: u32 = 14;
 const COMPRESSED: u32 = 15;
 
+/// Stands for the file in place of a variable.
+pub(super) const WHOLE: &str = "/";
+
 /// The variables of a file that were wanted, inflated.
 #[derive(Debug)]
 pub(super) struct MatFile {
@@ -33,6 +36,8 @@ pub(super) struct MatFile {
     variables: Vec<(String, Vec<u8>)>,
     /// All variables of the file.
     pub(super) listed: Vec<Listed>,
+    /// What is stated of those of HDF5 besides their numbers.
+    attributes: Vec<(String, Vec<String>)>,
 }
 
 /// An array: its sides, and what it holds.
@@ -95,8 +100,10 @@ impl MatFile {
         for entry in chosen {
             variables.push((entry.listed.name.clone(), file.element(entry).map_err(wrong)?));
         }
+        let own = entries.iter().map(|entry| (entry.listed.name.clone(), entry.attributes.clone()));
+        let attributes = std::iter::once((WHOLE.to_owned(), file.attributes())).chain(own).collect();
         let listed = entries.into_iter().map(|entry| entry.listed).collect();
-        Ok(Self { is_big_endian: false, is_row_major: !file.is_matlab, variables, listed })
+        Ok(Self { is_big_endian: false, is_row_major: !file.is_matlab, variables, listed, attributes })
     }
 
     fn parse(bytes: &[u8], wanted: &dyn Fn(&Listed) -> bool) -> Result<Self, String> {
@@ -121,7 +128,12 @@ impl MatFile {
             variables.extend(content.map(|content| (own.name.clone(), content)));
             listed.push(own);
         }
-        Ok(Self { is_big_endian, is_row_major: false, variables, listed })
+        Ok(Self { is_big_endian, is_row_major: false, variables, listed, attributes: vec![] })
+    }
+
+    /// The names of what is stated of a variable besides its numbers.
+    pub(super) fn attributes_of(&self, name: &str) -> &[String] {
+        self.attributes.iter().find(|(own, _)| own == name).map_or(&[], |(_, attributes)| attributes)
     }
 
     /// Returns a variable, or `None` where the file has none of this name.

@@ -4,7 +4,8 @@
 //! round, the first being the fastest; arrays of other programs have the last as the fastest. How MATLAB marks its variables was
 //! taken from files that it wrote: attributes `MATLAB_class` and `MATLAB_empty`, structures as groups, cells as references.
 
-use hdf5_pure::{AttrValue, DType, Dataset, File, Group};
+use exr::prelude::f16;
+use hdf5_pure::{AttrValue, DType, Dataset, Datatype, DatatypeByteOrder, File, FloatingPointLayout, Group};
 
 use super::elements::{self, LIMIT_ARRAYS, LIMIT_DEPTH, Listed};
 
@@ -22,6 +23,8 @@ pub(super) struct Entry {
     is_group: bool,
     /// Bytes of its numbers.
     pub(super) n_bytes: u64,
+    /// What else is stated of it.
+    pub(super) attributes: Vec<String>,
 }
 
 impl Hdf5 {
@@ -29,6 +32,11 @@ impl Hdf5 {
     pub(super) fn open(bytes: Vec<u8>) -> Result<Self, String> {
         let is_matlab = bytes.starts_with(b"MATLAB 7.3");
         Ok(Self { file: File::from_bytes(bytes).map_err(broken)?, is_matlab })
+    }
+
+    /// Returns the names of what the file states of itself.
+    pub(super) fn attributes(&self) -> Vec<String> {
+        self.file.root().attrs().map(|own| unknown(own.into_keys().collect())).unwrap_or_default()
     }
 
     /// Lists the variables of MATLAB, or the arrays of all groups, by their paths.
@@ -43,13 +51,19 @@ impl Hdf5 {
             return Err(too_many());
         }
         for name in group.datasets().map_err(broken)? {
-            let dataset = group.dataset(&name).map_err(broken)?;
+            let path = format!("{before}{name}");
+            // A link to what is not there, or not here, is known by its name alone.
+            let Ok(dataset) = group.dataset(&name) else {
+                let listed = Listed { name: path.clone(), sides: vec![], is_numeric: false };
+                entries.push(Entry { listed, path, is_group: false, n_bytes: 0, attributes: vec![] });
+                continue;
+            };
             let sides = self.sides_of(&dataset)?;
             let is_numeric = class_of(&dataset).is_ok_and(|class| class.is_some());
             let n_bytes = sides.iter().map(|side| *side as u64).fold(8, u64::saturating_mul);
-            let path = format!("{before}{name}");
             let listed = Listed { name: path.clone(), sides, is_numeric };
-            entries.push(Entry { listed, path, is_group: false, n_bytes });
+            let stated = dataset.attrs().map(|own| own.into_keys().collect()).unwrap_or_default();
+            entries.push(Entry { listed, path, is_group: false, n_bytes, attributes: unknown(stated) });
         }
         for name in group.groups().map_err(broken)? {
             // What references lead to.
@@ -59,7 +73,7 @@ impl Hdf5 {
             let path = format!("{before}{name}");
             if self.is_matlab {
                 let listed = Listed { name: path.clone(), sides: vec![1, 1], is_numeric: false };
-                entries.push(Entry { listed, path, is_group: true, n_bytes: 0 });
+                entries.push(Entry { listed, path, is_group: true, n_bytes: 0, attributes: vec![] });
             } else {
                 let group = group.group(&name).map_err(broken)?;
                 self.list(&group, &format!("{path}/"), depth - 1, entries)?;
@@ -130,6 +144,25 @@ impl Hdf5 {
     }
 }
 
+/// Returns the names of attributes that may change what numbers mean, in their order.
+fn unknown(mut names: Vec<String>) -> Vec<String> {
+    const HARMLESS: [&str; 9] = [
+        "CLASS",
+        "NAME",
+        "REFERENCE_LIST",
+        "DIMENSION_LIST",
+        "DIMENSION_LABELS",
+        "TITLE",
+        "VERSION",
+        "FLAVOR",
+        "comment",
+    ];
+    names
+        .retain(|name| !(HARMLESS.contains(&name.as_str()) || name.starts_with("MATLAB_") || name.starts_with("_Net")));
+    names.sort();
+    names
+}
+
 /// Returns the class of numbers and the type that they are stored as; `None` where they are none.
 fn class_of(dataset: &Dataset) -> Result<Option<(u32, u32)>, String> {
     Ok(Some(match dataset.dtype().map_err(broken)? {
@@ -143,8 +176,29 @@ fn class_of(dataset: &Dataset) -> Result<Option<(u32, u32)>, String> {
         DType::U32 => (13, 6),
         DType::I64 => (14, 12),
         DType::U64 => (15, 13),
+        // Halves become singles, which hold them all.
+        DType::Other(kind) if half_order(&kind).is_some() => (elements::SINGLES, 7),
         _ => return Ok(None),
     }))
+}
+
+/// Returns the byte order of the half floats of IEEE 754; `None` of all else.
+fn half_order(kind: &Datatype) -> Option<DatatypeByteOrder> {
+    const HALF: FloatingPointLayout = FloatingPointLayout {
+        bit_offset: 0,
+        bit_precision: 16,
+        exponent_location: 10,
+        exponent_size: 5,
+        mantissa_location: 0,
+        mantissa_size: 10,
+        exponent_bias: 15,
+    };
+    match kind {
+        Datatype::FloatingPoint { size: 2, byte_order, layout } if *layout == HALF => {
+            Some(*byte_order).filter(|order| !matches!(order, DatatypeByteOrder::Vax))
+        }
+        _ => None,
+    }
 }
 
 /// Returns the numbers of an array, little-endian.
@@ -166,12 +220,22 @@ fn numbers_of(dataset: &Dataset) -> Result<Vec<u8>, String> {
         DType::U32 => bytes(dataset.read_u32(), u32::to_le_bytes),
         DType::I64 => bytes(dataset.read_i64(), i64::to_le_bytes),
         DType::U64 => bytes(dataset.read_u64(), u64::to_le_bytes),
+        DType::Other(kind) => {
+            let Some(order) = half_order(&kind) else { return Ok(vec![]) };
+            let raw = dataset.read_raw().map_err(broken)?;
+            let of = |pair: &[u8]| match order {
+                DatatypeByteOrder::BigEndian => f16::from_be_bytes([pair[0], pair[1]]),
+                _ => f16::from_le_bytes([pair[0], pair[1]]),
+            };
+            Ok(raw.chunks_exact(2).flat_map(|pair| of(pair).to_f32().to_le_bytes()).collect())
+        }
         _ => Ok(vec![]),
     }
 }
 
 fn broken(error: hdf5_pure::Error) -> String {
-    format!("it is HDF5 that cannot be read: {error}")
+    let way = "expected one without links, which older programs read as well (h5repack --high=V18)";
+    format!("it is HDF5 that cannot be read ({error}): {way}")
 }
 
 fn too_many() -> String {

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use dioptric_files::write;
+use dioptric_spectrum::{Illuminant, SpectralImage, WavelengthGrid};
 
 use super::{
     super::{photons::joules_per_photon, unusable::unwritable},
@@ -37,28 +38,12 @@ pub fn write_iset_scene(path: &Path, scene: &Scene) -> Result<(), SceneError> {
 fn content(scene: &Scene) -> Option<Vec<u8>> {
     let (rows, columns) = (scene.rows(), scene.columns());
     let wave_nm = scene.radiance.grid().centers_nm();
-    let photons = scene.radiance.planes().iter().zip(wave_nm).flat_map(|(plane, nm)| {
-        let joules = joules_per_photon(*nm);
-        // The first index, that of rows, is the fastest.
-        (0..rows * columns).map(move |i| (f64::from(plane[(i % rows, i / rows)]) / joules) as f32)
-    });
-    let named = |name: &str, content: Vec<u8>| (name.to_owned(), content);
-    let wave = || elements::structure("", &[named("wave", elements::doubles("", &[wave_nm.len(), 1], wave_nm)?)]);
     let mut fields = vec![
         named("type", elements::text("", "scene")?),
         named("name", elements::text("", &scene.name)?),
         named("metadata", elements::doubles("", &[0, 0], &[])?),
-        named("spectrum", wave()?),
-        named(
-            "data",
-            elements::structure(
-                "",
-                &[
-                    named("photons", elements::singles("", &[rows, columns, wave_nm.len()], photons)?),
-                    named("luminance", elements::doubles("", &[0, 0], &[])?),
-                ],
-            )?,
-        ),
+        named("spectrum", spectrum(wave_nm)?),
+        named("data", data(&scene.radiance, "luminance")?),
         named("magnification", elements::doubles("", &[1, 1], &[1.0])?),
     ];
     if let Some(view) = scene.view {
@@ -81,19 +66,46 @@ fn content(scene: &Scene) -> Option<Vec<u8>> {
         fields.push(named("depthMap", elements::doubles("", &[rows, columns], &distances)?));
     }
     if let Some((light, lux)) = scene.light.as_ref().and_then(|light| Some((light, light.illuminance_lux?))) {
-        let white = light.illuminant.white_radiance(scene.radiance.grid(), lux);
-        let photons: Vec<f64> = white.iter().zip(wave_nm).map(|(watts, nm)| watts / joules_per_photon(*nm)).collect();
-        let illuminant = [
-            named("type", elements::text("", "illuminant")?),
-            named("name", elements::text("", "light of the scene")?),
-            named("spectrum", wave()?),
-            named(
-                "data",
-                elements::structure("", &[named("photons", elements::doubles("", &[photons.len(), 1], &photons)?)])?,
-            ),
-        ];
-        fields.push(named("illuminant", elements::structure("", &illuminant)?));
+        fields.push(named("illuminant", illuminant(&light.illuminant, lux, scene.radiance.grid())?));
     }
     let scene = elements::structure("scene", &fields)?;
     Some([elements::file_head(), elements::variable(&scene)?].concat())
+}
+
+/// Returns a field of a structure.
+pub(super) fn named(name: &str, content: Vec<u8>) -> (String, Vec<u8>) {
+    (name.to_owned(), content)
+}
+
+/// Returns the structure `spectrum` of bands.
+pub(super) fn spectrum(wave_nm: &[f64]) -> Option<Vec<u8>> {
+    elements::structure("", &[named("wave", elements::doubles("", &[wave_nm.len(), 1], wave_nm)?)])
+}
+
+/// Returns the structure `data`: the photons of an image, and an empty field that `ISETCam` fills itself.
+pub(super) fn data(image: &SpectralImage, summary: &str) -> Option<Vec<u8>> {
+    let (rows, columns, wave_nm) = (image.rows(), image.columns(), image.grid().centers_nm());
+    let photons = image.planes().iter().zip(wave_nm).flat_map(|(plane, nm)| {
+        let joules = joules_per_photon(*nm);
+        // The first index, that of rows, is the fastest.
+        (0..rows * columns).map(move |i| (f64::from(plane[(i % rows, i / rows)]) / joules) as f32)
+    });
+    let photons = elements::singles("", &[rows, columns, wave_nm.len()], photons)?;
+    elements::structure("", &[named("photons", photons), named(summary, elements::doubles("", &[0, 0], &[])?)])
+}
+
+/// Returns the structure `illuminant`: the photons of a perfect white under a light.
+fn illuminant(light: &Illuminant, lux: f64, grid: &WavelengthGrid) -> Option<Vec<u8>> {
+    let (white, wave_nm) = (light.white_radiance(grid, lux), grid.centers_nm());
+    let photons: Vec<f64> = white.iter().zip(wave_nm).map(|(watts, nm)| watts / joules_per_photon(*nm)).collect();
+    let photons = elements::doubles("", &[photons.len(), 1], &photons)?;
+    elements::structure(
+        "",
+        &[
+            named("type", elements::text("", "illuminant")?),
+            named("name", elements::text("", "light of the scene")?),
+            named("spectrum", spectrum(wave_nm)?),
+            named("data", elements::structure("", &[named("photons", photons)])?),
+        ],
+    )
 }

@@ -14,11 +14,12 @@ use super::{
         contents::Cube as NumberCube,
         photons::joules_per_photon,
         reading::{FileQuantity, FileReading},
-        stated::note_of,
+        stated::{name_of, note_of},
         unusable::unreadable,
     },
-    container::{Content, MatArray, MatFile},
+    container::{Content, MatArray, MatFile, WHOLE},
     elements::Listed,
+    iset_kinds,
 };
 use crate::{SceneError, SceneLight};
 
@@ -68,7 +69,12 @@ pub(in super::super) enum MatScene {
     Iset(IsetScene),
     /// A cube of plain numbers.
     Cube(NumberCube),
+    /// Linear red, green and blue, and what of the file is not used.
+    Linear([Array2<f32>; 3], Vec<String>),
 }
+
+/// Names of arrays of three colors, as Hypersim and others write them.
+const COLORS: [&str; 4] = ["dataset", "color", "colors", "rgb"];
 
 /// Bands that a linear model may have: what it takes of memory is at most a thousand times its coefficients.
 const LIMIT_BANDS: usize = 1000;
@@ -107,7 +113,11 @@ pub(in super::super) fn read_mat(path: &Path, reading: &FileReading) -> Result<M
     let is_list = |own: &Listed| WAVES.contains(&last_part(&own.name)) && own.is_numeric;
     let wanted = |own: &Listed| {
         let name = own.name.as_str();
-        WANTED.contains(&name) || name == "dist" || told == Some(name) || is_cube(own) || is_list(own)
+        match told {
+            // Others may be of a kind that cannot be read.
+            Some(told) => told == name || is_list(own),
+            None => WANTED.contains(&name) || name == "dist" || is_cube(own) || is_list(own),
+        }
     };
     let file = MatFile::read(path, &wanted)?;
     let wrong = |reason: String| unreadable(path, reason);
@@ -116,9 +126,18 @@ pub(in super::super) fn read_mat(path: &Path, reading: &FileReading) -> Result<M
     if told.is_none() && (has("scene") || has("mcCOEF") || has("photons")) {
         return of_iset(path, &file).map(MatScene::Iset);
     }
+    if told.is_none()
+        && !file.listed.iter().any(is_cube)
+        && let Some(what) = iset_kinds::other_than_scene(&file)
+    {
+        return Err(wrong(what));
+    }
     // What is called data is photons where it is as much as only photons are.
-    let is_open = told.is_none() && reading.quantity.is_none() && reading.unit.is_none();
-    if is_open && let Some(data) = file.array("data").map_err(wrong)? {
+    let is_open = reading.quantity.is_none() && reading.unit.is_none();
+    if is_open
+        && told.is_none()
+        && let Some(data) = file.array("data").map_err(wrong)?
+    {
         let most = data.list().unwrap_or_default().into_iter().fold(0.0, f64::max);
         if most > LEAST_PHOTONS {
             let mut scene = of_iset(path, &file)?;
@@ -147,7 +166,14 @@ pub(in super::super) fn read_mat(path: &Path, reading: &FileReading) -> Result<M
             _ => return Err(wrong(format!("it has several cubes, {}: expected --variable", cubes.join(", ")))),
         },
     };
-    cube_of(path, &file, name, reading).map_err(wrong).map(MatScene::Cube)
+    let mut cube = cube_of(path, &file, name, reading).map_err(wrong)?;
+    let is_unsaid = cube.wavelengths_nm.is_none() && reading.wavelengths_nm.is_none() && cube.quantity.is_none();
+    let is_color = file.is_row_major && cube.top.is_none() && COLORS.contains(&last_part(name).to_lowercase().as_str());
+    if is_unsaid && is_open && is_color && cube.planes.len() == 3 {
+        let mut plane = || cube.planes.remove(0);
+        return Ok(MatScene::Linear([plane(), plane(), plane()], cube.notes));
+    }
+    Ok(MatScene::Cube(cube))
 }
 
 /// Returns the name of an array without the groups that it is in.
@@ -172,8 +198,12 @@ fn cube_of(path: &Path, file: &MatFile, name: &str, reading: &FileReading) -> Re
     // A list that counts bands, or of another length, is none of wavelengths.
     let is_bands = |list: &[f64]| array.sides.contains(&list.len()) && list.iter().all(|nm| *nm >= 100.0);
     let waves = waves.filter(|(_, list)| is_bands(list));
-    let known =
-        KNOWN.iter().find(|(own, n, _)| *own == name && array.sides.last() == Some(n)).map(|(_, n, [first, last])| {
+    // What is known by name gives way to what is told.
+    let known = KNOWN
+        .iter()
+        .filter(|_| reading.wavelengths_nm.is_none())
+        .find(|(own, n, _)| *own == name && array.sides.last() == Some(n))
+        .map(|(_, n, [first, last])| {
             (0..*n).map(|i| first + (last - first) * i as f64 / (*n as f64 - 1.0)).collect::<Vec<f64>>()
         });
     let own = waves.as_ref().map(|(_, list)| list.clone()).or(known);
@@ -184,6 +214,10 @@ fn cube_of(path: &Path, file: &MatFile, name: &str, reading: &FileReading) -> Re
     let used = |own: &str| own == name || waves.as_ref().is_some_and(|(list, _)| list == own);
     let unused: Vec<String> = file.listed.iter().map(|own| own.name.clone()).filter(|own| !used(own)).collect();
     let mut notes: Vec<String> = note_of(path, "variable", &unused).into_iter().collect();
+    let file_name = name_of(path);
+    let ambiguous = axes::note(&array.sides, reading.axes.as_deref(), n_bands);
+    notes.extend(ambiguous.map(|note| format!("{file_name}: '{name}': {note}")));
+    notes.extend(note_of(path, "attribute", &[file.attributes_of(WHOLE), file.attributes_of(name)].concat()));
     let mut quantity = None;
     let told = reading.quantity.is_some() || reading.unit.is_some();
     if !told && !numbers.is_integer {
@@ -234,14 +268,14 @@ fn unused_of(path: &Path, file: &MatFile) -> Result<Vec<String>, String> {
 }
 
 /// Returns the places of numbers in ascending order.
-fn ascending(numbers: &[f64]) -> Vec<usize> {
+pub(super) fn ascending(numbers: &[f64]) -> Vec<usize> {
     let mut order: Vec<usize> = (0..numbers.len()).collect();
     order.sort_by(|&a, &b| numbers[a].total_cmp(&numbers[b]));
     order
 }
 
 /// Returns the light whose perfect white has this radiance.
-fn light_of(white: &Spectrum) -> Result<SceneLight, String> {
+pub(super) fn light_of(white: &Spectrum) -> Result<SceneLight, String> {
     let illuminant = Illuminant::Spectrum(white.clone());
     illuminant.check().map_err(|error| format!("its illuminant cannot be: {error}"))?;
     let fine = WavelengthGrid::uniform(360.0, 830.0, 1.0).expect("a valid range");
@@ -322,11 +356,16 @@ impl Raw {
 }
 
 /// Photons of each band.
-struct Cube(Vec<Array2<f32>>);
+pub(super) struct Cube(Vec<Array2<f32>>);
 
 impl Cube {
     /// Reads rows × columns × bands, of whole numbers between the ends of `range` where they are coded so.
-    fn of(array: &MatArray<'_>, name: &str, range: Option<[f64; 2]>, n_bands: usize) -> Result<Self, String> {
+    pub(super) fn of(
+        array: &MatArray<'_>,
+        name: &str,
+        range: Option<[f64; 2]>,
+        n_bands: usize,
+    ) -> Result<Self, String> {
         let numbers = array.numbers().map_err(|what| format!("its '{name}' is {what}, expected numbers"))?;
         let (rows, columns) = match array.sides[..] {
             [rows, columns] if n_bands == 1 => (rows, columns),
@@ -356,7 +395,7 @@ impl Cube {
     }
 
     /// Returns the energy of the photons.
-    fn into_watts(mut self, wave_nm: &[f64]) -> Result<Vec<Array2<f32>>, String> {
+    pub(super) fn into_watts(mut self, wave_nm: &[f64]) -> Result<Vec<Array2<f32>>, String> {
         for (plane, &nm) in self.0.iter_mut().zip(wave_nm) {
             let joules = joules_per_photon(nm);
             if !(joules.is_finite() && joules > 0.0) {
@@ -414,7 +453,7 @@ fn plane_of(array: &MatArray<'_>, (rows, columns): (usize, usize)) -> Result<Arr
 
 /// Returns the radiance of a perfect white, W m⁻² sr⁻¹ nm⁻¹: of a modern illuminant from its photons, of an old one from its
 /// energy; `None` where it is not the same everywhere, or of another length than its bands.
-fn white_of(illuminant: &MatArray<'_>, scene_wave_nm: &[f64]) -> Option<Spectrum> {
+pub(super) fn white_of(illuminant: &MatArray<'_>, scene_wave_nm: &[f64]) -> Option<Spectrum> {
     let wave = illuminant.field("spectrum").and_then(|spectrum| spectrum.field("wave"));
     let wave = wave.or_else(|| illuminant.field("wave")).or_else(|| illuminant.field("wavelength"));
     let wave_nm = wave.and_then(MatArray::list).unwrap_or_else(|| scene_wave_nm.to_vec());

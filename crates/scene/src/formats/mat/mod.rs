@@ -5,12 +5,19 @@ mod elements;
 #[cfg(test)]
 pub(super) mod fixtures;
 mod hdf5;
+mod iset_display;
+mod iset_film;
+mod iset_kinds;
 mod iset_write;
 mod isetcam;
+mod plane;
 #[cfg(test)]
 mod tests;
 
+pub use iset_display::read_iset_display;
+pub use iset_film::{IsetIrradiance, holds_iset_irradiance, read_iset_irradiance, write_iset_irradiance};
 pub use iset_write::write_iset_scene;
 #[cfg(test)]
 use isetcam::IsetScene;
 pub(super) use isetcam::{MatScene, WAVES, read_mat};
+pub(super) use plane::{Plane, read_plane};

@@ -21,7 +21,7 @@ fn fixture(name: &str) -> PathBuf {
 fn read_iset_mat(path: &Path) -> Result<IsetScene, SceneError> {
     match read_mat(path, &FileReading::default())? {
         MatScene::Iset(scene) => Ok(scene),
-        MatScene::Cube(_) => panic!("no scene of ISETCam"),
+        MatScene::Cube(_) | MatScene::Linear(..) => panic!("no scene of ISETCam"),
     }
 }
 

@@ -247,6 +247,9 @@ fn reading(ui: &mut Ui, reading: &mut LensReadOptions) {
     let words = "Change of index a nanometre, of media of which one index is stated";
     let slope = NumberField::even("index slope", "1/nm", -0.01..=0.01, -0.001..=0.001, words);
     optional(ui, slope, &mut reading.slope_per_nm, -1.333e-4);
+    let words = "How many times as large the lens is as its prescription has it, in all its lengths";
+    let scale = NumberField::even("lens scale", "", 1e-6..=1e6, 0.1..=10.0, words);
+    optional(ui, scale, &mut reading.lens_scale, 2.0);
     let numbers =
         [(None, "what is plausible"), (Some(SeqNumbers::Radii), "radii"), (Some(SeqNumbers::Curvatures), "curvatures")];
     let words = "What the numbers of surfaces are in a CODE V file that does not state it";

@@ -99,6 +99,9 @@ fn more(ui: &mut Ui, scene: &mut SceneSpec) {
     let words = "Scales the radiance to this mean luminance";
     let luminance = NumberField::by_factors("mean luminance", "cd/m²", 1e-9..=1e9, 0.01..=1e4, words);
     optional(ui, luminance, &mut scene.mean_luminance_cd_m2, 100.0);
+    let words = "Scales the light so that the film gets this illuminance on average";
+    let lux = NumberField::by_factors("mean on the film", "lux", 1e-9..=1e9, 0.01..=1e4, words);
+    optional(ui, lux, &mut scene.mean_lux, 10.0);
     let mut is_flat = scene.flat.is_some();
     let words = "A flat scene stated by its size, in place of field of view and depth: slides, documents, wafers";
     if tick(ui, "flat, by its size", words, &mut is_flat) {

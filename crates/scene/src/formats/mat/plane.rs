@@ -1,0 +1,65 @@
+//! An array of two axes of a MATLAB or HDF5 file: a depth.
+
+use std::path::Path;
+
+use ndarray::Array2;
+
+use super::{
+    super::{stated::note_of, unusable::unreadable},
+    container::MatFile,
+    elements::Listed,
+};
+use crate::SceneError;
+
+/// Names of arrays of depth, those of distances from the camera first.
+const NAMES: [&str; 10] =
+    ["distance", "depth_meters", "depth", "depths", "depthmap", "depth_map", "z", "dataset", "rawdepths", "disparity"];
+
+/// A plane of numbers.
+pub(in super::super) struct Plane {
+    /// The name of the array.
+    pub(in super::super) name: String,
+    pub(in super::super) values: Array2<f32>,
+    /// The largest number that its whole numbers have.
+    pub(in super::super) top: Option<f64>,
+    pub(in super::super) notes: Vec<String>,
+}
+
+/// Reads the one plane of a file, or that whose name says that it is a depth.
+///
+/// # Errors
+/// When it has none, or several of other names.
+pub(in super::super) fn read_plane(path: &Path) -> Result<Plane, SceneError> {
+    let sides_of = |own: &Listed| own.sides.iter().copied().filter(|side| *side != 1).collect::<Vec<usize>>();
+    let is_plane = |own: &Listed| own.is_numeric && sides_of(own).len() == 2;
+    let file = MatFile::read(path, &is_plane)?;
+    let wrong = |reason: String| unreadable(path, reason);
+    let planes: Vec<&Listed> = file.listed.iter().filter(|own| is_plane(own)).collect();
+    let last = |own: &Listed| own.name.rsplit('/').next().unwrap_or_default().to_lowercase();
+    let named = NAMES.iter().find_map(|name| planes.iter().find(|own| last(own) == *name));
+    let chosen = match (named, &planes[..]) {
+        (Some(named), _) => named,
+        (None, [only]) => only,
+        (None, []) => return Err(wrong("it has no array of rows and columns, expected one of depth".to_owned())),
+        (None, _) => {
+            let names = planes.iter().map(|own| own.name.as_str()).collect::<Vec<_>>().join(", ");
+            return Err(wrong(format!("it has several arrays, {names}: expected one, or one that is called depth")));
+        }
+    };
+    let array = file.array(&chosen.name).map_err(wrong)?.ok_or_else(|| wrong("its depth is not there".to_owned()))?;
+    let numbers =
+        array.numbers().map_err(|what| wrong(format!("its '{}' is {what}, expected numbers", chosen.name)))?;
+    let sides = sides_of(chosen);
+    let (rows, columns) = (sides[0], sides[1]);
+    let at = |(row, column): (usize, usize)| {
+        if file.is_row_major { column + columns * row } else { row + rows * column }
+    };
+    let others: Vec<String> =
+        file.listed.iter().map(|own| own.name.clone()).filter(|own| *own != chosen.name).collect();
+    Ok(Plane {
+        name: chosen.name.clone(),
+        values: Array2::from_shape_fn((rows, columns), |place| numbers.at(at(place)) as f32),
+        top: numbers.is_integer.then(|| numbers.top()),
+        notes: note_of(path, "array", &others).into_iter().collect(),
+    })
+}
