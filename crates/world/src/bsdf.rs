@@ -153,6 +153,10 @@ impl<const N: usize> Bsdf<N> {
             {
                 self.chances -= last.chance;
             }
+            if self.lobes.is_empty() {
+                // Most surfaces have one.
+                self.lobes.reserve_exact(1);
+            }
             self.lobes.push((factor, lobe));
             self.chances += factor.chance;
         }
@@ -324,7 +328,8 @@ impl<const N: usize> Lobe<N> {
             }
             Self::Glossy { reflectance, index, rough: Some(ggx) } if is_reflection => {
                 let (common, cos) = facet_reflection(ggx, o, i);
-                lanes(|lane| reflectance[lane] * common * fresnel::dielectric(cos, index[lane]))
+                let mirrored = fresnel::dielectrics(cos, index);
+                lanes(|lane| reflectance[lane] * common * mirrored[lane])
             }
             Self::Pane { reflectance, transmittance, rough: Some(ggx) } => {
                 let (of, i) = if is_reflection { (reflectance, i) } else { (transmittance, across(i)) };
@@ -361,12 +366,12 @@ impl<const N: usize> Lobe<N> {
             }
             Self::Coated { diffuse, index, inside, rough } if is_reflection => {
                 let (common, cos) = rough.as_ref().map_or((0.0, 1.0), |ggx| facet_reflection(ggx, o, i));
+                let [out, of, mirrored] = [o.z, i.z, cos].map(|z| fresnel::dielectrics(z.abs(), index));
                 lanes(|lane| {
                     let n = index[lane];
-                    let through = |z: f32| 1.0 - fresnel::dielectric(z.abs(), n);
                     let between = diffuse[lane] / (n * n * (1.0 - diffuse[lane] * inside[lane]));
-                    let base = FRAC_1_PI * i.z.abs() * through(o.z) * through(i.z) * between;
-                    base + common * fresnel::dielectric(cos, n)
+                    let base = FRAC_1_PI * i.z.abs() * (1.0 - out[lane]) * (1.0 - of[lane]) * between;
+                    base + common * mirrored[lane]
                 })
             }
             _ => [0.0; N],
@@ -478,7 +483,8 @@ impl<const N: usize> Lobe<N> {
         match self {
             Self::Mirror { reflectance, .. } => all(*reflectance),
             Self::Glossy { reflectance, index, .. } => {
-                all(lanes(|lane| reflectance[lane] * fresnel::dielectric(cos, index[lane])))
+                let mirrored = fresnel::dielectrics(cos, index);
+                all(lanes(|lane| reflectance[lane] * mirrored[lane]))
             }
             Self::Pane { reflectance, transmittance, .. } => {
                 let p = self.back_probability();
@@ -498,13 +504,13 @@ impl<const N: usize> Lobe<N> {
             }
             Self::Metal { n, k, .. } => all(lanes(|lane| fresnel::conductor(cos, n[lane], k[lane]))),
             Self::Coated { index, .. } => {
-                let value = lanes(|lane| fresnel::dielectric(cos, index[lane]));
+                let value = fresnel::dielectrics(cos, index);
                 let probability = self.coat_probability(o);
                 Some(Mirrored { incident: back, value, probability, is_dispersed: false })
             }
             Self::Dielectric { index, reflectance, transmittance, .. } => {
-                let eta = index.map(|n| if o.z > 0.0 { n } else { 1.0 / n });
-                let value = eta.map(|eta| fresnel::dielectric(cos, eta));
+                let eta: [f32; N] = lanes(|lane| if o.z > 0.0 { index[lane] } else { 1.0 / index[lane] });
+                let value = fresnel::dielectrics(cos, &eta);
                 let probability = value[0];
                 if u_lobe < probability {
                     let value = lanes(|lane| reflectance[lane] * value[lane]);
@@ -531,7 +537,8 @@ impl<const N: usize> Lobe<N> {
             Self::Diffuse { reflectance, transmittance } => lanes(|lane| reflectance[lane] + transmittance[lane]),
             Self::RoughDiffuse { reflectance, .. } | Self::Mirror { reflectance, .. } => *reflectance,
             Self::Glossy { reflectance, index, .. } => {
-                lanes(|lane| reflectance[lane] * fresnel::dielectric(cos, index[lane]))
+                let mirrored = fresnel::dielectrics(cos, index);
+                lanes(|lane| reflectance[lane] * mirrored[lane])
             }
             Self::Metal { n, k, .. } => lanes(|lane| fresnel::conductor(cos, n[lane], k[lane])),
             Self::Dielectric { index, reflectance, transmittance, .. } => lanes(|lane| {
@@ -553,11 +560,13 @@ impl<const N: usize> Lobe<N> {
                 })
             }
             Self::Open => [1.0; N],
-            Self::Coated { diffuse, index, inside, .. } => lanes(|lane| {
-                let mirrored = fresnel::dielectric(cos, index[lane]);
-                mirrored
-                    + (1.0 - mirrored) * diffuse[lane] * (1.0 - inside[lane]) / (1.0 - diffuse[lane] * inside[lane])
-            }),
+            Self::Coated { diffuse, index, inside, .. } => {
+                let mirrored = fresnel::dielectrics(cos, index);
+                lanes(|lane| {
+                    let below = diffuse[lane] * (1.0 - inside[lane]) / (1.0 - diffuse[lane] * inside[lane]);
+                    mirrored[lane] + (1.0 - mirrored[lane]) * below
+                })
+            }
         }
     }
 

@@ -121,8 +121,15 @@ impl SpectralCurve {
         match &self.kind {
             Kind::Constant => [self.scale; N],
             Kind::Knots { knots, beyond } => lanes(|i| self.scale * between_knots(knots, *beyond, wavelengths_nm[i])),
-            Kind::Table { first_nm, values, beyond } => {
-                lanes(|i| self.scale * in_table(wavelengths_nm[i] - first_nm, values, *beyond))
+            Kind::Table { first_nm, values, beyond: Beyond::Held } => {
+                lanes(|i| self.scale * held_in_table(wavelengths_nm[i] - first_nm, values))
+            }
+            Kind::Table { first_nm, values, beyond: Beyond::Zero } => {
+                let last_nm = first_nm + (values.len() - 1) as f32;
+                lanes(|i| match (*first_nm..=last_nm).contains(&wavelengths_nm[i]) {
+                    true => self.scale * held_in_table(wavelengths_nm[i] - first_nm, values),
+                    false => 0.0,
+                })
             }
             Kind::Smooth(smooth) => {
                 let share = smooth.at(wavelengths_nm);
@@ -195,15 +202,13 @@ fn between_knots(knots: &[(f32, f32)], beyond: Beyond, wavelength_nm: f32) -> f3
 }
 
 #[inline]
-fn in_table(along_nm: f32, values: &[f32], beyond: Beyond) -> f32 {
+fn held_in_table(along_nm: f32, values: &[f32]) -> f32 {
     let last = values.len() - 1;
-    if beyond == Beyond::Zero && !(along_nm >= 0.0 && along_nm <= last as f32) {
-        return 0.0;
-    }
     let along_nm = along_nm.clamp(0.0, last as f32);
-    let below = (along_nm as usize).min(last.saturating_sub(1));
-    let above = (below + 1).min(last);
-    values[below] + (along_nm - below as f32) * (values[above] - values[below])
+    // A whole number of nanometers fits into 32 bits, from which it is quicker to turn back.
+    let below = along_nm as i32;
+    let (low, high) = (values[below as usize], values[(below as usize + 1).min(last)]);
+    low + (along_nm - below as f32) * (high - low)
 }
 
 #[cfg(test)]

@@ -333,8 +333,10 @@ impl Surfaces<'_> {
         wavelengths_nm: &[f32; N],
     ) {
         let surface = &self.surfaces[material.0 as usize];
-        let share_of =
-            |texture: TextureId| self.textures.spectral(texture, at, wavelengths_nm).map(|v| v.clamp(0.0, 1.0));
+        let share_of = |texture: TextureId| -> [f32; N] {
+            let value = self.textures.spectral(texture, at, wavelengths_nm);
+            lanes(|lane| value[lane].clamp(0.0, 1.0))
+        };
         let number = |texture: TextureId| self.textures.number(texture, at).clamp(0.0, 1.0);
         let rough = |roughness: &Roughness| {
             roughness.and_then(|alphas| {
@@ -415,7 +417,7 @@ impl Surfaces<'_> {
                 let lost = [mirrored.iter().copied().fold(0.0, f32::max), edge];
                 let base = (1.0 - metallic) * (1.0 - through);
                 let layered = Lobe::Layered {
-                    diffuse: color.map(|c| c * base),
+                    diffuse: lanes(|lane| color[lane] * base),
                     mirrored: lanes(|lane| mirrored[lane] + metallic * (color[lane] - mirrored[lane])),
                     edge: edge + metallic * (1.0 - edge),
                     lost,

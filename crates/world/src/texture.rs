@@ -156,7 +156,8 @@ impl Textures<'_> {
         match &self.0[id.0 as usize] {
             Texture::Curve(curve) => curve.at(wavelengths_nm),
             Texture::Image { image, mapping, scale } => {
-                image.reflectance_at(mapping.at(at)).at(wavelengths_nm).map(|v| v * scale)
+                let reflectance = image.reflectance_at(mapping.at(at)).at(wavelengths_nm);
+                lanes(|lane| reflectance[lane] * scale)
             }
             Texture::Checkerboard { fields, mapping } => {
                 self.spectral(fields[field(mapping.at(at))], at, wavelengths_nm)

@@ -22,6 +22,9 @@ pub(super) struct LightRays {
 }
 
 impl LightRays {
+    /// As few as there can be.
+    pub(super) const FEW: Self = Self { n_lights: 1, n_bounces: 1, n_gloss: 1 };
+
     /// More of them where light is smoothed less: where less than all samples beside are [`alike`](super::smooth::alike).
     pub(super) fn where_alike(self, alike: f32) -> Self {
         let times = match alike {
@@ -94,7 +97,7 @@ impl<const N: usize> Gatherer<'_, N> {
         Sampler::new(self.seed ^ (purpose << 40), block, n, within * n + index)
     }
 
-    fn integrator(&self) -> Integrator<'_> {
+    pub(super) fn integrator(&self) -> Integrator<'_> {
         Integrator { world: self.world, paths: LightPaths::Full, clamp: Some(self.most) }
     }
 

@@ -44,6 +44,8 @@ pub(super) struct First {
 const MOST_MIRRORS: usize = 12;
 /// What is mirrored of light less than this is not looked for.
 const LEAST_MIRRORED: f32 = 1e-3;
+/// What is mirrored less than this is lit by few rays: its noise is as weak.
+const WEAK: f32 = 0.15;
 /// How many mirrors deep what is mirrored besides is looked for.
 const DEEP: usize = 3;
 
@@ -141,6 +143,7 @@ impl<const N: usize> Gatherer<'_, N> {
     ) -> [f32; N] {
         let mut sum: [f32; N] = lanes(|lane| surface.through[lane] * gloss[lane]);
         for (ray, value) in &surface.mirrored {
+            let rays = if mean(value) < WEAK { LightRays::FEW } else { rays };
             let seen = self.lit_along(*ray, at, (rays, DEEP));
             (0..N).for_each(|lane| sum[lane] += value[lane] * seen[lane]);
         }
@@ -215,8 +218,8 @@ fn seen_side(hit: &Hit, normal: Vec3, along: Vec3) -> Vec3 {
 /// Returns the size of details that a pixel blurs away, m, where it is `width_m` wide.
 fn footprint_m(hit: &Hit, direction: Vec3, width_m: f32) -> f32 {
     let cos = hit.geometric_normal.dot(direction).abs().max(0.12);
-    // The side of a square of the mean of the pixel's width and its length along the slope.
-    0.7 * 0.5 * (width_m + width_m / cos)
+    // A part of the mean of the pixel's width and its length along the slope, since the looks of a pixel blur by its width again.
+    0.42 * 0.5 * (width_m + width_m / cos)
 }
 
 /// Returns the depth of a point along an axis from a place, m.

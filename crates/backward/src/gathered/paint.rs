@@ -18,7 +18,7 @@ use super::{
     look::{Look, depth_m},
     smooth::{Guide, Lanes, Passes, Smoothing, alike},
 };
-use crate::{Pinhole, Sampler, peeling::Surfaces};
+use crate::{Pinhole, Sampler, integrator::Integrator, peeling::Surfaces};
 
 /// The numbers of the lattices.
 const DIRECT: usize = 0;
@@ -28,8 +28,8 @@ const BOUNCED: usize = 2;
 /// Light on the lattices.
 type Lights<const N: usize> = [Smoothing<N>; 3];
 
-/// The rays of a sample whose neighbors are alike.
-const RAYS: LightRays = LightRays { n_lights: 2, n_bounces: 1, n_gloss: 1 };
+/// The rays of a sample whose neighbors are alike: most of the noise that is left is that of light which has bounced.
+const RAYS: LightRays = LightRays { n_lights: 1, n_bounces: 2, n_gloss: 1 };
 
 /// What a detail means.
 #[derive(Clone, Copy, Debug)]
@@ -51,7 +51,7 @@ impl ViewDetail {
                     (1, Passes::by_surface(&[1, 2, 4])),
                     (2, Passes::by_surface(&[1, 2, 4, 8])),
                 ],
-                within: [(0, 0.0), (2, 0.3), (4, 0.2), (12, 0.0734)],
+                within: [(0, 0.0), (2, 0.3), (12, 0.0734), (12, 0.0734)],
             },
             Self::Quick => Effort {
                 lattices: [
@@ -158,11 +158,7 @@ impl<'a, const N: usize> Painter<'a, N> {
         let value = |place: u32| {
             let share = [place % METER, place / METER].map(|i| (f64::from(i) + 0.5) / f64::from(METER));
             let ray = self.behind(self.view.ray_at(share))?;
-            let integrator = crate::integrator::Integrator {
-                world: self.gatherer.world,
-                paths: crate::LightPaths::Full,
-                clamp: None,
-            };
+            let integrator = Integrator { clamp: None, ..self.gatherer.integrator() };
             let random = Sampler::new(self.gatherer.seed, place, 1, 0);
             let radiance = integrator.radiance(ray, self.gatherer.wavelengths_nm, &random);
             let mean = radiance.iter().sum::<f32>() / N as f32;
@@ -232,6 +228,12 @@ impl<'a, const N: usize> Painter<'a, N> {
         let lattices = self.effort.lattices;
         let mut corners =
             Corners { looks: Vec::with_capacity(n), lights: std::array::from_fn(|_| (Vec::new(), Vec::new())) };
+        for ((guides, lights), (pitch, _)) in corners.lights.iter_mut().zip(lattices) {
+            if row.is_multiple_of(pitch) {
+                guides.reserve_exact(n.div_ceil(pitch));
+                lights.reserve_exact(n.div_ceil(pitch));
+            }
+        }
         let mut surfaces = Vec::with_capacity(n);
         for column in 0..n {
             self.cancel.check()?;

@@ -100,11 +100,11 @@ impl<const N: usize> Smoothing<N> {
             let rows = after[0].get_mut(from..to).unwrap_or_default();
             rows.par_iter_mut().enumerate().try_for_each(|(n, smoothed)| {
                 let row = from + n;
-                let sample = |column| {
+                smoothed.reserve_exact(before[row].len());
+                for column in 0..before[row].len() {
                     cancel.check()?;
-                    Ok(smoothed_sample((&self.guides, before), (row, column), step, keeps_edges))
-                };
-                *smoothed = (0..before[row].len()).map(sample).collect::<Result<_, Cancelled>>()?;
+                    smoothed.push(smoothed_sample((&self.guides, before), (row, column), step, keeps_edges));
+                }
                 Ok(())
             })?;
             self.n_ready[pass + 1] = from.max(to);

@@ -96,8 +96,8 @@ impl<const N: usize> Bsdf<N> {
         for (factor, lobe) in self.lobes() {
             match lobe {
                 Lobe::Dielectric { index, reflectance, transmittance, rough: None } => {
-                    let eta = index.map(|n| if o.z > 0.0 { n } else { 1.0 / n });
-                    let mirrored: [f32; N] = lanes(|lane| fresnel::dielectric(o.z.abs(), eta[lane]));
+                    let eta: [f32; N] = lanes(|lane| if o.z > 0.0 { index[lane] } else { 1.0 / index[lane] });
+                    let mirrored = fresnel::dielectrics(o.z.abs(), &eta);
                     let value = lanes(|lane| reflectance[lane] * mirrored[lane]);
                     add(factor.share, Vec3::new(-o.x, -o.y, o.z), value);
                     if let Some(through) = refract(o, Vec3::Z * o.z.signum(), eta[0]) {
@@ -141,10 +141,13 @@ impl<const N: usize> Lobe<N> {
     fn diffuse_reflectance(&self, cos: f32) -> [f32; N] {
         match self {
             Self::Diffuse { reflectance, .. } => *reflectance,
-            Self::Coated { diffuse, index, inside, .. } => lanes(|lane| {
-                let through = 1.0 - fresnel::dielectric(cos, index[lane]);
-                through * diffuse[lane] * (1.0 - inside[lane]) / (1.0 - diffuse[lane] * inside[lane])
-            }),
+            Self::Coated { diffuse, index, inside, .. } => {
+                let mirrored = fresnel::dielectrics(cos, index);
+                lanes(|lane| {
+                    let below = diffuse[lane] * (1.0 - inside[lane]) / (1.0 - diffuse[lane] * inside[lane]);
+                    (1.0 - mirrored[lane]) * below
+                })
+            }
             Self::RoughDiffuse { reflectance, constants: [a, b] } => {
                 let shape = a + b * rough_matte_mean(cos);
                 lanes(|lane| reflectance[lane] * shape)
