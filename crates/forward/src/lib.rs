@@ -31,6 +31,7 @@ mod mixed;
 mod narrow;
 mod node_kernels;
 mod occluded;
+mod past_surfaces;
 mod places;
 mod plan;
 mod points;

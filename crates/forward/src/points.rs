@@ -11,12 +11,13 @@ use crate::{
     Film, SceneGeometry,
     coverage::Composite,
     lamps::Lamp,
+    past_surfaces::{HiddenPoint, OpenPupil},
     places::SceneRaster,
     raster::{Level, Raster},
     rectangle::Rectangle,
     surface::LayerCoordinates,
     tile::film_pixels,
-    visible::{Before, SeenPoint, Visible},
+    visible::{Before, Visible},
 };
 
 /// A point as a band shows it.
@@ -148,8 +149,6 @@ pub(crate) struct Drawing<'a> {
     pub(crate) hides: bool,
 }
 
-/// How far beside each other, pixels, rays through different parts of the pupil must meet the film to be told apart, beside what aberrations do.
-const PART_OF_PIXEL: f64 = 0.3;
 /// The share of a surface before a point that must be laid to tell how much of the pupil it leaves; of less, it leaves none.
 const LEAST_LAID: f32 = 0.05;
 /// What a surface that spans ten layers leaves open of a pixel before the last of them: less is left by others.
@@ -161,8 +160,9 @@ const MOST_KERNELS: usize = 256;
 const AT_ONCE: usize = 8;
 /// Change of blur radius between points that share a kernel, pixels.
 const BLUR_STEP_PX: f64 = 0.5;
-/// Blur radius of kernels on samples of a quarter pixel, pixels; wider ones are on samples in proportion.
-const QUARTER_BLUR_PX: f64 = 8.0;
+/// Cells of a kernel: an eighth of a pixel, or more where there would be more of them along its spread.
+const LEAST_CELL_PX: f64 = 0.125;
+const CELLS: f64 = 32.0;
 
 impl Drawing<'_> {
     /// Adds what points of a layer bring to the pixels of the film, row by row: radiance. `picture` is what lies before the layer.
@@ -215,70 +215,72 @@ impl Drawing<'_> {
         let pitch_mm = self.pitch_mm();
         let spread_px = self.lens.spread_mm(place_mm, dioptres, self.wavelength_nm) / pitch_mm;
         let blur_px = self.lens.blur_radius_mm(place_mm, dioptres, self.wavelength_nm) / pitch_mm;
-        let unclear_px = PART_OF_PIXEL + (spread_px * spread_px - blur_px * blur_px).max(0.0).sqrt();
-        let cell_px = 0.25 * (spread_px / QUARTER_BLUR_PX).log2().ceil().max(0.0).exp2();
+        let width_px = group[0].width_mm / pitch_mm;
+        let most_px = LEAST_CELL_PX * (spread_px / (CELLS * LEAST_CELL_PX)).log2().ceil().max(0.0).exp2();
+        // Lamps are an odd number of cells wide: their rims and those of cells are the same.
+        let wide = 2 * (0.5 * (width_px / most_px - 1.0)).ceil().max(0.0) as usize + 1;
+        let cell_px = if width_px > 0.0 { width_px / wide as f64 } else { most_px };
+        // In focus all of the pupil meets in a cell.
+        let unclear_px = (spread_px * spread_px - blur_px * blur_px).max(cell_px * cell_px).sqrt();
         let query =
             FilmQuery { place_mm, dioptres, wavelength_nm: self.wavelength_nm, pitch_um: cell_px * self.film.pitch_um };
-        let width_px = group[0].width_mm / pitch_mm;
-        let kernel = Sums::of(&self.lens.kernel(query), cell_px, width_px);
+        let kernel = self.lens.kernel(query);
+        let whole = Sums::of(&kernel, (cell_px, wide), &|_, _| 1.0);
 
         let pixels = Raster::new(self.film, Level::PIXEL);
         let reached =
-            group.iter().filter_map(|point| kernel.reached(point.place_px(pitch_mm), &pixels).intersection(film));
+            group.iter().filter_map(|point| whole.reached(point.place_px(pitch_mm), &pixels).intersection(film));
         let at = Rectangle::around(reached)?;
         let mut light = vec![0.0; at.len()];
         for point in group {
             let place = point.place_px(pitch_mm);
-            let Some(reached) = kernel.reached(place, &pixels).intersection(film) else { continue };
-            let seen = SeenPoint {
-                layer: point.layer,
-                dioptres,
-                before: point.before,
-                unclear_px: unclear_px as f32,
-                place_px: (place[0] as f32, place[1] as f32),
-                width_px: width_px as f32,
-            };
-            let parts = kernel.on_pixels(place, &pixels, &reached);
-            for (row, parts) in parts.chunks_exact(reached.columns).enumerate() {
-                let pixel_row = reached.first_row + row as i64;
-                let first = (pixel_row - at.first_row) as usize * at.columns
-                    + (reached.first_column - at.first_column) as usize;
-                for (column, (sum, part)) in light[first..].iter_mut().zip(parts).enumerate() {
-                    if *part > 0.0 {
-                        let pixel = (pixel_row, reached.first_column + column as i64);
-                        *sum += (point.light * part) as f32 * self.part_seen(point, &seen, pixel, (picture, film));
-                    }
+            let Some(reached) = whole.reached(place, &pixels).intersection(film) else { continue };
+            let visible =
+                self.visible.filter(|visible| self.hides && reached.pixels().any(|pixel| visible.has_edges(pixel)));
+            let parts = match visible {
+                Some(visible) => {
+                    let hidden = HiddenPoint {
+                        layer: point.layer,
+                        dioptres,
+                        before: point.before,
+                        place_px: (place[0] as f32, place[1] as f32),
+                        width_px: width_px as f32,
+                        unclear_px: unclear_px as f32,
+                    };
+                    let pupil = OpenPupil::of(visible.sight(), &hidden);
+                    let seen = Sums::of(&kernel, (cell_px, wide), &|below, beside| pupil.part_at(below, beside));
+                    seen.on_pixels(place, &pixels, &reached)
                 }
+                None => {
+                    let mut parts = whole.on_pixels(place, &pixels, &reached);
+                    let open = reached.pixels().map(|pixel| self.open_before(point, pixel, (picture, film)));
+                    parts.iter_mut().zip(open).for_each(|(part, open)| *part *= f64::from(open));
+                    parts
+                }
+            };
+            let lines = light[reached.offset_in(&at)..].chunks_mut(at.columns);
+            for (sums, parts) in lines.zip(parts.chunks_exact(reached.columns)) {
+                sums.iter_mut().zip(parts).for_each(|(sum, part)| *sum += (point.light * part) as f32);
             }
         }
         Some((at, light))
     }
 
-    /// Returns the part of a point's light that reaches a pixel past nearer surfaces.
-    fn part_seen(
-        &self,
-        point: &Point,
-        seen: &SeenPoint,
-        pixel: (i64, i64),
-        (picture, film): (&Composite, &Rectangle),
-    ) -> f32 {
+    /// Returns the part of a pixel's pupil that nearer surfaces leave to a point, where no edge of them lies.
+    fn open_before(&self, point: &Point, pixel: (i64, i64), (picture, film): (&Composite, &Rectangle)) -> f32 {
         if !self.hides {
             return if point.before.is_some() { 0.0 } else { 1.0 };
         }
         let at = ((pixel.0 - film.first_row) as usize, (pixel.1 - film.first_column) as usize);
-        let open = match point.before {
+        match point.before {
+            // Nearer parts of its own surface hide nothing of it.
+            None if point.is_of_surface => (picture.open_well_before(point.layer, at) / OWN_SURFACE).min(1.0),
             None => picture.open_well_before(point.layer, at),
             Some(before) => {
                 // Of the surface that it lies behind, a part may be in layers that are not laid yet.
                 let laid = (point.layer as f32 - before.coordinate).clamp(0.0, 1.0);
                 if laid > LEAST_LAID { (1.0 - (1.0 - picture.open(at)) / laid).max(0.0) } else { 0.0 }
             }
-        };
-        match self.visible.filter(|visible| visible.has_edges(pixel)) {
-            Some(visible) => visible.part_of_point(seen, pixel, open),
-            // Nearer parts of its own surface hide nothing of it.
-            None if point.is_of_surface => (open / OWN_SURFACE).min(1.0),
-            None => open,
         }
     }
 }
@@ -295,17 +297,26 @@ struct Sums {
 }
 
 impl Sums {
-    /// Takes a kernel on cells that are so many pixels wide, each of whose points is a square so wide.
-    fn of(kernel: &Kernel, cell_px: f64, width_px: f64) -> Self {
+    /// Takes a kernel on cells that are so many pixels wide, each of whose points is a square of so many cells, an odd number, and `part` of its light so many pixels below and to the right.
+    fn of(kernel: &Kernel, (cell_px, wide): (f64, usize), part: &dyn Fn(f64, f64) -> f64) -> Self {
         let (rows, columns) = kernel.samples.dim();
-        // Cells are squares themselves.
-        let taps = square_taps((width_px.powi(2) / cell_px.powi(2) - 1.0).max(0.0).sqrt());
+        let taps = vec![1.0 / wide as f64; wide];
         let margin = taps.len() / 2;
         let (wide_rows, wide_columns) = (rows + 2 * margin, columns + 2 * margin);
+        let total: f64 = kernel.samples.iter().map(|sample| f64::from(*sample)).sum();
+        let below_px =
+            |middle: i32, n: usize, cell: usize| (f64::from(middle) + cell as f64 + 0.5 - 0.5 * n as f64) * cell_px;
         let mut across = vec![0.0; rows * wide_columns];
-        for (line, samples) in across.chunks_exact_mut(wide_columns).zip(kernel.samples.rows()) {
+        let mut seen = vec![0.0; columns];
+        for (row, line) in across.chunks_exact_mut(wide_columns).enumerate() {
+            let below = below_px(kernel.middle_px.y, rows, row);
+            for (column, (seen, sample)) in seen.iter_mut().zip(kernel.samples.row(row)).enumerate() {
+                let light = f64::from(*sample) / total;
+                *seen =
+                    if light == 0.0 { 0.0 } else { light * part(below, below_px(kernel.middle_px.x, columns, column)) };
+            }
             for (k, tap) in taps.iter().enumerate() {
-                line[k..].iter_mut().zip(samples).for_each(|(sum, sample)| *sum += tap * f64::from(*sample));
+                line[k..].iter_mut().zip(&seen).for_each(|(sum, seen)| *sum += tap * seen);
             }
         }
         let mut sums = vec![0.0; (wide_rows + 1) * (wide_columns + 1)];
@@ -315,12 +326,11 @@ impl Sums {
                 sums.iter_mut().zip(line).for_each(|(sum, value)| *sum += tap * value);
             }
         }
-        let total: f64 = sums.iter().sum();
         for row in 1..=wide_rows {
             let (above, own) = sums[(row - 1) * (wide_columns + 1)..].split_at_mut(wide_columns + 1);
             let mut along = 0.0;
             for (sum, above) in own.iter_mut().zip(above.iter()) {
-                along += *sum / total;
+                along += *sum;
                 *sum = above + along;
             }
         }
@@ -371,15 +381,6 @@ impl Sums {
     }
 }
 
-/// Returns what of a square so many cells wide falls on each cell about its middle.
-fn square_taps(width: f64) -> Vec<f64> {
-    let half = 0.5 * width;
-    // The part of it up to a place.
-    let part = |at: f64| if half > 0.0 { (0.5 + 0.5 * at / half).clamp(0.0, 1.0) } else { f64::from(at > 0.0) };
-    let reach = (half - 0.5).ceil().max(0.0) as i64;
-    (-reach..=reach).map(|cell| part(cell as f64 + 0.5) - part(cell as f64 - 0.5)).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -396,8 +397,8 @@ mod tests {
             samples.indexed_iter().map(|((r, c), v)| weight(r, c) * f64::from(*v)).sum::<f64>() / f64::from(sum)
         };
         let middle = [mean(&|row, _| row as f64 - 2.0), mean(&|_, column| column as f64 - 3.0)];
-        for (cell_px, width_px) in [(0.25, 0.0), (0.25, 0.7), (1.0, 0.0), (4.0, 3.0)] {
-            let sums = Sums::of(&Kernel::centered(samples.clone(), 1.0), cell_px, width_px);
+        for (cell_px, wide) in [(0.25, 1), (0.25, 3), (1.0, 1), (4.0, 3)] {
+            let sums = Sums::of(&Kernel::centered(samples.clone(), 1.0), (cell_px, wide), &|_, _| 1.0);
             for place in [[0.0, 0.0], [0.13, -3.42], [2.77, 1.5]] {
                 let at = sums.reached(place, &pixels);
                 let parts = sums.on_pixels(place, &pixels, &at);
@@ -415,14 +416,6 @@ mod tests {
                     assert!((centroid[axis] - expected).abs() < 0.25, "{cell_px} {place:?}: {centroid:?}");
                 }
             }
-        }
-    }
-
-    #[test]
-    fn squares_are_spread_over_cells() {
-        for (width, expected) in [(0.0, vec![1.0]), (0.8, vec![1.0]), (2.0, vec![0.25, 0.5, 0.25])] {
-            let taps = square_taps(width);
-            assert!(taps.len() == expected.len() && taps.iter().zip(&expected).all(|(a, b)| (a - b).abs() < 1e-12));
         }
     }
 }

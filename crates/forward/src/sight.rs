@@ -158,6 +158,11 @@ impl Sight {
         (self.middle.0 + row as f32, self.middle.1 + column as f32)
     }
 
+    /// Returns the pixel that a place lies in, pixels below and to the right of the film's middle.
+    pub(crate) fn pixel_at(&self, (down, across): (f32, f32)) -> (i64, i64) {
+        ((down - self.middle.0).round() as i64, (across - self.middle.1).round() as i64)
+    }
+
     /// Returns the edges of depth in the bundle of a pixel.
     pub(crate) fn near_edges(&self, (row, column): (i64, i64)) -> NearEdges {
         let (row, column) = (row - self.at.first_row, column - self.at.first_column);

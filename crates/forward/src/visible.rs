@@ -51,20 +51,6 @@ pub(crate) struct Before {
     pub(crate) coordinate: f32,
 }
 
-/// A point that shines, as the pixels around it see it.
-pub(crate) struct SeenPoint {
-    /// The layer that it lies in or behind, and its depth.
-    pub(crate) layer: usize,
-    pub(crate) dioptres: f64,
-    /// The first surface where it lies, if it lies behind that.
-    pub(crate) before: Option<Before>,
-    /// What rays through all of the pupil make of it in focus, pixels.
-    pub(crate) unclear_px: f32,
-    /// Pixels below and to the right of the film's middle, and how wide it is, pixels.
-    pub(crate) place_px: (f32, f32),
-    pub(crate) width_px: f32,
-}
-
 /// Blur radii between which rays begin to tell parts of the pupil apart, pixels: what a point in focus becomes is aberrations and pixels.
 const TELLS_APART_PX: (f32, f32) = (1.0, 3.0);
 /// Rays along the radius of a bundle.
@@ -75,9 +61,6 @@ const POINTS_OF_RADIUS: f32 = 6.0;
 const NEGLIGIBLE_PART: f32 = 1e-3;
 /// Part of the rays that must meet a layer to tell what is seen of it; of less, all rays tell.
 const FEW_RAYS: f32 = 0.02;
-/// Rays from a pixel to a point, each way; twice as many of blurs with a radius below so many pixels.
-const TO_POINT: usize = 2;
-const SMALL_BLUR_PX: f32 = 6.0;
 
 impl Visible {
     /// Draws rays, by the kernels of the layers, from the pixels of a film.
@@ -154,40 +137,9 @@ impl Visible {
         }
     }
 
-    /// Returns the part of a point's light that reaches a pixel, `open` being the part that layers well before the point leave of the pixel's pupil.
-    pub(crate) fn part_of_point(&self, point: &SeenPoint, pixel: (i64, i64), open: f32) -> f32 {
-        let most_px = self.sight.near_edges(pixel).most_px;
-        let radius_px = self.sight.radius_px_of(point.dioptres, pixel);
-        let apart = |radius_px: f32| 0.5 * (radius_px.abs() / point.unclear_px - 1.0);
-        let told = apart(radius_px).min(apart(most_px)).clamp(0.0, 1.0);
-        let block = self.blocks.get(&(pixel.0.div_euclid(BLOCK), pixel.1.div_euclid(BLOCK)));
-        let may_be_seen = told > 0.0 && (open > NEGLIGIBLE_PART || point.before.is_some());
-        let Some(BlockParts { met, .. }) = block.filter(|_| may_be_seen) else { return open };
-        let from = self.sight.place_px(pixel);
-        let width_px = point.width_px.max(1.0);
-        // A pixel has a large part of a small blur.
-        let n = if radius_px.abs() < SMALL_BLUR_PX { 2 * TO_POINT } else { TO_POINT };
-        let (mut seen, mut all) = (0.0, 0.0);
-        for ray in 0..n * n {
-            let within = |number: usize| width_px * ((number as f32 + 0.5) / n as f32 - 0.5);
-            let down = point.place_px.0 - from.0 + within(ray / n);
-            let across = point.place_px.1 - from.1 + within(ray % n);
-            // What aberrations and pixels put beyond the disc came through its rim: it counts where there is nothing else.
-            let inside = radius_px.abs() / down.hypot(across).max(1e-6);
-            let (scale, weight) = (inside.min(1.0) / radius_px, if inside >= 1.0 { 1.0 } else { 1e-3 });
-            let beside = (scale * down, scale * across);
-            let is_before = |before: &Before| {
-                // Whether that surface is also where the ray passes its depth.
-                let ratio = self.sight.radius_px_of(before.dioptres, pixel);
-                let (surface, _) = self.sight.coordinates_at((from.0 + ratio * beside.0, from.1 + ratio * beside.1));
-                surface <= before.coordinate + 0.5
-            };
-            all += weight;
-            if !point.before.as_ref().is_some_and(is_before) && self.sight.reaches(point.layer, met, from, beside) {
-                seen += weight;
-            }
-        }
-        open + told * (seen / all - open)
+    /// The depth picture as rays meet it.
+    pub(crate) fn sight(&self) -> &Sight {
+        &self.sight
     }
 
     /// Whether edges of depth lie in the bundle of a pixel.
