@@ -19,7 +19,11 @@ pub(crate) fn dielectric(cos: f32, eta: f32) -> f32 {
 
 /// Returns [`dielectric`] of boundaries of several indices, mostly all the same.
 pub(crate) fn dielectrics<const N: usize>(cos: f32, eta: &[f32; N]) -> [f32; N] {
-    if eta.iter().all(|n| n == &eta[0]) { [dielectric(cos, eta[0]); N] } else { lanes(|lane| dielectric(cos, eta[lane])) }
+    if eta.iter().all(|n| n == &eta[0]) {
+        [dielectric(cos, eta[0]); N]
+    } else {
+        lanes(|lane| dielectric(cos, eta[lane]))
+    }
 }
 
 /// Returns the reflectance of a metal of index `n` + i `k`, in a medium of index 1 (Born & Wolf, 14.2).
