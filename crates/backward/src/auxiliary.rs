@@ -8,7 +8,7 @@ use dioptric_world::{
 use ndarray::Array2;
 use rayon::prelude::*;
 
-use crate::{BackwardError, Camera, Panorama, Parallel, Pinhole, Placement, RadiantPoint, Subject, peeling::Surfaces};
+use crate::{BackwardError, Camera, Panorama, Parallel, Pinhole, Placement, peeling::Surfaces};
 
 /// Pictures of what each pixel's middle sees through the middle of the pupil.
 #[derive(Clone, Debug)]
@@ -43,13 +43,12 @@ struct Seen {
 ///
 /// # Errors
 /// When it was cancelled.
-pub fn auxiliary<'a>(
-    subject: impl Into<Subject<'a>>,
+pub fn auxiliary(
+    world: &World,
     camera: &Camera,
     grid: &WavelengthGrid,
     cancel: &Cancel,
 ) -> Result<Auxiliary, BackwardError> {
-    let subject = subject.into();
     camera.check()?;
     let (rows, columns) = camera.pixels().size();
     let (center_m, axis) = projection_center(camera);
@@ -63,7 +62,7 @@ pub fn auxiliary<'a>(
             Camera::Parallel(window) => pixels.iter().map(|&pixel| Some(window.ray(pixel, [0.5; 2]))).collect(),
             Camera::Lens(lens) => lens.chief_rays(&pixels),
         };
-        let look = |ray: Option<Ray>| Seen::along(subject, ray, (center_m, axis), grid);
+        let look = |ray: Option<Ray>| Seen::along(world, ray, (center_m, axis), grid);
         Ok(rays.into_iter().map(look).collect::<Vec<Seen>>())
     };
     let seen: Vec<Seen> =
@@ -137,42 +136,23 @@ impl Seen {
         Self { z_m: f32::INFINITY, distance_m: f32::INFINITY, normal: Vec3::ZERO, ids: [0.0; 3], albedo }
     }
 
-    fn along(subject: Subject<'_>, ray: Option<Ray>, place: (DVec3, DVec3), grid: &WavelengthGrid) -> Self {
-        let found = ray.and_then(|ray| match subject {
-            Subject::World(world) => Self::in_world(world, ray, place, grid),
-            Subject::Radiant(scene) => {
-                let wavelengths_nm: Vec<f32> = grid.centers_nm().iter().map(|&nm| nm as f32).collect();
-                scene.look(&ray, &wavelengths_nm).map(|point| Self::of_point(point, place))
-            }
-        });
-        found.unwrap_or_else(|| Self::nothing(grid.len()))
+    fn along(world: &World, ray: Option<Ray>, place: (DVec3, DVec3), grid: &WavelengthGrid) -> Self {
+        let found = ray.and_then(|ray| Some((ray, world.intersect(&ray, f32::INFINITY)?)));
+        found.map_or_else(|| Self::nothing(grid.len()), |(ray, hit)| Self::of_hit(world, &ray, &hit, place, grid))
     }
 
-    fn in_world(world: &World, ray: Ray, place: (DVec3, DVec3), grid: &WavelengthGrid) -> Option<Self> {
-        let hit = world.intersect(&ray, f32::INFINITY)?;
-        let albedo_at = |nm: &f64| world.bsdf(&hit, -ray.direction, &[*nm as f32]).albedo()[0];
-        let normal = world.bsdf(&hit, -ray.direction, &[550.0]).normal();
-        let point = RadiantPoint {
-            point: hit.point,
-            normal: if normal.dot(ray.direction) > 0.0 { -normal } else { normal },
-            material: hit.material.0,
-            instance: hit.instance.map(|instance| instance.0),
-            shape: hit.shape.0,
-            albedo: grid.centers_nm().iter().map(albedo_at).collect(),
-        };
-        Some(Self::of_point(point, place))
-    }
-
-    fn of_point(seen: RadiantPoint, (center_m, axis): (DVec3, DVec3)) -> Self {
-        let from_center_m = seen.point.as_dvec3() - center_m;
+    fn of_hit(world: &World, ray: &Ray, hit: &Hit, (center_m, axis): (DVec3, DVec3), grid: &WavelengthGrid) -> Self {
+        let albedo_at = |nm: &f64| world.bsdf(hit, -ray.direction, &[*nm as f32]).albedo()[0];
+        let normal = world.bsdf(hit, -ray.direction, &[550.0]).normal();
+        let from_center_m = hit.point.as_dvec3() - center_m;
         // Numbers from 1 on; up to 2²⁴ they are exact in single precision.
         let number = |id: u32| (id + 1) as f32;
         Self {
             z_m: from_center_m.dot(axis) as f32,
             distance_m: from_center_m.length() as f32,
-            normal: seen.normal,
-            ids: [number(seen.material), seen.instance.map_or(0.0, number), number(seen.shape)],
-            albedo: seen.albedo,
+            normal: if normal.dot(ray.direction) > 0.0 { -normal } else { normal },
+            ids: [number(hit.material.0), hit.instance.map_or(0.0, |instance| number(instance.0)), number(hit.shape.0)],
+            albedo: grid.centers_nm().iter().map(albedo_at).collect(),
         }
     }
 }

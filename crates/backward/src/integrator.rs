@@ -4,6 +4,7 @@
 //! that both could have found is shared between them by the balance heuristic (Veach 1997, ch. 9). Paths end by Russian
 //! roulette. A packet of wavelengths shares the path until it meets a surface that disperses it; there each goes on alone.
 
+use dioptric_spectrum::lanes;
 use dioptric_world::{Ray, Receiver, World};
 use serde::{Deserialize, Serialize};
 
@@ -58,13 +59,13 @@ pub(crate) struct Integrator<'a> {
 
 /// A path on its way.
 #[derive(Clone, Copy)]
-struct Path<const N: usize> {
-    ray: Ray,
+pub(crate) struct Path<const N: usize> {
+    pub(crate) ray: Ray,
     /// The share of radiance that reaches the camera.
-    throughput: [f32; N],
+    pub(crate) throughput: [f32; N],
     /// Where it was scattered last and the density of its direction; `None` where no drawn light could have found it.
-    scattered: Option<(Receiver, f32)>,
-    n_scatterings: u32,
+    pub(crate) scattered: Option<(Receiver, f32)>,
+    pub(crate) n_scatterings: u32,
 }
 
 impl Integrator<'_> {
@@ -73,7 +74,13 @@ impl Integrator<'_> {
         self.follow(Path { ray, throughput: [1.0; N], scattered: None, n_scatterings: 0 }, wavelengths_nm, random)
     }
 
-    fn follow<const N: usize>(&self, mut path: Path<N>, wavelengths_nm: &[f32; N], random: &Sampler) -> [f32; N] {
+    /// Returns an estimate of the light that a path on its way still finds.
+    pub(crate) fn follow<const N: usize>(
+        &self,
+        mut path: Path<N>,
+        wavelengths_nm: &[f32; N],
+        random: &Sampler,
+    ) -> [f32; N] {
         let mut sum = [0.0; N];
         loop {
             let Path { ray, throughput, scattered, n_scatterings } = path;
@@ -81,7 +88,7 @@ impl Integrator<'_> {
             let Some(hit) = self.world.intersect(&ray, f32::INFINITY) else {
                 let share = scattered.map_or(1.0, |(from, pdf)| share(pdf, self.world.sky_pdf(from, ray.direction)));
                 let sky = self.world.sky(ray.direction, wavelengths_nm);
-                self.add(&mut sum, n_scatterings, &throughput, &sky.map(|l| l * share));
+                self.add(&mut sum, n_scatterings, &throughput, &lanes(|i| sky[i] * share));
                 return sum;
             };
             // Dispersion takes the packet apart: every wavelength meets this surface again by itself.
@@ -96,14 +103,14 @@ impl Integrator<'_> {
             }
             // A medium that it fills has taken its share on the way.
             let throughput = match self.world.transmittance(&hit, &ray, wavelengths_nm) {
-                Some(left) => std::array::from_fn(|i| throughput[i] * left[i]),
+                Some(left) => lanes(|i| throughput[i] * left[i]),
                 None => throughput,
             };
             // The surface may shine.
             let glow = self.world.emission(&hit, -ray.direction, wavelengths_nm);
             if glow.iter().any(|&l| l > 0.0) {
                 let share = scattered.map_or(1.0, |(from, pdf)| share(pdf, self.world.light_pdf(from, &hit)));
-                self.add(&mut sum, n_scatterings, &throughput, &glow.map(|l| l * share));
+                self.add(&mut sum, n_scatterings, &throughput, &lanes(|i| glow[i] * share));
             }
             if is_last {
                 return sum;
@@ -119,14 +126,14 @@ impl Integrator<'_> {
                 let is_lit = light.pdf > 0.0 && factor.iter().zip(&light.radiance).any(|(f, l)| f * l > 0.0);
                 if is_lit && !self.world.is_occluded(&hit.ray_towards(light.direction), light.distance_m) {
                     let share = if light.is_delta { 1.0 } else { share(light.pdf, bsdf.pdf(light.direction)) };
-                    let found = std::array::from_fn(|i| factor[i] * light.radiance[i] * (share / light.pdf));
+                    let found = lanes(|i| factor[i] * light.radiance[i] * (share / light.pdf));
                     self.add(&mut sum, n_scatterings + 1, &throughput, &found);
                 }
             }
             // Go on in a direction that the surface scatters from.
             let Some(next) = bsdf.sample(u_lobe, u_direction) else { return sum };
             path.ray = hit.ray_towards(next.incident);
-            path.throughput = std::array::from_fn(|i| throughput[i] * next.weight[i]);
+            path.throughput = lanes(|i| throughput[i] * next.weight[i]);
             path.scattered = if next.is_delta { None } else { Some((at, next.pdf)) };
             path.n_scatterings += 1;
             let greatest = path.throughput.iter().copied().fold(0.0, f32::max);
@@ -139,7 +146,7 @@ impl Integrator<'_> {
                 if random.pair(pair + ROULETTE)[0] >= chance {
                     return sum;
                 }
-                path.throughput = path.throughput.map(|share| share / chance);
+                path.throughput.iter_mut().for_each(|share| *share /= chance);
             }
         }
     }

@@ -5,7 +5,7 @@
 //! wavelengths are sampled at once, each through its own path in the lens and, where those differ, its own in the world.
 //! Pictures depend on the seed and not on threads.
 //!
-//! A [`RadiantScene`], which knows the light along every ray by itself, stands in the place of a world.
+//! [`gathered_view`] is the quick, clean picture of what a pinhole sees, for previews.
 //!
 //! Lens lengths are millimeters in the frame of `dioptric-optics`; worlds are in meters. Pictures are upright as the
 //! photographer sees them, row 0 at the top. This crate knows nothing of sensors.
@@ -19,6 +19,7 @@ mod camera;
 mod checkpoint;
 mod error;
 mod film;
+mod gathered;
 mod integrator;
 mod lens_camera;
 mod micro_array;
@@ -26,7 +27,6 @@ mod output;
 mod packets;
 mod peeling;
 mod placement;
-mod radiant;
 mod renderer;
 mod sampler;
 mod world_camera;
@@ -37,13 +37,13 @@ pub use ndarray;
 pub use auxiliary::{Auxiliary, auxiliary, layered_depth};
 pub use camera::{Camera, Panorama, Parallel, Pinhole, ThinLens};
 pub use error::BackwardError;
+pub use gathered::{GatheredView, ViewDetail, gathered_view};
 pub use integrator::LightPaths;
 pub use lens_camera::{LensCamera, LensCameraSettings, LensOrigin};
 pub use micro_array::{MicroArray, MicroElements, MicroLayout};
 pub use output::{write_auxiliary_exr, write_rendering_exr};
 pub use packets::BandSampling;
 pub use placement::{PixelGrid, Placement, Rendering};
-pub use radiant::{RadiantPoint, RadiantScene, Subject};
 pub use renderer::{Bands, RenderSettings, Renderer};
 pub use sampler::{SOBOL_DIMENSIONS, Sampler, scrambled_sobol};
 pub use world_camera::distance_ahead_m;

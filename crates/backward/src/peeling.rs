@@ -5,7 +5,7 @@ use dioptric_world::{Hit, InstanceId, Ray, ShapeId, World};
 /// The surfaces that a ray meets, of which each hides the next.
 ///
 /// The other side of a shape that the ray has met counts for none: of a closed object that is its back, which no part of a pupil sees past its
-/// front. A shape that is open and folded is taken for closed; walls of several shapes each are surfaces of their own.
+/// front. A shape that is open and folded is taken for closed; walls of several shapes each are surfaces of their own, unless these are one thing.
 pub(crate) struct Surfaces<'a> {
     world: &'a World,
     /// From behind the last surface on, the other sides of shapes left out.
@@ -34,8 +34,10 @@ impl<'a> Surfaces<'a> {
         loop {
             let hit = self.world.intersect(&self.ray, f32::INFINITY)?;
             let faces = faces(&hit, &self.ray);
-            let is_other_side = |met: &(Option<InstanceId>, ShapeId, bool)| {
-                (met.0, met.1) == (hit.instance, hit.shape) && met.2 != faces
+            let is_other_side = |&(instance, shape, faced): &(Option<InstanceId>, ShapeId, bool)| {
+                let is_same = shape == hit.shape;
+                instance == hit.instance
+                    && (is_same && faced != faces || !is_same && self.world.are_one_thing(shape, hit.shape))
             };
             if !self.met.iter().any(is_other_side) {
                 return Some(hit);

@@ -94,7 +94,7 @@ impl PixelGrid {
     }
 
     /// Rows and columns of the part.
-    pub(crate) fn size(&self) -> (usize, usize) {
+    pub fn size(&self) -> (usize, usize) {
         (self.crop[3], self.crop[2])
     }
 

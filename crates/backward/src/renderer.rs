@@ -3,12 +3,12 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use dioptric_spectrum::{Cancel, SpectralImage, WavelengthGrid};
-use dioptric_world::Ray;
+use dioptric_world::{Ray, World};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    BackwardError, BandSampling, Camera, LightPaths, Rendering, Sampler, Subject,
+    BackwardError, BandSampling, Camera, LightPaths, Rendering, Sampler,
     camera::{CameraRays, PixelSample},
     film::Film,
     integrator::Integrator,
@@ -49,7 +49,7 @@ pub struct RenderSettings {
 /// A picture being rendered.
 #[derive(Clone, Debug)]
 pub struct Renderer<'a> {
-    subject: Subject<'a>,
+    world: &'a World,
     camera: &'a Camera,
     settings: RenderSettings,
     packets: Packets,
@@ -66,18 +66,9 @@ impl<'a> Renderer<'a> {
     /// Returns a renderer that has not begun.
     ///
     /// # Errors
-    /// When a setting makes no sense, or the camera was made for other bands; or when the light of a scene that knows it is to
-    /// be followed otherwise, or looked for behind its first surfaces.
-    pub fn new(
-        subject: impl Into<Subject<'a>>,
-        camera: &'a Camera,
-        settings: RenderSettings,
-    ) -> Result<Self, BackwardError> {
-        let subject = subject.into();
+    /// When a setting makes no sense, or the camera was made for other bands.
+    pub fn new(world: &'a World, camera: &'a Camera, settings: RenderSettings) -> Result<Self, BackwardError> {
         camera.check()?;
-        if let Subject::Radiant(_) = subject {
-            check_radiant(camera, &settings)?;
-        }
         if !(1..=MOST_SAMPLES).contains(&settings.samples_per_pass) {
             let found = settings.samples_per_pass;
             return Err(BackwardError::setting("the samples of a pass", found, "1 to 65536"));
@@ -98,7 +89,7 @@ impl<'a> Renderer<'a> {
         };
         let (rows, columns) = camera.pixels().size();
         let film = Film::new(rows, columns, settings.bands.grid.len());
-        Ok(Self { subject, camera, settings, packets, film, targets: None, n_passes: 0 })
+        Ok(Self { world, camera, settings, packets, film, targets: None, n_passes: 0 })
     }
 
     /// The settings, with the samples of a pass as they are.
@@ -263,47 +254,15 @@ impl<'a> Renderer<'a> {
 
     /// Returns an estimate of the radiance along a ray, behind the surfaces that are looked through.
     fn radiance<const N: usize>(&self, ray: Ray, wavelengths_nm: &[f32; N], random: &Sampler) -> [f32; N] {
-        let world = match self.subject {
-            Subject::World(world) => world,
-            Subject::Radiant(scene) => {
-                let mut radiance = [0.0; N];
-                scene.add_radiance(&ray, wavelengths_nm, random, &mut radiance);
-                return radiance;
-            }
-        };
         // There may not be so many surfaces.
         let ray = match self.camera.layer() {
             0 => Some(ray),
-            n => Surfaces::along(world, ray).ray_behind(n),
+            n => Surfaces::along(self.world, ray).ray_behind(n),
         };
         let RenderSettings { paths, clamp, .. } = self.settings;
-        let integrator = Integrator { world, paths, clamp };
+        let integrator = Integrator { world: self.world, paths, clamp };
         ray.map_or([0.0; N], |ray| integrator.radiance(ray, wavelengths_nm, random))
     }
-}
-
-/// Checks that nothing is asked of a scene that knows its light which only a world can do.
-fn check_radiant(camera: &Camera, settings: &RenderSettings) -> Result<(), BackwardError> {
-    if settings.paths != LightPaths::Full {
-        let found = format!("{:?}", settings.paths);
-        return Err(BackwardError::setting(
-            "the light that is followed",
-            found,
-            "Full of a scene that knows its light",
-        ));
-    }
-    if let Some(clamp) = settings.clamp {
-        return Err(BackwardError::setting(
-            "the clamp of scattered light",
-            clamp,
-            "none of a scene that knows its light",
-        ));
-    }
-    if camera.layer() > 0 {
-        let found = camera.layer();
-        return Err(BackwardError::setting("the surfaces looked through", found, "0 of a scene that knows its light"));
-    }
-    Ok(())
 }
 
 /// The pair of numbers that chooses wavelengths; those below are the stop's and the integrator's.

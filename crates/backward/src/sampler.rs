@@ -39,10 +39,11 @@ impl Sampler {
     pub fn pair(&self, pair: u32) -> [f32; 2] {
         let key = mix(self.key ^ mix(pair.wrapping_add(0x5bd1_e995)));
         let index = scrambled(self.index, key);
-        [0, 1].map(|dimension| {
+        let number = |dimension: usize| {
             let bits = scrambled(sobol(index, dimension), mix(key ^ (dimension as u32 + 1)));
             (bits >> 8) as f32 * UNIT_F32
-        })
+        };
+        [number(0), number(1)]
     }
 }
 

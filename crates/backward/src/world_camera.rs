@@ -2,11 +2,11 @@
 
 use dioptric_diffraction::Hurb;
 use dioptric_optics::{Lens, OpticsError, glam::DVec2};
-use dioptric_world::{CameraKind, WorldCamera, glam::DVec3};
+use dioptric_world::{CameraKind, World, WorldCamera, glam::DVec3};
 
 use crate::{
     BackwardError, Bands, Camera, LensCamera, LensCameraSettings, LensOrigin, Panorama, Parallel, Pinhole, PixelGrid,
-    Placement, Subject, ThinLens, camera::world_ray,
+    Placement, ThinLens, camera::world_ray,
 };
 
 /// The paper's stand-in for dispersion: a straight line through each index at 550 nm, per nm.
@@ -92,9 +92,9 @@ impl Camera {
 }
 
 /// Returns the distance along its axis, m, of what a camera sees in the middle of its picture; none where that is nothing.
-pub fn distance_ahead_m<'a>(subject: impl Into<Subject<'a>>, placement: &Placement) -> Option<f64> {
+pub fn distance_ahead_m(world: &World, placement: &Placement) -> Option<f64> {
     let ray = world_ray(placement, DVec3::ZERO, DVec3::Z);
-    subject.into().first_point(&ray).map(|point| f64::from((point - ray.origin).dot(ray.direction)))
+    world.intersect(&ray, f32::INFINITY).map(|hit| f64::from((hit.point - ray.origin).dot(ray.direction)))
 }
 
 /// Returns the tangents of half the angles of a picture, from the angle across its shorter side.

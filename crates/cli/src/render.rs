@@ -59,36 +59,30 @@ pub(crate) fn run(arguments: &RenderArgs, common: &Common) -> anyhow::Result<()>
     let kept = KeptCamera::new(camera_of(arguments, common)?);
     kept.camera().validate()?;
     check_lens(kept.camera(), arguments)?;
-    let world = kept.world_of_file(&clock, &cancel)?;
-    let notes = world.as_ref().map_or(&[][..], |world| world.notes());
+    let world = kept.world(&clock, &cancel)?;
+    let notes = world.notes();
     tell(notes, common);
     let is_of_file = matches!(&kept.camera().scene.source, SceneSource::World(spec) if spec.view == WorldView::OfFile);
-    if is_of_file && world.as_ref().is_some_and(|world| world.cameras().is_empty()) {
+    if is_of_file && world.cameras().is_empty() {
         let whole = "the file has no camera: the whole of it is seen; --eye and --look-at give another view";
         tell(&[whole.to_owned()], common);
     }
     let mut camera = kept.camera().clone();
+    let SceneSource::World(spec) = kept.camera().scene.source.clone() else { unreachable!("the scene is a world") };
     // The demo's lens is that of the still life.
-    let has_lens = arguments.lens.is_some() || arguments.camera_file().is_some() || world.is_none();
-    let own = match (&world, &camera.scene.source) {
-        (Some(world), SceneSource::World(spec)) => Some(world_camera(world, spec, arguments.fov_deg)?),
-        _ => None,
-    };
-    let own_has_lens = match &own {
-        Some(own) if arguments.camera_file().is_none() => camera.take_from_world(own)?,
-        _ => false,
-    };
+    let is_still_life = spec.is_still_life();
+    let has_lens = arguments.lens.is_some() || arguments.camera_file().is_some() || is_still_life;
+    let own = world_camera(&world, &spec, arguments.fov_deg)?;
+    let takes_own = arguments.camera_file().is_none() && !is_still_life;
+    let own_has_lens = takes_own && camera.take_from_world(&own)?;
     if !has_lens && !own_has_lens {
-        let (Some(world), Some(own), SceneSource::World(spec)) = (&world, &own, &camera.scene.source) else {
-            bail!("{}: has no camera, expected one, or --lens", arguments.world.display());
-        };
         let grid = camera.wavelengths.grid()?.map_or_else(|| WavelengthGrid::uniform(400.0, 700.0, 10.0), Ok)?;
         let (first_nm, last_nm) = grid.range_nm();
         tell(&world.note_on_bands(first_nm, last_nm).into_iter().collect::<Vec<_>>(), common);
-        let render = WorldRender::of_own_camera(world.clone(), own, spec, grid)?;
+        let render = WorldRender::of_own_camera(world.clone(), &own, &spec, grid)?;
         let render = cropped(render, arguments)?;
         return render_without_sensor(arguments, common, (&render, &clock, &cancel), &|rendering| {
-            RenderingSummary::of(rendering, notes, spec)
+            RenderingSummary::of(rendering, notes, &spec)
         });
     }
     change_lens(&mut camera, arguments)?;
@@ -96,41 +90,23 @@ pub(crate) fn run(arguments: &RenderArgs, common: &Common) -> anyhow::Result<()>
     camera.focus = match arguments.place.focus() {
         Some(focus) => focus,
         // What stands ahead in the middle.
-        None if arguments.lens.is_some() => camera.focus_ahead(world.as_deref())?,
+        None if arguments.lens.is_some() => camera.focus_ahead(&world)?,
         None => camera.focus,
     };
     let kept = kept.with(|own| *own = camera);
-    show_before_light(arguments, (&kept, &clock, &cancel))?;
     let render = kept.world_render(&clock, &cancel)?;
-    if let (Some(_), SceneSource::World(spec)) = (&arguments.crop, &kept.camera().scene.source) {
+    if arguments.crop.is_some() {
         let render = cropped(render, arguments)?;
         return render_without_sensor(arguments, common, (&render, &clock, &cancel), &|rendering| {
-            RenderingSummary::of(rendering, notes, spec)
+            RenderingSummary::of(rendering, notes, &spec)
         });
     }
     let rendering = refine(arguments, (&render, &clock, &cancel))?;
     finish(arguments, common, (&kept, &clock, &cancel), (&render, &rendering))
 }
 
-/// Shows the still life before its light is known, which takes some seconds; of a rendering that goes on there is a picture.
-fn show_before_light(
-    arguments: &RenderArgs,
-    (kept, clock, cancel): (&KeptCamera, &Clock, &Cancel),
-) -> anyhow::Result<()> {
-    if arguments.resume && arguments.out.join(STATE).exists() {
-        return Ok(());
-    }
-    let Some(unlit) = kept.unlit_render(clock, cancel)? else { return Ok(()) };
-    make_folder(&arguments.out)?;
-    show_first_look(&cropped(unlit, arguments)?, FIRST_LOOKS[0], &arguments.out, cancel)
-}
-
 fn make_folder(out: &Path) -> anyhow::Result<()> {
     fs::create_dir_all(out).with_context(|| format!("cannot make {}", out.display()))
-}
-
-fn show_first_look(render: &WorldRender, factor: usize, out: &Path, cancel: &Cancel) -> anyhow::Result<()> {
-    Ok(write_seen_png(&render.preview(factor, cancel)?, factor, &out.join(PREVIEW))?)
 }
 
 /// Returns the part that is asked for.
@@ -150,7 +126,7 @@ fn camera_of(arguments: &RenderArgs, common: &Common) -> anyhow::Result<Camera> 
         sky: arguments.view.sky.clone(),
         lamps: arguments.view.light.clone(),
         effort: effort(arguments),
-        // How finely the still life is lit does not hang on the film, unless that has its pixels.
+        // The view of the still life does not hang on the film, unless that has its pixels.
         size: size.filter(|_| !of_file.is_still_life() || camera.film == FilmSpec::Scene),
         paths: arguments.bounces.map_or_else(LightPaths::default, LightPaths::UpTo),
         seed: common.seed.unwrap_or(1),
@@ -254,7 +230,12 @@ fn refine(arguments: &RenderArgs, (render, clock, cancel): Job<'_>) -> anyhow::R
     if renderer.n_passes() == 0 {
         clock.at(Stage::Irradiance, 0.0);
         for factor in FIRST_LOOKS {
-            show_first_look(render, factor, out, cancel)?;
+            let (picture, factor_seen) = render.first_look(factor, cancel)?;
+            write_seen_png(&picture, factor_seen, &preview)?;
+            // What is clean needs no finer look.
+            if factor_seen != factor {
+                break;
+            }
         }
     }
     let (mut saved, mut shown): (Option<Instant>, Option<Instant>) = (None, None);
@@ -303,8 +284,8 @@ fn finish(
     if arguments.layers.is_some() {
         report.files.push(SCENE.to_owned());
     }
-    let world = kept.world_of_file(&Silent, cancel)?;
-    let notes = world.as_ref().map_or(&[][..], |world| world.notes());
+    let world = kept.world(&Silent, cancel)?;
+    let notes = world.notes();
     let SceneSource::World(spec) = &kept.camera().scene.source else { unreachable!("the scene is a world") };
     let rendering = RenderingSummary::of(rendering, notes, spec);
     let report = Report { run: Some(report), rendering };

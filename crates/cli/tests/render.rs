@@ -238,7 +238,6 @@ fn built_in_still_life_is_rendered() {
     output(folder.path(), &still_life(&["--resume", "-o", "out"]));
     assert_eq!(bits(&out), bits(&folder.path().join("whole")));
     check_error(folder.path(), &still_life(&["--unit-m", "2"]), &["unit_m is 2"]);
-    check_error(folder.path(), &still_life(&["--bounces", "1"]), &["paths is UpTo(1)"]);
     let infrared = ["render", "still-life", "--wavelengths-nm", "900:1200:100", "--quiet"];
     check_error(folder.path(), &infrared, &["850 to 1250 nm", "within 300 to 1100 nm"]);
 }

@@ -99,7 +99,7 @@ pub enum PipelineError {
     Psf(PsfError),
     /// The scene.
     #[error(transparent)]
-    Scene(SceneError),
+    Scene(#[from] SceneError),
     /// The blur.
     #[error(transparent)]
     Forward(ForwardError),
@@ -235,15 +235,6 @@ impl From<PsfError> for PipelineError {
         match error {
             PsfError::Cancelled(cancelled) => Self::Cancelled(cancelled),
             other => Self::Psf(other),
-        }
-    }
-}
-
-impl From<SceneError> for PipelineError {
-    fn from(error: SceneError) -> Self {
-        match error {
-            SceneError::Cancelled(cancelled) => Self::Cancelled(cancelled),
-            other => Self::Scene(other),
         }
     }
 }

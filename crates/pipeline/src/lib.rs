@@ -16,6 +16,7 @@ mod error;
 pub mod figures;
 mod film_files;
 mod frame_files;
+mod gathered;
 mod json;
 mod keys;
 mod light_field;
@@ -30,6 +31,7 @@ mod schema;
 mod sense;
 mod shown;
 mod stages;
+mod still_life;
 mod video_files;
 mod words;
 

@@ -1,23 +1,23 @@
-//! Paintings of the still life kept in files, so that a later run does not paint them again.
+//! Views of worlds kept in files, so that a later run does not gather them again.
 
 use std::{
     cmp::Reverse,
     env, fs,
-    hash::{DefaultHasher, Hash, Hasher},
     path::{Path, PathBuf},
     time::{SystemTime, UNIX_EPOCH},
 };
 
-use dioptric_scene::{ExrParts, ExrSamples, Scene, StillLife, read_spectral_exr, write_spectral_exr};
-use dioptric_spectrum::{Cancel, Quantity, SpectralImage, WavelengthGrid};
+use dioptric_backward::GatheredView;
+use dioptric_scene::{ExrParts, ExrSamples, read_spectral_exr, write_spectral_exr};
+use dioptric_spectrum::{Quantity, SpectralImage, WavelengthGrid};
 use etcetera::{BaseStrategy, choose_base_strategy};
 
 use crate::PipelineError;
 
-/// Pixels of the smallest painting that is worth a file: it takes a second to paint.
+/// Pixels of the smallest view that is worth a file: it takes a second to gather.
 const LEAST_PIXELS: usize = 100_000;
 
-/// Bytes of all paintings together; the oldest give way.
+/// Bytes of all views together; the oldest give way.
 const MOST_BYTES: u64 = 1 << 30;
 
 /// Names the user's folder; nothing is kept where it is empty.
@@ -30,21 +30,31 @@ pub fn program_build(file: &Path) -> Option<String> {
     Some(format!("{} {} {}", env!("CARGO_PKG_VERSION"), file.len(), built.as_nanos()))
 }
 
-/// A folder in which paintings of the still life are kept from run to run.
+/// A folder in which views of worlds are kept from run to run, those of the built-in still life among them.
 ///
-/// A painting is used again, bit for bit, where the same build of the program painted it at the same size on the same bands. Files
-/// that cannot be read or written are as if they were not there.
+/// A view is used again, bit for bit, where the same build of the program gathered it of an equal world, known by the contents of its
+/// files, from the same place at the same size on the same bands. Files that cannot be read or written are as if they were not there.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PaintingFolder {
     path: PathBuf,
     build: String,
 }
 
+/// What a view is known by.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct ViewKey {
+    /// Words that differ between worlds, places and ways to look at them.
+    pub(crate) words: String,
+    pub(crate) rows: usize,
+    pub(crate) columns: usize,
+    pub(crate) grid: WavelengthGrid,
+}
+
 impl PaintingFolder {
-    /// Returns the user's folder of paintings, which all programs share: the one that the environment variable `DIOPTRIC_CACHE` names,
+    /// Returns the user's folder of views, which all programs share: the one that the environment variable `DIOPTRIC_CACHE` names,
     /// else `dioptric` in the user's cache; `None` where there is none or, by an empty variable, none is wanted.
     ///
-    /// `program` is the file of the program that paints, by which its builds are distinguished.
+    /// `program` is the file of the program that looks, by which its builds are distinguished.
     pub fn of_user(program: &Path) -> Option<Self> {
         let folder = match env::var_os(VARIABLE) {
             Some(folder) => PathBuf::from(folder),
@@ -54,87 +64,95 @@ impl PaintingFolder {
     }
 
     /// Returns the folder at a path, which need not exist yet; `build` tells builds of the program apart, since another may
-    /// paint otherwise.
+    /// see otherwise.
     pub fn new(path: impl Into<PathBuf>, build: impl Into<String>) -> Self {
         Self { path: path.into(), build: build.into() }
     }
 
-    /// Returns the still life, painted now where there is no painting of it.
-    pub(crate) fn scene(
+    /// Returns a view, made now where there is no file of it.
+    pub(crate) fn view(
         &self,
-        life: &StillLife,
-        grid: &WavelengthGrid,
-        progress: &(dyn Fn(f64) + Sync),
-        cancel: &Cancel,
-    ) -> Result<Scene, PipelineError> {
-        if !is_kept(life) {
-            return Ok(life.scene_with(grid, progress, cancel)?);
+        key: &ViewKey,
+        make: impl FnOnce() -> Result<GatheredView, PipelineError>,
+    ) -> Result<GatheredView, PipelineError> {
+        if !is_kept(key) {
+            return make();
         }
-        let file = self.file(life, grid);
-        if let Some(scene) = restored(&file, life, grid) {
-            return Ok(scene);
+        let file = self.file(key);
+        if let Some(seen) = restored(&file, key) {
+            return Ok(seen);
         }
-        let scene = life.scene_with(grid, progress, cancel)?;
-        self.keep(&file, &scene);
-        Ok(scene)
+        let seen = make()?;
+        self.keep(&file, &seen);
+        Ok(seen)
     }
 
-    /// Whether a painting that would be kept is not.
-    pub(crate) fn lacks(&self, life: &StillLife, grid: &WavelengthGrid) -> bool {
-        is_kept(life) && !self.file(life, grid).exists()
+    /// Whether a view that would be kept is not.
+    pub(crate) fn lacks(&self, key: &ViewKey) -> bool {
+        is_kept(key) && !self.file(key).exists()
     }
 
-    fn file(&self, life: &StillLife, grid: &WavelengthGrid) -> PathBuf {
-        let StillLife { rows, columns, horizontal_fov_deg, quick, moved_m, .. } = *life;
-        let mut hasher = DefaultHasher::new();
-        (&self.build, rows, columns, horizontal_fov_deg.to_bits(), quick, moved_m.map(f64::to_bits)).hash(&mut hasher);
-        grid.centers_nm().iter().for_each(|nm| nm.to_bits().hash(&mut hasher));
-        self.path.join(format!("still-life-{columns}x{rows}-{:016x}.exr", hasher.finish()))
+    fn file(&self, key: &ViewKey) -> PathBuf {
+        let mut hasher = blake3::Hasher::new();
+        for words in [&self.build, &key.words] {
+            hasher.update(&(words.len() as u64).to_le_bytes()).update(words.as_bytes());
+        }
+        for nm in key.grid.centers_nm() {
+            hasher.update(&nm.to_bits().to_le_bytes());
+        }
+        let hash = hasher.finalize().to_hex();
+        self.path.join(format!("{PREFIX}{}x{}-{}.exr", key.columns, key.rows, &hash[..16]))
     }
 
-    /// Writes a painting, and removes the oldest of too many.
-    fn keep(&self, file: &Path, scene: &Scene) {
+    /// Writes a view, and removes the oldest of too many.
+    fn keep(&self, file: &Path, seen: &GatheredView) {
         // Quick to read again.
         let samples = ExrSamples::Uncompressed;
-        let parts = ExrParts { depth: scene.depth.as_ref(), view: scene.view, samples, ..ExrParts::default() };
+        let parts = ExrParts { depth: Some(&seen.depth), samples, ..ExrParts::default() };
         let is_written =
-            fs::create_dir_all(&self.path).is_ok() && write_spectral_exr(file, &scene.radiance, &parts).is_ok();
+            fs::create_dir_all(&self.path).is_ok() && write_spectral_exr(file, &seen.radiance, &parts).is_ok();
         if is_written {
             remove_oldest(&self.path, MOST_BYTES);
         }
     }
 }
 
-/// Whether a painting is worth a file.
-fn is_kept(life: &StillLife) -> bool {
-    !life.with_hidden && life.rows.saturating_mul(life.columns) >= LEAST_PIXELS
+/// What the names of files begin with.
+const PREFIX: &str = "view-";
+
+/// Whether a view is worth a file.
+fn is_kept(key: &ViewKey) -> bool {
+    key.rows.saturating_mul(key.columns) >= LEAST_PIXELS
 }
 
-/// Returns the scene of a file of this size and these bands, `None` where there is none.
-fn restored(file: &Path, life: &StillLife, grid: &WavelengthGrid) -> Option<Scene> {
+/// Returns the view of a file of this size and these bands, `None` where there is none.
+fn restored(file: &Path, key: &ViewKey) -> Option<GatheredView> {
     if !file.exists() {
         return None;
     }
     let read = read_spectral_exr(file).ok()?;
     // Names of bands have fewer digits than their wavelengths.
-    let radiance = SpectralImage::new(Quantity::Radiance, grid.clone(), read.image.into_planes()).ok()?;
-    life.of_painting(radiance, read.depth?).ok()
+    let radiance = SpectralImage::new(Quantity::Radiance, key.grid.clone(), read.image.into_planes()).ok()?;
+    let depth = read.depth?;
+    let size = (key.rows, key.columns);
+    (depth.z_m().dim() == size && (radiance.rows(), radiance.columns()) == size)
+        .then_some(GatheredView { radiance, depth })
 }
 
-/// Removes the oldest paintings of a folder until the rest takes at most so many bytes.
+/// Removes the oldest views of a folder until the rest takes at most so many bytes.
 fn remove_oldest(folder: &Path, most_bytes: u64) {
     let Ok(entries) = fs::read_dir(folder) else { return };
-    let mut paintings: Vec<(SystemTime, u64, PathBuf)> = entries
+    let mut views: Vec<(SystemTime, u64, PathBuf)> = entries
         .filter_map(Result::ok)
-        .filter(|entry| entry.file_name().to_string_lossy().starts_with("still-life-"))
+        .filter(|entry| entry.file_name().to_string_lossy().starts_with(PREFIX))
         .filter_map(|entry| {
             let metadata = entry.metadata().ok()?;
             Some((metadata.modified().ok()?, metadata.len(), entry.path()))
         })
         .collect();
-    paintings.sort_by_key(|(at, ..)| Reverse(*at));
+    views.sort_by_key(|(at, ..)| Reverse(*at));
     let mut bytes = 0;
-    for (_, len, path) in paintings {
+    for (_, len, path) in views {
         bytes += len;
         if bytes > most_bytes {
             // Another program may have removed it.
@@ -147,42 +165,59 @@ fn remove_oldest(folder: &Path, most_bytes: u64) {
 mod tests {
     use std::sync::atomic::{AtomicUsize, Ordering};
 
+    use dioptric_spectrum::DepthMap;
+    use ndarray::Array2;
+
     use super::*;
 
     #[test]
-    fn painting_is_kept_to_the_bit() {
+    fn view_is_kept_to_the_bit() {
         let folder = tempfile::tempdir().unwrap();
-        let paintings = PaintingFolder::new(folder.path().join("made/when/needed"), "one build");
-        let (life, grid) = (StillLife::new(400, 250), WavelengthGrid::new(vec![450.123_456_789, 610.0]).unwrap());
-        let n_reports = AtomicUsize::new(0);
-        let count = |_| {
-            n_reports.fetch_add(1, Ordering::Relaxed);
+        let views = PaintingFolder::new(folder.path().join("made/when/needed"), "one build");
+        let grid = WavelengthGrid::new(vec![450.123_456_789, 610.0]).unwrap();
+        let key = ViewKey { words: "a room".to_owned(), rows: 250, columns: 400, grid: grid.clone() };
+        let plane = |band: usize| {
+            Array2::from_shape_fn((250, 400), |(r, c)| 1.1_f32.powi((r + 3 * band) as i32 % 50) + c as f32)
         };
-        let painted = paintings.scene(&life, &grid, &count, &Cancel::new()).unwrap();
-        assert!(n_reports.swap(0, Ordering::Relaxed) > 0);
-        let kept = paintings.scene(&life, &grid, &count, &Cancel::new()).unwrap();
-        assert_eq!((kept, n_reports.into_inner()), (painted.clone(), 0));
-        // A file that was cut off is painted anew.
-        let file = paintings.file(&life, &grid);
+        let z_m = Array2::from_shape_fn((250, 400), |(r, c)| if r < 9 { f32::INFINITY } else { 1.0 + c as f32 / 7.0 });
+        let seen = GatheredView {
+            radiance: SpectralImage::new(Quantity::Radiance, grid, vec![plane(0), plane(1)]).unwrap(),
+            depth: DepthMap::new(z_m).unwrap(),
+        };
+        let n_made = AtomicUsize::new(0);
+        let view = || {
+            views.view(&key, || {
+                n_made.fetch_add(1, Ordering::Relaxed);
+                Ok(seen.clone())
+            })
+        };
+        assert!(views.lacks(&key));
+        assert_eq!((view().unwrap(), view().unwrap()), (seen.clone(), seen.clone()));
+        assert!(!views.lacks(&key) && n_made.load(Ordering::Relaxed) == 1);
+        // A file that was cut off is made anew.
+        let file = views.file(&key);
         let bytes = fs::read(&file).unwrap();
         fs::write(&file, &bytes[..bytes.len() / 2]).unwrap();
-        assert_eq!(paintings.scene(&life, &grid, &|_| {}, &Cancel::new()).unwrap(), painted);
+        assert_eq!((view().unwrap(), n_made.load(Ordering::Relaxed)), (seen.clone(), 2));
         assert_eq!(fs::read(&file).unwrap(), bytes);
-        // Other bands, another size and another build are other files.
+        // Other bands, another size, another place and another build are other files.
         let others = [
-            paintings.file(&life, &WavelengthGrid::new(vec![450.0, 610.0]).unwrap()),
-            paintings.file(&StillLife::new(400, 251), &grid),
-            PaintingFolder::new(&paintings.path, "another build").file(&life, &grid),
+            views.file(&ViewKey { grid: WavelengthGrid::new(vec![450.0, 610.0]).unwrap(), ..key.clone() }),
+            views.file(&ViewKey { rows: 251, ..key.clone() }),
+            views.file(&ViewKey { words: "another".to_owned(), ..key.clone() }),
+            PaintingFolder::new(&views.path, "another build").file(&key),
         ];
         assert!(!others.contains(&file));
+        // What is small is made again each time, and leaves no file.
+        let small = ViewKey { rows: 9, ..key.clone() };
+        views.view(&small, || Ok(seen.clone())).unwrap();
+        assert!(!views.lacks(&small) && !views.file(&small).exists());
     }
 
     #[test]
-    fn oldest_paintings_give_way() {
+    fn oldest_views_give_way() {
         let folder = tempfile::tempdir().unwrap();
-        for (age_s, name) in
-            [(30, "still-life-a.exr"), (20, "still-life-b.exr"), (10, "still-life-c.exr"), (40, "notes.txt")]
-        {
+        for (age_s, name) in [(30, "view-a.exr"), (20, "view-b.exr"), (10, "view-c.exr"), (40, "notes.txt")] {
             let path = folder.path().join(name);
             fs::write(&path, vec![0; 100]).unwrap();
             let at = SystemTime::UNIX_EPOCH + std::time::Duration::from_secs(1_000_000 - age_s);
@@ -191,6 +226,6 @@ mod tests {
         remove_oldest(folder.path(), 250);
         let mut left: Vec<_> = fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().file_name()).collect();
         left.sort();
-        assert_eq!(left, ["notes.txt", "still-life-b.exr", "still-life-c.exr"]);
+        assert_eq!(left, ["notes.txt", "view-b.exr", "view-c.exr"]);
     }
 }

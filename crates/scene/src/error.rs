@@ -4,15 +4,12 @@ use std::path::PathBuf;
 
 use dioptric_files::memory::TooLarge;
 
-use dioptric_spectrum::{Cancelled, SpectrumError};
+use dioptric_spectrum::SpectrumError;
 
 /// A scene that cannot be read, written or used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SceneError {
-    /// Work that was stopped on request.
-    #[error(transparent)]
-    Cancelled(#[from] Cancelled),
     /// A file that cannot be read: absent, truncated, or of another format.
     #[error("{}: cannot be read: {reason}", file.display())]
     Unreadable {

@@ -1,4 +1,4 @@
-//! Spectral radiance with depth: scenes, their files, targets and a built-in still life.
+//! Spectral radiance with depth: scenes, their files, and targets.
 //!
 //! A [`Scene`] is what stands before the camera as seen from one point: spectral radiance (W m⁻² sr⁻¹ nm⁻¹), the
 //! axial depth of each sample (m), and the pinhole geometry ([`View`]) that gives each sample a direction. Row 0 is
@@ -7,12 +7,21 @@
 //! This crate knows nothing of lenses: what blurs a scene is another crate's concern.
 //!
 //! ```
-//! use dioptric_scene::StillLife;
-//! use dioptric_spectrum::WavelengthGrid;
-//! let grid = WavelengthGrid::uniform(450.0, 650.0, 50.0)?;
-//! let scene = StillLife::new(30, 20).scene(&grid)?;
-//! let (near_m, far_m) = scene.require_depth()?.range_m();
-//! assert!(near_m < 1.0 && far_m > 3.5);
+//! use dioptric_scene::{Pattern, Target, TargetLight};
+//! use dioptric_spectrum::{Illuminant, WavelengthGrid};
+//! let target = Target {
+//!     pattern: Pattern::SiemensStar { n_cycles: 36 },
+//!     rows: 20,
+//!     columns: 30,
+//!     light: TargetLight::Illuminant(Illuminant::D65),
+//!     luminance_cd_m2: 200.0,
+//!     dark: 0.02,
+//!     supersampling: 4,
+//!     horizontal_fov_deg: 20.0,
+//!     distance_m: 2.0,
+//! };
+//! let scene = target.scene(&WavelengthGrid::uniform(450.0, 650.0, 50.0)?)?;
+//! assert_eq!(scene.require_depth()?.range_m(), (2.0, 2.0));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
@@ -26,7 +35,6 @@ mod reframe;
 mod resample;
 mod scene;
 mod shown;
-mod still_life;
 mod targets;
 mod view;
 
@@ -49,7 +57,6 @@ pub use point_lights::{PointBrightness, PointLight, PointPlace};
 pub use preview::{srgb_preview, write_preview_png};
 pub use resample::{reflectance_under, resampled};
 pub use scene::{HiddenLayer, Scene};
-pub use still_life::{LitStillLife, StillLife, StillLifePoint};
 pub use targets::{Pattern, Target, TargetLight, Wave};
 pub use view::View;
 

@@ -27,6 +27,7 @@ mod exr_header;
 mod grid;
 mod illuminant;
 mod image;
+mod lanes;
 mod smooth_reflectance;
 mod spectrum;
 
@@ -41,5 +42,6 @@ pub use exr_header::sort_exr_attributes;
 pub use grid::WavelengthGrid;
 pub use illuminant::{ColorTemperature, Illuminant, blackbody, blackbody_peak, color_checker_reflectances, daylight};
 pub use image::{Bands, DepthMap, Quantity, SpectralImage};
+pub use lanes::lanes;
 pub use smooth_reflectance::SmoothReflectance;
 pub use spectrum::Spectrum;

@@ -8,7 +8,7 @@ use std::sync::OnceLock;
 
 use rayon::prelude::*;
 
-use crate::{Illuminant, Observer, WavelengthGrid, Xyz};
+use crate::{Illuminant, Observer, WavelengthGrid, Xyz, lanes};
 
 /// The smooth reflectance of a color: one lift for photographs and textures.
 ///
@@ -27,8 +27,8 @@ impl SmoothReflectance {
     /// Returns the reflectance at wavelengths, nm.
     pub fn at<const N: usize>(&self, wavelengths_nm: &[f32; N]) -> [f32; N] {
         let [c0, c1, c2] = self.c;
-        wavelengths_nm.map(|wavelength_nm| {
-            let s = (wavelength_nm - 550.0) * (1.0 / 200.0);
+        lanes(|lane| {
+            let s = (wavelengths_nm[lane] - 550.0) * (1.0 / 200.0);
             let x = c0 + s * (c1 + s * c2);
             // Written so that a large parabola gives exactly 0 or 1.
             self.scale * (0.5 + 0.5 * x / (1.0 + x * x).sqrt())

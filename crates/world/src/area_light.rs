@@ -206,6 +206,7 @@ impl Quadric {
             Shape::Sphere { radius_m } => 4.0 * PI * radius_m * radius_m,
             Shape::Disc { radius_m, inner_radius_m } => PI * (radius_m * radius_m - inner_radius_m * inner_radius_m),
             Shape::Cylinder { radius_m, z_min_m, z_max_m } => 2.0 * PI * radius_m * (z_max_m - z_min_m),
+            Shape::Lathe(ref lathe) => lathe.area(),
             Shape::Mesh(_) => 0.0,
         }
     }
@@ -248,6 +249,7 @@ impl Quadric {
                 let around = glam::DVec2::from_angle(f64::from(TAU * u[0]));
                 (radius_m * around).extend(z_min_m + f64::from(u[1]) * (z_max_m - z_min_m))
             }
+            Shape::Lathe(ref lathe) => lathe.sample(u),
             Shape::Mesh(_) => DVec3::ZERO,
         };
         let point = self.place().transform_point3(own);
@@ -257,6 +259,10 @@ impl Quadric {
 
     /// The density of `sample_area` at a point of the surface, 1/m².
     fn area_pdf(&self, point: Vec3) -> f32 {
-        (1.0 / (self.own_area() * self.area_ratio_at(point.as_dvec3()))) as f32
+        let own_density = match self.shape() {
+            Shape::Lathe(lathe) => lathe.density_at(self.own_point(point.as_dvec3())),
+            _ => 1.0 / self.own_area(),
+        };
+        (own_density / self.area_ratio_at(point.as_dvec3())) as f32
     }
 }

@@ -1,5 +1,8 @@
 //! How one point of a surface scatters light.
 
+mod parts;
+
+use dioptric_spectrum::lanes;
 use glam::Vec3;
 use std::f32::consts::FRAC_1_PI;
 
@@ -20,8 +23,7 @@ pub struct Bsdf<const N: usize> {
     geometric_normal: Vec3,
     outgoing: Vec3,
     /// Kinds of scattering, each with its factor.
-    lobes: [(Factor, Lobe<N>); MAX_LOBES],
-    n_lobes: usize,
+    lobes: Vec<(Factor, Lobe<N>)>,
     /// The sum of the chances.
     chances: f32,
 }
@@ -126,8 +128,7 @@ struct Mirrored<const N: usize> {
 
 impl<const N: usize> Bsdf<N> {
     pub(crate) fn new(frame: Frame, geometric_normal: Vec3, outgoing: Vec3) -> Self {
-        let none = (Factor { share: 0.0, chance: 0.0 }, Lobe::Open);
-        Self { frame, geometric_normal, outgoing, lobes: [none; MAX_LOBES], n_lobes: 0, chances: 0.0 }
+        Self { frame, geometric_normal, outgoing, lobes: Vec::new(), chances: 0.0 }
     }
 
     /// Adds a kind of scattering of a share of the surface, which is drawn as often.
@@ -147,23 +148,27 @@ impl<const N: usize> Bsdf<N> {
     /// What would be one too many takes the place of the last.
     fn push_with(&mut self, factor: Factor, lobe: Lobe<N>) {
         if factor.share > 0.0 {
-            if self.n_lobes == MAX_LOBES {
-                self.n_lobes -= 1;
-                self.chances -= self.lobes[self.n_lobes].0.chance;
+            if self.lobes.len() == MAX_LOBES
+                && let Some((last, _)) = self.lobes.pop()
+            {
+                self.chances -= last.chance;
             }
-            self.lobes[self.n_lobes] = (factor, lobe);
-            self.n_lobes += 1;
+            if self.lobes.is_empty() {
+                // Most surfaces have one.
+                self.lobes.reserve_exact(1);
+            }
+            self.lobes.push((factor, lobe));
             self.chances += factor.chance;
         }
     }
 
     /// Divides all shares by a number.
     pub(crate) fn divide(&mut self, by: f32) {
-        self.lobes[..self.n_lobes].iter_mut().for_each(|(factor, _)| factor.share /= by);
+        self.lobes.iter_mut().for_each(|(factor, _)| factor.share /= by);
     }
 
     fn lobes(&self) -> &[(Factor, Lobe<N>)] {
-        &self.lobes[..self.n_lobes]
+        &self.lobes
     }
 
     /// Returns the scattering function times the cosine of the angle between `incident` and the shading normal, 1/sr.
@@ -174,7 +179,7 @@ impl<const N: usize> Bsdf<N> {
         let mut sum = [0.0; N];
         for (Factor { share, .. }, lobe) in self.lobes() {
             let value = lobe.eval(o, i);
-            sum = std::array::from_fn(|lane| sum[lane] + share * value[lane]);
+            sum = lanes(|lane| sum[lane] + share * value[lane]);
         }
         sum
     }
@@ -209,7 +214,7 @@ impl<const N: usize> Bsdf<N> {
             let incident = self.frame.to_world(incident).normalize();
             self.local(incident)?;
             let chance = factor.chance / self.chances;
-            let weight = value.map(|v| v * factor.share / (chance * probability));
+            let weight = lanes(|lane| value[lane] * factor.share / (chance * probability));
             return Some(BsdfSample { incident, weight, pdf: chance * probability, is_delta: true, is_dispersed });
         }
         let incident = self.frame.to_world(lobe.draw(o, u_lobe, u)?).normalize();
@@ -217,10 +222,10 @@ impl<const N: usize> Bsdf<N> {
         if !(pdf > 0.0 && pdf.is_finite()) {
             return None;
         }
-        let weight = self.eval(incident).map(|f| f / pdf);
+        let value = self.eval(incident);
         let (o, i) = self.local(incident)?;
         let is_dispersed = o.z * i.z < 0.0 && self.is_dispersive();
-        let weight = std::array::from_fn(|lane| if is_dispersed && lane > 0 { 0.0 } else { weight[lane] });
+        let weight = lanes(|lane| if is_dispersed && lane > 0 { 0.0 } else { value[lane] / pdf });
         Some(BsdfSample { incident, weight, pdf, is_delta: false, is_dispersed })
     }
 
@@ -255,7 +260,7 @@ impl<const N: usize> Bsdf<N> {
         let mut sum = [0.0; N];
         for (Factor { share, .. }, lobe) in self.lobes() {
             let albedo = lobe.albedo(cos);
-            sum = std::array::from_fn(|lane| sum[lane] + share * albedo[lane]);
+            sum = lanes(|lane| sum[lane] + share * albedo[lane]);
         }
         sum
     }
@@ -307,7 +312,7 @@ impl<const N: usize> Lobe<N> {
         match self {
             Self::Diffuse { reflectance, transmittance } => {
                 let of = if is_reflection { reflectance } else { transmittance };
-                of.map(|r| r * FRAC_1_PI * i.z.abs())
+                lanes(|lane| of[lane] * FRAC_1_PI * i.z.abs())
             }
             Self::RoughDiffuse { reflectance, constants: [a, b] } if is_reflection => {
                 let (sin_o, sin_i) = (o.truncate().length(), i.truncate().length());
@@ -315,20 +320,21 @@ impl<const N: usize> Lobe<N> {
                 let along = o.truncate().dot(i.truncate()) / (sin_o * sin_i).max(f32::MIN_POSITIVE);
                 let steeper = o.z.abs().max(i.z.abs()).max(1e-6);
                 let shape = a + b * along.max(0.0) * sin_o * sin_i / steeper;
-                reflectance.map(|r| r * shape * FRAC_1_PI * i.z.abs())
+                lanes(|lane| reflectance[lane] * shape * FRAC_1_PI * i.z.abs())
             }
             Self::Mirror { reflectance, rough: Some(ggx) } if is_reflection => {
                 let (common, _) = facet_reflection(ggx, o, i);
-                reflectance.map(|r| r * common)
+                lanes(|lane| reflectance[lane] * common)
             }
             Self::Glossy { reflectance, index, rough: Some(ggx) } if is_reflection => {
                 let (common, cos) = facet_reflection(ggx, o, i);
-                std::array::from_fn(|lane| reflectance[lane] * common * fresnel::dielectric(cos, index[lane]))
+                let mirrored = fresnel::dielectrics(cos, index);
+                lanes(|lane| reflectance[lane] * common * mirrored[lane])
             }
             Self::Pane { reflectance, transmittance, rough: Some(ggx) } => {
                 let (of, i) = if is_reflection { (reflectance, i) } else { (transmittance, across(i)) };
                 let (common, _) = facet_reflection(ggx, o, i);
-                of.map(|share| share * common)
+                lanes(|lane| of[lane] * common)
             }
             Self::Layered { diffuse, mirrored, edge, lost, rough } if is_reflection => {
                 let (common, cos) = match rough {
@@ -337,37 +343,35 @@ impl<const N: usize> Lobe<N> {
                 };
                 let tail = fresnel::schlick_tail(cos);
                 let below = FRAC_1_PI * i.z.abs() * (1.0 - fresnel::between(lost[0], lost[1], tail));
-                std::array::from_fn(|lane| {
-                    diffuse[lane] * below + common * fresnel::between(mirrored[lane], *edge, tail)
-                })
+                lanes(|lane| diffuse[lane] * below + common * fresnel::between(mirrored[lane], *edge, tail))
             }
             Self::Substrate { diffuse, mirrored, rough } if is_reflection => {
                 let base = substrate_base(o.z.abs(), i.z.abs()) * i.z.abs();
                 let (gloss, tail) = substrate_gloss(rough.as_ref(), o, i);
-                std::array::from_fn(|lane| {
+                lanes(|lane| {
                     let coat = fresnel::between(mirrored[lane], 1.0, tail);
                     diffuse[lane] * (1.0 - mirrored[lane]) * base + gloss * coat
                 })
             }
             Self::Metal { n, k, rough: Some(ggx) } if is_reflection => {
                 let (common, cos) = facet_reflection(ggx, o, i);
-                std::array::from_fn(|lane| common * fresnel::conductor(cos, n[lane], k[lane]))
+                lanes(|lane| common * fresnel::conductor(cos, n[lane], k[lane]))
             }
             Self::Dielectric { index, reflectance, transmittance, rough: Some(ggx) } => {
                 let tint = if is_reflection { reflectance } else { transmittance };
-                std::array::from_fn(|lane| {
+                lanes(|lane| {
                     let eta = if o.z > 0.0 { index[lane] } else { 1.0 / index[lane] };
                     tint[lane] * rough_dielectric(ggx, eta, o, i).0
                 })
             }
             Self::Coated { diffuse, index, inside, rough } if is_reflection => {
                 let (common, cos) = rough.as_ref().map_or((0.0, 1.0), |ggx| facet_reflection(ggx, o, i));
-                std::array::from_fn(|lane| {
+                let [out, of, mirrored] = [o.z, i.z, cos].map(|z| fresnel::dielectrics(z.abs(), index));
+                lanes(|lane| {
                     let n = index[lane];
-                    let through = |z: f32| 1.0 - fresnel::dielectric(z.abs(), n);
                     let between = diffuse[lane] / (n * n * (1.0 - diffuse[lane] * inside[lane]));
-                    let base = FRAC_1_PI * i.z.abs() * through(o.z) * through(i.z) * between;
-                    base + common * fresnel::dielectric(cos, n)
+                    let base = FRAC_1_PI * i.z.abs() * (1.0 - out[lane]) * (1.0 - of[lane]) * between;
+                    base + common * mirrored[lane]
                 })
             }
             _ => [0.0; N],
@@ -479,7 +483,8 @@ impl<const N: usize> Lobe<N> {
         match self {
             Self::Mirror { reflectance, .. } => all(*reflectance),
             Self::Glossy { reflectance, index, .. } => {
-                all(std::array::from_fn(|lane| reflectance[lane] * fresnel::dielectric(cos, index[lane])))
+                let mirrored = fresnel::dielectrics(cos, index);
+                all(lanes(|lane| reflectance[lane] * mirrored[lane]))
             }
             Self::Pane { reflectance, transmittance, .. } => {
                 let p = self.back_probability();
@@ -489,32 +494,32 @@ impl<const N: usize> Lobe<N> {
             }
             Self::Layered { mirrored, edge, .. } => {
                 let tail = fresnel::schlick_tail(cos);
-                let value = mirrored.map(|at_right_angles| fresnel::between(at_right_angles, *edge, tail));
+                let value = lanes(|lane| fresnel::between(mirrored[lane], *edge, tail));
                 Some(Mirrored { incident: back, value, probability: self.coat_probability(o), is_dispersed: false })
             }
             Self::Substrate { mirrored, .. } => {
                 let tail = fresnel::schlick_tail(cos);
-                let value = mirrored.map(|at_right_angles| fresnel::between(at_right_angles, 1.0, tail));
+                let value = lanes(|lane| fresnel::between(mirrored[lane], 1.0, tail));
                 Some(Mirrored { incident: back, value, probability: self.coat_probability(o), is_dispersed: false })
             }
-            Self::Metal { n, k, .. } => all(std::array::from_fn(|lane| fresnel::conductor(cos, n[lane], k[lane]))),
+            Self::Metal { n, k, .. } => all(lanes(|lane| fresnel::conductor(cos, n[lane], k[lane]))),
             Self::Coated { index, .. } => {
-                let value = index.map(|n| fresnel::dielectric(cos, n));
+                let value = fresnel::dielectrics(cos, index);
                 let probability = self.coat_probability(o);
                 Some(Mirrored { incident: back, value, probability, is_dispersed: false })
             }
             Self::Dielectric { index, reflectance, transmittance, .. } => {
-                let eta = index.map(|n| if o.z > 0.0 { n } else { 1.0 / n });
-                let value = eta.map(|eta| fresnel::dielectric(cos, eta));
+                let eta: [f32; N] = lanes(|lane| if o.z > 0.0 { index[lane] } else { 1.0 / index[lane] });
+                let value = fresnel::dielectrics(cos, &eta);
                 let probability = value[0];
                 if u_lobe < probability {
-                    let value = std::array::from_fn(|lane| reflectance[lane] * value[lane]);
+                    let value = lanes(|lane| reflectance[lane] * value[lane]);
                     return Some(Mirrored { incident: back, value, probability, is_dispersed: false });
                 }
                 let incident = refract(o, Vec3::Z * o.z.signum(), eta[0])?;
                 let is_dispersed = eta.iter().any(|e| *e != eta[0]);
                 // Radiance over n² is what goes through unchanged.
-                let value = std::array::from_fn(|lane| match is_dispersed && lane > 0 {
+                let value = lanes(|lane| match is_dispersed && lane > 0 {
                     true => 0.0,
                     false => transmittance[lane] * (1.0 - value[lane]) / (eta[lane] * eta[lane]),
                 });
@@ -529,40 +534,39 @@ impl<const N: usize> Lobe<N> {
     fn albedo(&self, cos: f32) -> [f32; N] {
         let (is_outside, cos) = (cos > 0.0, cos.abs());
         match self {
-            Self::Diffuse { reflectance, transmittance } => {
-                std::array::from_fn(|lane| reflectance[lane] + transmittance[lane])
-            }
+            Self::Diffuse { reflectance, transmittance } => lanes(|lane| reflectance[lane] + transmittance[lane]),
             Self::RoughDiffuse { reflectance, .. } | Self::Mirror { reflectance, .. } => *reflectance,
             Self::Glossy { reflectance, index, .. } => {
-                std::array::from_fn(|lane| reflectance[lane] * fresnel::dielectric(cos, index[lane]))
+                let mirrored = fresnel::dielectrics(cos, index);
+                lanes(|lane| reflectance[lane] * mirrored[lane])
             }
-            Self::Metal { n, k, .. } => std::array::from_fn(|lane| fresnel::conductor(cos, n[lane], k[lane])),
-            Self::Dielectric { index, reflectance, transmittance, .. } => std::array::from_fn(|lane| {
+            Self::Metal { n, k, .. } => lanes(|lane| fresnel::conductor(cos, n[lane], k[lane])),
+            Self::Dielectric { index, reflectance, transmittance, .. } => lanes(|lane| {
                 let mirrored = fresnel::dielectric(cos, if is_outside { index[lane] } else { 1.0 / index[lane] });
                 fresnel::between(transmittance[lane], reflectance[lane], mirrored)
             }),
-            Self::Pane { reflectance, transmittance, .. } => {
-                std::array::from_fn(|lane| reflectance[lane] + transmittance[lane])
-            }
+            Self::Pane { reflectance, transmittance, .. } => lanes(|lane| reflectance[lane] + transmittance[lane]),
             Self::Layered { diffuse, mirrored, edge, lost, .. } => {
                 let tail = fresnel::schlick_tail(cos);
                 let below = 1.0 - fresnel::between(lost[0], lost[1], tail);
-                std::array::from_fn(|lane| diffuse[lane] * below + fresnel::between(mirrored[lane], *edge, tail))
+                lanes(|lane| diffuse[lane] * below + fresnel::between(mirrored[lane], *edge, tail))
             }
             // The integral of the base over all directions is 1 - (1 - cos o/2)^5 times its reflectance.
             Self::Substrate { diffuse, mirrored, .. } => {
                 let tail = fresnel::schlick_tail(cos);
                 let base = 1.0 - (1.0 - 0.5 * cos).powi(5);
-                std::array::from_fn(|lane| {
+                lanes(|lane| {
                     diffuse[lane] * (1.0 - mirrored[lane]) * base + fresnel::between(mirrored[lane], 1.0, tail)
                 })
             }
             Self::Open => [1.0; N],
-            Self::Coated { diffuse, index, inside, .. } => std::array::from_fn(|lane| {
-                let mirrored = fresnel::dielectric(cos, index[lane]);
-                mirrored
-                    + (1.0 - mirrored) * diffuse[lane] * (1.0 - inside[lane]) / (1.0 - diffuse[lane] * inside[lane])
-            }),
+            Self::Coated { diffuse, index, inside, .. } => {
+                let mirrored = fresnel::dielectrics(cos, index);
+                lanes(|lane| {
+                    let below = diffuse[lane] * (1.0 - inside[lane]) / (1.0 - diffuse[lane] * inside[lane]);
+                    mirrored[lane] + (1.0 - mirrored[lane]) * below
+                })
+            }
         }
     }
 

@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, OnceLock};
 
-use dioptric_spectrum::{Illuminant, Observer, SmoothReflectance, Spectrum, WavelengthGrid};
+use dioptric_spectrum::{Illuminant, Observer, SmoothReflectance, Spectrum, WavelengthGrid, lanes};
 
 /// A function of wavelength that is quick to look up and cheap to copy.
 ///
@@ -98,7 +98,7 @@ impl SpectralCurve {
         }
         let share = SmoothReflectance::of_rgb(rgb.map(|v| v / largest)).at(wavelengths_nm);
         let white = d65().at(wavelengths_nm);
-        std::array::from_fn(|lane| largest * share[lane] * white[lane])
+        lanes(|lane| largest * share[lane] * white[lane])
     }
 
     /// Whether it is lifted from a color, which tells nothing beyond what is seen; grays are the same everywhere.
@@ -120,14 +120,24 @@ impl SpectralCurve {
     pub fn at<const N: usize>(&self, wavelengths_nm: &[f32; N]) -> [f32; N] {
         match &self.kind {
             Kind::Constant => [self.scale; N],
-            Kind::Knots { knots, beyond } => wavelengths_nm.map(|w| self.scale * between_knots(knots, *beyond, w)),
-            Kind::Table { first_nm, values, beyond } => {
-                wavelengths_nm.map(|w| self.scale * in_table(w - first_nm, values, *beyond))
+            Kind::Knots { knots, beyond } => lanes(|i| self.scale * between_knots(knots, *beyond, wavelengths_nm[i])),
+            Kind::Table { first_nm, values, beyond: Beyond::Held } => {
+                lanes(|i| self.scale * held_in_table(wavelengths_nm[i] - first_nm, values))
             }
-            Kind::Smooth(smooth) => smooth.at(wavelengths_nm).map(|v| self.scale * v),
+            Kind::Table { first_nm, values, beyond: Beyond::Zero } => {
+                let last_nm = first_nm + (values.len() - 1) as f32;
+                lanes(|i| match (*first_nm..=last_nm).contains(&wavelengths_nm[i]) {
+                    true => self.scale * held_in_table(wavelengths_nm[i] - first_nm, values),
+                    false => 0.0,
+                })
+            }
+            Kind::Smooth(smooth) => {
+                let share = smooth.at(wavelengths_nm);
+                lanes(|lane| self.scale * share[lane])
+            }
             Kind::SmoothLight(smooth) => {
                 let (share, white) = (smooth.at(wavelengths_nm), d65().at(wavelengths_nm));
-                std::array::from_fn(|lane| self.scale * share[lane] * white[lane])
+                lanes(|lane| self.scale * share[lane] * white[lane])
             }
         }
     }
@@ -191,15 +201,14 @@ fn between_knots(knots: &[(f32, f32)], beyond: Beyond, wavelength_nm: f32) -> f3
     v0 + (v1 - v0) * (wavelength_nm - w0) / (w1 - w0)
 }
 
-fn in_table(along_nm: f32, values: &[f32], beyond: Beyond) -> f32 {
+#[inline]
+fn held_in_table(along_nm: f32, values: &[f32]) -> f32 {
     let last = values.len() - 1;
-    if beyond == Beyond::Zero && !(along_nm >= 0.0 && along_nm <= last as f32) {
-        return 0.0;
-    }
     let along_nm = along_nm.clamp(0.0, last as f32);
-    let below = (along_nm as usize).min(last.saturating_sub(1));
-    let above = (below + 1).min(last);
-    values[below] + (along_nm - below as f32) * (values[above] - values[below])
+    // A whole number of nanometers fits into 32 bits, from which it is quicker to turn back.
+    let below = along_nm as i32;
+    let (low, high) = (values[below as usize], values[(below as usize + 1).min(last)]);
+    low + (along_nm - below as f32) * (high - low)
 }
 
 #[cfg(test)]

@@ -1,5 +1,7 @@
 //! How much light a boundary between two media mirrors, for unpolarized light.
 
+use dioptric_spectrum::lanes;
+
 /// Returns the reflectance of a boundary at the cosine of the angle of incidence, 0–1.
 ///
 /// `eta` is the index behind the boundary over that before it. 1 where light is totally reflected.
@@ -13,6 +15,15 @@ pub(crate) fn dielectric(cos: f32, eta: f32) -> f32 {
     let parallel = (eta * cos - cos_behind) / (eta * cos + cos_behind);
     let across = (cos - eta * cos_behind) / (cos + eta * cos_behind);
     0.5 * (parallel * parallel + across * across)
+}
+
+/// Returns [`dielectric`] of boundaries of several indices, mostly all the same.
+pub(crate) fn dielectrics<const N: usize>(cos: f32, eta: &[f32; N]) -> [f32; N] {
+    if eta.iter().all(|n| n == &eta[0]) {
+        [dielectric(cos, eta[0]); N]
+    } else {
+        lanes(|lane| dielectric(cos, eta[lane]))
+    }
 }
 
 /// Returns the reflectance of a metal of index `n` + i `k`, in a medium of index 1 (Born & Wolf, 14.2).

@@ -3,6 +3,7 @@
 //! Those far away stand beside a tree of the others ([`LightTree`]), in which one is drawn by what may fall on the point, as is which of the two
 //! groups; a mesh that glows is as many lights there as it has triangles. A light that is the only one needs neither.
 
+use dioptric_spectrum::lanes;
 use glam::Vec3;
 use std::{f32::consts::TAU, f64::consts::PI};
 
@@ -176,7 +177,7 @@ impl Lights {
                 Source::Sky(sky) => sky.radiance(direction, wavelengths_nm),
                 Source::Alone(_) | Source::Area(_) => continue,
             };
-            sum = std::array::from_fn(|i| sum[i] + radiance[i]);
+            sum = lanes(|i| sum[i] + radiance[i]);
         }
         sum
     }

@@ -12,7 +12,7 @@ use crate::{
     uv::TexturePoint,
 };
 use dioptric_optics::Glass;
-use dioptric_spectrum::Spectrum;
+use dioptric_spectrum::{Spectrum, lanes};
 
 /// How a surface scatters light.
 #[derive(Clone, Debug, PartialEq)]
@@ -159,12 +159,17 @@ pub enum Relief {
     Normals(TextureId),
     /// The same with the parts along u and v multiplied.
     ScaledNormals(TextureId, f32),
+    /// The [tilt](crate::Pattern::tilt) of a pattern.
+    Pattern(TextureId),
 }
 
 impl Relief {
     pub(crate) fn texture(self) -> TextureId {
         match self {
-            Self::Heights(texture) | Self::Normals(texture) | Self::ScaledNormals(texture, _) => texture,
+            Self::Heights(texture)
+            | Self::Normals(texture)
+            | Self::ScaledNormals(texture, _)
+            | Self::Pattern(texture) => texture,
         }
     }
 }
@@ -279,15 +284,20 @@ pub(crate) struct Surfaces<'a> {
 
 impl Surfaces<'_> {
     /// Returns the scattering function at a hit.
-    pub(crate) fn bsdf<const N: usize>(self, hit: &Hit, outgoing: Vec3, wavelengths_nm: &[f32; N]) -> Bsdf<N> {
-        let at = TexturePoint::from(hit);
-        let frame = self.frame(hit);
+    pub(crate) fn bsdf<const N: usize>(
+        self,
+        hit: &Hit,
+        at: &TexturePoint<'_>,
+        outgoing: Vec3,
+        wavelengths_nm: &[f32; N],
+    ) -> Bsdf<N> {
+        let frame = self.frame(hit, at);
         let mut bsdf = Bsdf::new(frame, hit.geometric_normal, outgoing);
-        self.add_lobes(&mut bsdf, hit.material, &at, (1.0, false), wavelengths_nm);
+        self.add_lobes(&mut bsdf, hit.material, at, (1.0, false), wavelengths_nm);
         // Where a part of a mixture is open, the hit is one of the rest.
         let surface = &self.surfaces[hit.material.0 as usize];
         if surface.has_gaps && surface.material != Material::Open {
-            let share = self.share_of_parts(&surface.material, &at);
+            let share = self.share_of_parts(&surface.material, at);
             if share > 0.0 {
                 bsdf.divide(share);
             }
@@ -296,13 +306,13 @@ impl Surfaces<'_> {
     }
 
     /// Returns how much of the surface of a material is there, 0–1.
-    pub(crate) fn coverage(self, material: MaterialId, at: &TexturePoint) -> f32 {
+    pub(crate) fn coverage(self, material: MaterialId, at: &TexturePoint<'_>) -> f32 {
         let surface = &self.surfaces[material.0 as usize];
         let own = surface.coverage.map_or(1.0, |coverage| self.textures.number(coverage, at).clamp(0.0, 1.0));
         if own > 0.0 { own * self.share_of_parts(&surface.material, at) } else { 0.0 }
     }
 
-    fn share_of_parts(self, material: &Material, at: &TexturePoint) -> f32 {
+    fn share_of_parts(self, material: &Material, at: &TexturePoint<'_>) -> f32 {
         match material {
             Material::Open => 0.0,
             Material::Blend { of: [a, b], amount } => {
@@ -318,13 +328,15 @@ impl Surfaces<'_> {
         self,
         bsdf: &mut Bsdf<N>,
         material: MaterialId,
-        at: &TexturePoint,
+        at: &TexturePoint<'_>,
         (share, is_term): (f32, bool),
         wavelengths_nm: &[f32; N],
     ) {
         let surface = &self.surfaces[material.0 as usize];
-        let share_of =
-            |texture: TextureId| self.textures.spectral(texture, at, wavelengths_nm).map(|v| v.clamp(0.0, 1.0));
+        let share_of = |texture: TextureId| -> [f32; N] {
+            let value = self.textures.spectral(texture, at, wavelengths_nm);
+            lanes(|lane| value[lane].clamp(0.0, 1.0))
+        };
         let number = |texture: TextureId| self.textures.number(texture, at).clamp(0.0, 1.0);
         let rough = |roughness: &Roughness| {
             roughness.and_then(|alphas| {
@@ -344,10 +356,10 @@ impl Surfaces<'_> {
             }
             Material::Translucent { reflectance, transmittance } => {
                 let (r, t) = (share_of(*reflectance), share_of(*transmittance));
-                let down: [f32; N] = std::array::from_fn(|lane| (r[lane] + t[lane]).max(1.0).recip());
+                let down: [f32; N] = lanes(|lane| (r[lane] + t[lane]).max(1.0).recip());
                 Lobe::Diffuse {
-                    reflectance: std::array::from_fn(|lane| r[lane] * down[lane]),
-                    transmittance: std::array::from_fn(|lane| t[lane] * down[lane]),
+                    reflectance: lanes(|lane| r[lane] * down[lane]),
+                    transmittance: lanes(|lane| t[lane] * down[lane]),
                 }
             }
             Material::Mirror { reflectance, roughness } => {
@@ -405,8 +417,8 @@ impl Surfaces<'_> {
                 let lost = [mirrored.iter().copied().fold(0.0, f32::max), edge];
                 let base = (1.0 - metallic) * (1.0 - through);
                 let layered = Lobe::Layered {
-                    diffuse: color.map(|c| c * base),
-                    mirrored: std::array::from_fn(|lane| mirrored[lane] + metallic * (color[lane] - mirrored[lane])),
+                    diffuse: lanes(|lane| color[lane] * base),
+                    mirrored: lanes(|lane| mirrored[lane] + metallic * (color[lane] - mirrored[lane])),
                     edge: edge + metallic * (1.0 - edge),
                     lost,
                     rough,
@@ -457,18 +469,17 @@ impl Surfaces<'_> {
     }
 
     /// Returns the shading frame at a hit, with relief: x runs along u.
-    fn frame(self, hit: &Hit) -> Frame {
+    fn frame(self, hit: &Hit, at: &TexturePoint<'_>) -> Frame {
         let plain = Frame::about_with(hit.shading_normal, hit.dp_du);
         match self.surfaces[hit.material.0 as usize].relief {
             None => plain,
             Some(Relief::Heights(heights)) => {
                 // Tilt the tangents by the slope of the heights (Blinn 1978).
                 const STEP: f32 = 1e-3;
-                let here = TexturePoint::from(hit);
                 let tangents = [hit.dp_du, hit.dp_dv];
-                let at = |du: f32, dv: f32| self.textures.number(heights, &here.beside((du, dv), tangents));
-                let slope_u = (at(0.5 * STEP, 0.0) - at(-0.5 * STEP, 0.0)) / STEP;
-                let slope_v = (at(0.0, 0.5 * STEP) - at(0.0, -0.5 * STEP)) / STEP;
+                let height = |du: f32, dv: f32| self.textures.number(heights, &at.beside((du, dv), tangents));
+                let slope_u = (height(0.5 * STEP, 0.0) - height(-0.5 * STEP, 0.0)) / STEP;
+                let slope_v = (height(0.0, 0.5 * STEP) - height(0.0, -0.5 * STEP)) / STEP;
                 let n = hit.shading_normal;
                 let along = |tangent: Vec3| tangent - n * n.dot(tangent);
                 let (along_u, along_v) = (along(hit.dp_du), along(hit.dp_dv));
@@ -476,14 +487,18 @@ impl Surfaces<'_> {
                 let normal = if normal.dot(n) < 0.0 { -normal } else { normal };
                 Frame::about_with(normal, hit.dp_du)
             }
-            Some(Relief::Normals(normals)) => self.with_normals(hit, plain, (normals, 1.0)),
-            Some(Relief::ScaledNormals(normals, scale)) => self.with_normals(hit, plain, (normals, scale)),
+            Some(Relief::Normals(normals)) => self.with_normals(hit, at, plain, (normals, 1.0)),
+            Some(Relief::ScaledNormals(normals, scale)) => self.with_normals(hit, at, plain, (normals, scale)),
+            Some(Relief::Pattern(pattern)) => {
+                let tilted = at.own().normal + self.textures.tilt(pattern, at);
+                Frame::about_with(at.frame.world_normal(tilted), hit.dp_du)
+            }
         }
     }
 
     /// Returns the shading frame by a picture of normals, those along u and v multiplied.
-    fn with_normals(self, hit: &Hit, plain: Frame, (normals, scale): (TextureId, f32)) -> Frame {
-        let n = Vec3::from_array(self.textures.rgb(normals, &TexturePoint::from(hit)).map(|v| 2.0 * v - 1.0));
+    fn with_normals(self, hit: &Hit, at: &TexturePoint<'_>, plain: Frame, (normals, scale): (TextureId, f32)) -> Frame {
+        let n = Vec3::from_array(self.textures.rgb(normals, at).map(|v| 2.0 * v - 1.0));
         let n = n * Vec3::new(scale, scale, 1.0);
         let y = plain.y * plain.y.dot(hit.dp_dv).signum();
         let normal = (plain.x * n.x + y * n.y + plain.z * n.z.max(1e-3)).normalize_or(plain.z);

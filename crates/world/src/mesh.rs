@@ -81,13 +81,15 @@ impl TriangleMesh {
 
     /// Returns the corners of a triangle, m.
     pub fn corners(&self, triangle: usize) -> [Vec3; 3] {
-        self.triangles[triangle].map(|v| self.positions[v as usize])
+        let [a, b, c] = self.triangles[triangle];
+        [self.positions[a as usize], self.positions[b as usize], self.positions[c as usize]]
     }
 
     /// Returns the outward normal of a triangle with these corners, of length 1: the side its vertex normals point to, where
     /// it has them.
     pub(crate) fn outward_normal(&self, triangle: usize, corners: [Vec3; 3]) -> Vec3 {
-        let [a, b, c] = corners.map(|p| p.as_dvec3());
+        let [a, b, c] = corners;
+        let (a, b, c) = (a.as_dvec3(), b.as_dvec3(), c.as_dvec3());
         let normal = (b - a).cross(c - a).normalize_or(DVec3::Z).as_vec3();
         let is_inward = !self.normals.is_empty()
             && self.triangles[triangle].iter().map(|&v| self.normals[v as usize]).sum::<Vec3>().dot(normal) < 0.0;
@@ -121,7 +123,7 @@ pub(crate) fn normal_matrix(placement: &DAffine3) -> DMat3 {
 
 /// Returns the area of a triangle, m².
 pub(crate) fn triangle_area([a, b, c]: [Vec3; 3]) -> f64 {
-    let [a, b, c]: [DVec3; 3] = [a, b, c].map(|p| p.as_dvec3());
+    let (a, b, c) = (a.as_dvec3(), b.as_dvec3(), c.as_dvec3());
     0.5 * (b - a).cross(c - a).length()
 }
 

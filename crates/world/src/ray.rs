@@ -49,6 +49,8 @@ pub struct Hit {
     pub material: MaterialId,
     /// The instance through which it was met, if any.
     pub instance: Option<InstanceId>,
+    /// The size of details of patterns that are to be blurred away, m; 0, which rays give, for none.
+    pub footprint_m: f32,
 }
 
 /// A point that light is to fall on.

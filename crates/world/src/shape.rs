@@ -3,7 +3,7 @@
 use glam::{DAffine3, DVec2, DVec3};
 use std::f64::consts::TAU;
 
-use crate::{TriangleMesh, WorldError, mesh::normal_matrix};
+use crate::{Lathe, TriangleMesh, WorldError, lathe::SurfacePoint, mesh::normal_matrix};
 
 /// A shape about its own origin.
 #[derive(Clone, Debug, PartialEq)]
@@ -31,6 +31,8 @@ pub enum Shape {
         /// Where it ends, m.
         z_max_m: f64,
     },
+    /// A surface of revolution about the z axis.
+    Lathe(Lathe),
 }
 
 impl Shape {
@@ -69,16 +71,6 @@ pub(crate) struct Quadric {
     normals_by: glam::DMat3,
 }
 
-/// A point of a quadric's surface, in the frame of its group.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct SurfacePoint {
-    pub(crate) point: DVec3,
-    pub(crate) normal: DVec3,
-    pub(crate) dp_du: DVec3,
-    pub(crate) dp_dv: DVec3,
-    pub(crate) uv: DVec2,
-}
-
 impl Quadric {
     pub(crate) fn new(shape: Shape, place: DAffine3) -> Self {
         Self { shape, place, inverse: place.inverse(), normals_by: normal_matrix(&place) }
@@ -92,12 +84,18 @@ impl Quadric {
         &self.place
     }
 
+    /// Returns a point of its group's frame in its own.
+    pub(crate) fn own_point(&self, point: DVec3) -> DVec3 {
+        self.inverse.transform_point3(point)
+    }
+
     /// Returns by how much placing enlarges areas at a point of the surface.
     pub(crate) fn area_ratio_at(&self, point: DVec3) -> f64 {
         let p = self.inverse.transform_point3(point);
         let own_normal = match self.shape {
             Shape::Sphere { .. } => p.normalize_or(DVec3::Z),
             Shape::Cylinder { .. } => p.truncate().normalize_or(DVec2::X).extend(0.0),
+            Shape::Lathe(ref lathe) => lathe.normal_at(p),
             Shape::Disc { .. } | Shape::Mesh(_) => DVec3::Z,
         };
         (self.normals_by * own_normal).length()
@@ -111,6 +109,7 @@ impl Quadric {
             Shape::Cylinder { radius_m: r, z_min_m, z_max_m } => {
                 (DVec3::new(-r, -r, z_min_m), DVec3::new(r, r, z_max_m))
             }
+            Shape::Lathe(ref lathe) => lathe.bounds(),
             Shape::Mesh(_) => (DVec3::ZERO, DVec3::ZERO),
         };
         placed_bounds(&self.place, low, high)
@@ -123,6 +122,7 @@ impl Quadric {
         let within = |t: &f64| *t > 0.0 && *t < t_max;
         match self.shape {
             Shape::Mesh(_) => None,
+            Shape::Lathe(ref lathe) => lathe.meets(o, d, t_max),
             Shape::Sphere { radius_m } => {
                 // The distance of the center from the line, squared, computed from the nearest point: no cancellation.
                 let nearest = -o.dot(d) / d.length_squared();
@@ -187,6 +187,10 @@ impl Quadric {
                 let on = radius_m * outwards + DVec3::Z * p.z;
                 let dp_du = TAU * DVec3::new(-on.y, on.x, 0.0);
                 (on, outwards, dp_du, DVec3::Z * height, DVec2::new(azimuth(p) / TAU, (p.z - z_min_m) / height))
+            }
+            Shape::Lathe(ref lathe) => {
+                let SurfacePoint { point, normal, dp_du, dp_dv, uv } = lathe.surface_at(p);
+                (point, normal, dp_du, dp_dv, uv)
             }
             Shape::Mesh(_) => (p, DVec3::Z, DVec3::X, DVec3::Y, DVec2::ZERO),
         };

@@ -2,10 +2,13 @@
 
 use std::sync::Arc;
 
-use dioptric_spectrum::SmoothReflectance;
-use glam::Vec2;
+use dioptric_spectrum::{SmoothReflectance, lanes};
+use glam::{DVec3, Vec2};
 
-use crate::{ImageTexture, Pattern, SpectralCurve, TextureId, UvMapping, pattern::Found, uv::TexturePoint};
+use crate::{
+    ImageTexture, PatternRef, Procedural, SpectralCurve, TextureId, UvMapping, pattern::MOST_SHARES, procedural::Found,
+    uv::TexturePoint,
+};
 
 /// A value over a surface: a spectrum where a color is asked for, a number where a number is.
 ///
@@ -62,7 +65,7 @@ pub enum Texture {
         by: RoughnessLaw,
     },
     /// A pattern by formula.
-    Pattern(Box<Pattern>),
+    Procedural(Box<Procedural>),
     /// One texture times another.
     Product([TextureId; 2]),
     /// Two textures mixed.
@@ -71,6 +74,13 @@ pub enum Texture {
         of: [TextureId; 2],
         /// The share of the second, 0–1.
         amount: TextureId,
+    },
+    /// Textures that share the surface by a formula of the place, in the frame of the shape.
+    Pattern {
+        /// Up to 32 textures.
+        of: Vec<TextureId>,
+        /// What each counts where.
+        by: PatternRef,
     },
 }
 
@@ -111,7 +121,8 @@ impl Texture {
             Self::Curve(_) | Self::Image { .. } | Self::Channel { .. } | Self::VertexColors | Self::VertexAlpha => {
                 Vec::new()
             }
-            Self::Pattern(pattern) => pattern.parts(),
+            Self::Procedural(procedural) => procedural.parts(),
+            Self::Pattern { of, .. } => of.clone(),
             Self::Step { of, .. } | Self::Alpha { roughness: of, .. } => vec![*of],
             Self::Checkerboard { fields: of, .. } | Self::Product(of) => of.to_vec(),
             Self::Blend { of: [a, b], amount } => vec![*a, *b, *amount],
@@ -139,13 +150,14 @@ impl Textures<'_> {
     pub(crate) fn spectral<const N: usize>(
         self,
         id: TextureId,
-        at: &TexturePoint,
+        at: &TexturePoint<'_>,
         wavelengths_nm: &[f32; N],
     ) -> [f32; N] {
         match &self.0[id.0 as usize] {
             Texture::Curve(curve) => curve.at(wavelengths_nm),
             Texture::Image { image, mapping, scale } => {
-                image.reflectance_at(mapping.at(at)).at(wavelengths_nm).map(|v| v * scale)
+                let reflectance = image.reflectance_at(mapping.at(at)).at(wavelengths_nm);
+                lanes(|lane| reflectance[lane] * scale)
             }
             Texture::Checkerboard { fields, mapping } => {
                 self.spectral(fields[field(mapping.at(at))], at, wavelengths_nm)
@@ -153,7 +165,7 @@ impl Textures<'_> {
             Texture::Channel { .. } | Texture::VertexAlpha | Texture::Step { .. } | Texture::Alpha { .. } => {
                 [self.number(id, at); N]
             }
-            Texture::Pattern(pattern) => match pattern.at(at) {
+            Texture::Procedural(procedural) => match procedural.at(at) {
                 Found::Number(value) => [value; N],
                 Found::Color(rgb) => SmoothReflectance::of_rgb(rgb).at(wavelengths_nm),
                 Found::Texture(of) => self.spectral(of, at, wavelengths_nm),
@@ -161,7 +173,7 @@ impl Textures<'_> {
                     let mut sum = [0.0; N];
                     for (part, counts) in parts {
                         let value = self.spectral(part, at, wavelengths_nm);
-                        sum = std::array::from_fn(|i| sum[i] + counts * value[i]);
+                        sum = lanes(|i| sum[i] + counts * value[i]);
                     }
                     sum
                 }
@@ -172,18 +184,34 @@ impl Textures<'_> {
             }
             Texture::Product([a, b]) => {
                 let [a, b] = [*a, *b].map(|t| self.spectral(t, at, wavelengths_nm));
-                std::array::from_fn(|i| a[i] * b[i])
+                lanes(|i| a[i] * b[i])
             }
             Texture::Blend { of: [a, b], amount } => {
                 let [a, b] = [*a, *b].map(|t| self.spectral(t, at, wavelengths_nm));
                 let amount = self.number(*amount, at).clamp(0.0, 1.0);
-                std::array::from_fn(|i| a[i] + amount * (b[i] - a[i]))
+                lanes(|i| a[i] + amount * (b[i] - a[i]))
+            }
+            Texture::Pattern { of, by } => {
+                let mut sum = [0.0; N];
+                for (share, part) in shares(of, by, at) {
+                    let value = self.spectral(part, at, wavelengths_nm);
+                    sum = lanes(|i| sum[i] + share * value[i]);
+                }
+                sum
             }
         }
     }
 
+    /// Returns the relief of a pattern at the point: what is added to its normal.
+    pub(crate) fn tilt(self, id: TextureId, at: &TexturePoint<'_>) -> DVec3 {
+        match &self.0[id.0 as usize] {
+            Texture::Pattern { by, .. } => by.tilt(&at.own()),
+            _ => DVec3::ZERO,
+        }
+    }
+
     /// Returns the number at a point.
-    pub(crate) fn number(self, id: TextureId, at: &TexturePoint) -> f32 {
+    pub(crate) fn number(self, id: TextureId, at: &TexturePoint<'_>) -> f32 {
         match &self.0[id.0 as usize] {
             Texture::Curve(curve) => curve.mean_visible(),
             Texture::Image { image, mapping, scale } => scale * image.rgb_at(mapping.at(at)).iter().sum::<f32>() / 3.0,
@@ -196,7 +224,7 @@ impl Textures<'_> {
             Texture::VertexColors => at.color[..3].iter().sum::<f32>() / 3.0,
             Texture::VertexAlpha => at.color[3],
             Texture::Alpha { roughness, by } => by.alpha(self.number(*roughness, at)),
-            Texture::Pattern(pattern) => match pattern.at(at) {
+            Texture::Procedural(procedural) => match procedural.at(at) {
                 Found::Number(value) => value,
                 Found::Color(rgb) => rgb.iter().sum::<f32>() / 3.0,
                 Found::Texture(of) => self.number(of, at),
@@ -208,16 +236,28 @@ impl Textures<'_> {
                 let [a, b] = [*a, *b].map(|t| self.number(t, at));
                 a + self.number(*amount, at).clamp(0.0, 1.0) * (b - a)
             }
+            Texture::Pattern { of, by } => shares(of, by, at).map(|(share, part)| share * self.number(part, at)).sum(),
         }
     }
 
     /// Returns the linear sRGB color at a point of a picture, or of the pictures a texture is made of, for normal maps.
-    pub(crate) fn rgb(self, id: TextureId, at: &TexturePoint) -> [f32; 3] {
+    pub(crate) fn rgb(self, id: TextureId, at: &TexturePoint<'_>) -> [f32; 3] {
         match &self.0[id.0 as usize] {
             Texture::Image { image, mapping, .. } => image.rgb_at(mapping.at(at)),
             _ => [self.number(id, at); 3],
         }
     }
+}
+
+/// Returns the textures of a pattern that count at the point, each with its share.
+fn shares<'b>(
+    of: &'b [TextureId],
+    by: &PatternRef,
+    at: &TexturePoint<'_>,
+) -> impl Iterator<Item = (f32, TextureId)> + use<'b> {
+    let mut shares = [0.0; MOST_SHARES];
+    by.shares(&at.own(), &mut shares[..of.len()]);
+    shares.into_iter().zip(of.iter().copied()).filter(|(share, _)| *share != 0.0)
 }
 
 fn field(at: Vec2) -> usize {

@@ -4,7 +4,7 @@ use std::f32::consts::{FRAC_1_PI, PI, TAU};
 
 use glam::{Affine3A, Mat2, Vec2, Vec3};
 
-use crate::Hit;
+use crate::{Hit, PatternPoint, patterned::OwnFrame};
 
 /// Texture coordinates as a function of a point of the surface: `matrix · uv + offset`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,7 +41,7 @@ impl UvMapping {
         Self { matrix: Mat2::from_diagonal(scale), offset, ..Self::IDENTITY }
     }
 
-    pub(crate) fn at(&self, at: &TexturePoint) -> Vec2 {
+    pub(crate) fn at(&self, at: &TexturePoint<'_>) -> Vec2 {
         let uv = match &self.from {
             Coordinates::First => at.uv,
             Coordinates::Second => at.second_uv,
@@ -67,25 +67,40 @@ fn azimuth(d: Vec3) -> f32 {
 
 /// What textures can depend on.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct TexturePoint {
+pub(crate) struct TexturePoint<'a> {
     pub(crate) uv: Vec2,
     pub(crate) second_uv: Vec2,
     /// Linear sRGB and alpha of the vertices.
     pub(crate) color: [f32; 4],
     /// In the world, m.
     pub(crate) point: Vec3,
+    pub(crate) normal: Vec3,
+    pub(crate) footprint_m: f32,
+    /// The frame of the shape, in which patterns are asked.
+    pub(crate) frame: OwnFrame<'a>,
 }
 
-impl TexturePoint {
+impl<'a> TexturePoint<'a> {
+    pub(crate) fn of(hit: &Hit, frame: OwnFrame<'a>) -> Self {
+        Self {
+            uv: hit.uv,
+            second_uv: hit.second_uv,
+            color: hit.color,
+            point: hit.point,
+            normal: hit.shading_normal,
+            footprint_m: hit.footprint_m,
+            frame,
+        }
+    }
+
+    /// Returns the point in the frame of the shape.
+    pub(crate) fn own(&self) -> PatternPoint {
+        self.frame.own(self.point, self.normal, self.footprint_m)
+    }
+
     /// Returns a point beside this one, so far along both coordinates.
     pub(crate) fn beside(&self, (du, dv): (f32, f32), [dp_du, dp_dv]: [Vec3; 2]) -> Self {
         let by = Vec2::new(du, dv);
         Self { uv: self.uv + by, second_uv: self.second_uv + by, point: self.point + du * dp_du + dv * dp_dv, ..*self }
-    }
-}
-
-impl From<&Hit> for TexturePoint {
-    fn from(hit: &Hit) -> Self {
-        Self { uv: hit.uv, second_uv: hit.second_uv, color: hit.color, point: hit.point }
     }
 }

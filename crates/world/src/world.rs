@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use dioptric_spectrum::SmoothReflectance;
+use dioptric_spectrum::{SmoothReflectance, lanes};
 use glam::{DAffine3, DVec3, Vec2, Vec3};
 
 use crate::{
@@ -13,6 +13,8 @@ use crate::{
     material::{Surface, Surfaces},
     mesh::normal_matrix,
     notes::Notes,
+    pattern::MOST_SHARES,
+    patterned::{Frames, Patterned},
     placed::{PlacedKind, PlacedShape},
     shape::Quadric,
     texture::{MAX_DEPTH, Textures},
@@ -37,6 +39,7 @@ pub struct World {
     sources: Vec<PathBuf>,
     up: DVec3,
     is_left_handed: bool,
+    patterned: Patterned,
 }
 
 fn front_of(up: DVec3, is_left_handed: bool) -> DVec3 {
@@ -86,6 +89,13 @@ impl Parts for Geometry {
     }
 }
 
+impl Frames for Geometry {
+    fn instance_place(&self, instance: InstanceId) -> (&DAffine3, &DAffine3) {
+        let Instance { place, inverse, .. } = &self.instances[instance.0 as usize];
+        (place, inverse)
+    }
+}
+
 impl World {
     /// Returns where a ray first meets a surface nearer than `t_max_m`.
     ///
@@ -127,8 +137,12 @@ impl World {
         if surface.material == Material::Open && surface.coverage.is_none() {
             return self.geometry.shapes[hit.shape.0 as usize].emission.is_some();
         }
-        let share = self.asked().coverage(hit.material, &TexturePoint::from(hit));
+        let share = self.asked().coverage(hit.material, &self.point_of(hit));
         share >= 1.0 || share > 0.0 && number_of(ray) < share
+    }
+
+    fn point_of(&self, hit: &Hit) -> TexturePoint<'_> {
+        TexturePoint::of(hit, self.patterned.place(hit.shape, hit.instance, &self.geometry))
     }
 
     fn asked(&self) -> Surfaces<'_> {
@@ -149,7 +163,7 @@ impl World {
     ///
     /// `outgoing` has length 1 and points away from the surface, against the ray that met it.
     pub fn bsdf<const N: usize>(&self, hit: &Hit, outgoing: Vec3, wavelengths_nm: &[f32; N]) -> Bsdf<N> {
-        self.asked().bsdf(hit, outgoing, wavelengths_nm)
+        self.asked().bsdf(hit, &self.point_of(hit), outgoing, wavelengths_nm)
     }
 
     /// Returns the share of light that is left after the way along a ray to this hit, where the shape that it lies on is
@@ -168,13 +182,18 @@ impl World {
                 match self.surfaces[hit.material.0 as usize].glow {
                     None => radiance,
                     Some(glow) => {
-                        let share = Textures(&self.textures).spectral(glow, &TexturePoint::from(hit), wavelengths_nm);
-                        std::array::from_fn(|lane| radiance[lane] * share[lane])
+                        let share = Textures(&self.textures).spectral(glow, &self.point_of(hit), wavelengths_nm);
+                        lanes(|lane| radiance[lane] * share[lane])
                     }
                 }
             }
             _ => [0.0; N],
         }
+    }
+
+    /// Whether two shapes are one thing: the same shape, or some that were [joined](WorldBuilder::join).
+    pub fn are_one_thing(&self, a: ShapeId, b: ShapeId) -> bool {
+        a == b || self.patterned.are_joined(a, b)
     }
 
     /// Returns the radiance, W m⁻² sr⁻¹ nm⁻¹, that comes from a direction in which nothing is met.
@@ -198,9 +217,9 @@ impl World {
             && let Some(glow) = self.surfaces[self.geometry.shapes[shape as usize].material.0 as usize].glow
         {
             let point = at.point + light.distance_m * light.direction;
-            let hit = self.geometry.shapes[shape as usize].hit_at(point, triangle);
-            let share = Textures(&self.textures).spectral(glow, &TexturePoint::from(&hit), wavelengths_nm);
-            light.radiance = std::array::from_fn(|lane| light.radiance[lane] * share[lane]);
+            let hit = Hit { shape: ShapeId(shape), ..self.geometry.shapes[shape as usize].hit_at(point, triangle) };
+            let share = Textures(&self.textures).spectral(glow, &self.point_of(&hit), wavelengths_nm);
+            light.radiance = lanes(|lane| light.radiance[lane] * share[lane]);
         }
         Some(light)
     }
@@ -390,6 +409,7 @@ impl TriangleMesh {
             primitive: triangle,
             material: MaterialId(0),
             instance: None,
+            footprint_m: 0.0,
         }
     }
 }
@@ -423,6 +443,7 @@ impl Quadric {
             primitive: 0,
             material: MaterialId(0),
             instance: None,
+            footprint_m: 0.0,
         }
     }
 }
@@ -473,6 +494,7 @@ pub struct WorldBuilder {
     sources: Vec<PathBuf>,
     up: DVec3,
     is_left_handed: bool,
+    things: Vec<Vec<ShapeId>>,
 }
 
 /// A shape to be placed.
@@ -507,6 +529,7 @@ impl WorldBuilder {
             sources: Vec::new(),
             up: DVec3::Y,
             is_left_handed: false,
+            things: Vec::new(),
         }
     }
 
@@ -589,6 +612,11 @@ impl WorldBuilder {
         if let Some(shape) = self.shapes.get_mut(shape.0 as usize) {
             shape.is_reversed = !shape.is_reversed;
         }
+    }
+
+    /// Says that shapes are one thing, such as a vase and its inside: what one of them hides lies behind them all.
+    pub fn join(&mut self, shapes: impl IntoIterator<Item = ShapeId>) {
+        self.things.push(shapes.into_iter().collect());
     }
 
     /// Begins a group of shapes that stands nowhere until it is placed by [`add_instance`](Self::add_instance).
@@ -688,6 +716,7 @@ impl WorldBuilder {
     pub fn build(mut self) -> Result<World, WorldError> {
         self.check()?;
         let (up, is_left_handed) = self.convention();
+        let patterned = Patterned::of(&self.textures, self.shapes.iter().map(|s| s.place), &self.things);
         let Self { shapes, n_groups, instances, surfaces, textures, lights, cameras, .. } = self;
         let (notes, sources) = (self.notes.sentences(), self.sources);
         let mut placed: Vec<PlacedShape> = shapes.into_iter().map(NewShape::placed).collect();
@@ -714,7 +743,19 @@ impl WorldBuilder {
         let lights = Lights::new(lights, &mut placed);
         let geometry = Geometry { shapes: placed, instances, groups };
         let has_gaps = geometry.shapes.iter().any(|shape| surfaces[shape.material.0 as usize].has_gaps);
-        Ok(World { geometry, surfaces, textures, lights, cameras, notes, has_gaps, sources, up, is_left_handed })
+        Ok(World {
+            geometry,
+            surfaces,
+            textures,
+            lights,
+            cameras,
+            notes,
+            has_gaps,
+            sources,
+            up,
+            is_left_handed,
+            patterned,
+        })
     }
 
     fn check(&mut self) -> Result<(), WorldError> {
@@ -754,12 +795,19 @@ impl WorldBuilder {
                 named("a material", "texture", texture.0, self.textures.len())?;
             }
         }
+        for shape in self.things.iter().flatten() {
+            named("a thing", "shape", shape.0, self.shapes.len())?;
+        }
         // Textures are made of earlier ones, so that none is made of itself, and aren't nested too deep for a stack.
         let mut depths = vec![0; self.textures.len()];
         for (index, texture) in self.textures.iter().enumerate() {
             for part in texture.parts() {
                 named("a texture", "earlier texture", part.0, index)?;
                 depths[index] = depths[index].max(depths[part.0 as usize] + 1);
+            }
+            if texture.parts().len() > MOST_SHARES {
+                let (what, n) = ("textures of a pattern", texture.parts().len() as u64);
+                return Err(WorldError::TooMany { what, n, limit: MOST_SHARES as u64 });
             }
             if depths[index] > MAX_DEPTH {
                 let what = "textures within textures";

@@ -6,14 +6,14 @@ use std::{
 };
 
 use dioptric_scene::{
-    FileReading, FillDepth, Part, Pattern, ReadOptions, Scene, SceneLight, StillLife, Target, TargetLight, View,
+    FileReading, FillDepth, Part, Pattern, ReadOptions, Scene, SceneLight, Target, TargetLight, View,
     read_hidden_layer, read_scene,
 };
-use dioptric_spectrum::{DepthMap, Illuminant, WavelengthGrid};
+use dioptric_spectrum::{Cancel, DepthMap, Illuminant, WavelengthGrid};
 use serde::{Deserialize, Serialize};
 
 use super::{check::Checker, world::WorldSpec};
-use crate::{PipelineError, ranges::range_of};
+use crate::{PipelineError, ranges::range_of, still_life::StillLife};
 
 /// What stands before the camera.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -280,7 +280,7 @@ impl SceneSpec {
     /// # Errors
     /// When a file cannot be read, lacks what is needed or holds what cannot be.
     pub fn open(&self, wanted: Option<&WavelengthGrid>) -> Result<Scene, PipelineError> {
-        self.open_with(wanted, None, |life, grid| Ok(life.scene(grid)?))
+        self.open_with(wanted, None, |life, grid| life.scene(grid, None, &|_| {}, &Cancel::new()))
     }
 
     /// Returns the still life of this size as it is pictured.

@@ -6,7 +6,6 @@ use std::{
 };
 
 use dioptric_backward::{BandSampling, LightPaths};
-use dioptric_scene::LitStillLife;
 use dioptric_spectrum::WavelengthGrid;
 use serde::{Deserialize, Serialize};
 
@@ -232,6 +231,9 @@ impl WorldSpec {
     /// The name of the built-in still life, in place of a file.
     pub const STILL_LIFE: &str = "still-life";
 
+    /// The wavelengths at which the colors of the still life are known; beyond, they are those at the ends.
+    const STILL_LIFE_NM: (f64, f64) = (300.0, 1100.0);
+
     /// The built-in still life in a view of so many columns and rows, with the defaults for all else.
     pub fn still_life(size: (usize, usize)) -> Self {
         Self { size: Some(size), ..Self::of_file(PathBuf::from(Self::STILL_LIFE)) }
@@ -255,7 +257,7 @@ impl WorldSpec {
         let share = if self.bands == BandSampling::Mean { 0.5 } else { 0.0 };
         let ((first_nm, last_nm), widths_nm) = (grid.range_nm(), grid.widths_nm());
         let reached_nm = (first_nm - share * widths_nm[0], last_nm + share * widths_nm[widths_nm.len() - 1]);
-        let known_nm = LitStillLife::RANGE_NM;
+        let known_nm = Self::STILL_LIFE_NM;
         if known_nm.0 <= reached_nm.0 && reached_nm.1 <= known_nm.1 {
             return Ok(());
         }
@@ -305,10 +307,6 @@ impl WorldSpec {
             if self.view != WorldView::OfFile || self.sky.is_some() || !self.lamps.is_empty() {
                 let expected = "none: the still life has a view and light of its own";
                 checker.wrong("view, sky or lamps", "given", expected)?;
-            }
-            if self.paths != LightPaths::Full {
-                let expected = "Full: the light in the still life was followed before";
-                checker.wrong("paths", &format!("{:?}", self.paths), expected)?;
             }
         }
         match self.effort {

@@ -2,7 +2,6 @@
 
 use super::{
     chain::Chain,
-    lit_still_life::picture_of,
     painting::{PaintReach, PaintingInputs},
     spec::{GeometryInputs, SceneInputs},
 };
@@ -19,10 +18,6 @@ impl Chain<'_> {
 /// Returns the picture of the built-in still life that a quality asks for, and its bands; `None` for any other scene.
 fn painting_of(inputs: &SceneInputs) -> Result<Option<PaintingInputs>, PipelineError> {
     let GeometryInputs { source, wavelengths, quality, given, .. } = &inputs.geometry;
-    if let Some(spec) = inputs.geometry.still_life() {
-        let (life, _) = picture_of(&inputs.geometry, spec);
-        return Ok(Some((life, quality.bands_of(&wavelengths.of_world()?)?)));
-    }
     let SceneSource::StillLife { columns, rows } = source else { return Ok(None) };
     if given.is_some() {
         return Ok(None);

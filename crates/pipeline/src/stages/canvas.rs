@@ -6,9 +6,9 @@
 
 use std::ops::Range;
 
-use dioptric_scene::{SceneError, StillLife, View};
+use dioptric_scene::{SceneError, View};
 
-use crate::Quality;
+use crate::{Quality, still_life::StillLife};
 
 /// Steps to twice the width, the height or the fineness of a canvas.
 const STEPS_PER_OCTAVE: f64 = 8.0;
@@ -57,7 +57,7 @@ pub(super) struct Canvas {
 /// known, it is a painting as wide and as high as the picture and at least as fine, all three in steps of 9 %.
 pub(super) fn canvas_of(life: &StillLife, viewing: Viewing) -> Option<Canvas> {
     let columns = viewing.quality.canvas_columns()?;
-    if life.columns != columns || life.with_hidden || life.moved_m != [0.0; 3] {
+    if life.columns != columns {
         return None;
     }
     let quick = viewing.quality == Quality::Preview;

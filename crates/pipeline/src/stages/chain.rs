@@ -18,7 +18,6 @@ use super::{
     irradiance::{self, Irradiance, Keeping},
     lens::{self, ResolvedLens, check_glasses},
     lens_tables::{LensAberrations, TableParts},
-    lit_still_life,
     memory::MemoryBudget,
     narrow_surfaces::NarrowSurfaces,
     painting::Paintings,
@@ -59,14 +58,11 @@ impl Chain<'_> {
             self.watch.cancel.check()?;
             let paintings = self.paintings();
             let mut scene = match inputs.geometry.world() {
-                _ if let Some(spec) = inputs.geometry.still_life() => {
-                    lit_still_life::view(inputs, spec, paintings, &self.watch)?
-                }
                 Some((_, spec)) => {
                     let has_room = |size, n_bands, n_layers| {
                         self.budget.map_or(Ok(()), |budget| budget.check_rendering(size, n_bands, n_layers))
                     };
-                    world::view(inputs, spec, &self.world(&inputs.geometry)?, &has_room, &self.watch)?
+                    world::view(inputs, spec, &self.world(&inputs.geometry)?, (&has_room, self.paintings), &self.watch)?
                 }
                 None => {
                     let lens = inputs.geometry.flat.as_ref().map(|(_, lens)| self.lens(lens)).transpose()?;

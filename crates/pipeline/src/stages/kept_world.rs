@@ -3,7 +3,6 @@
 use std::sync::Arc;
 
 use dioptric_forward::check_depth_map;
-use dioptric_scene::StillLife;
 use dioptric_spectrum::{Cancel, Quantity, SpectralImage};
 use dioptric_world::World;
 
@@ -12,11 +11,10 @@ use super::{
     irradiance::Irradiance,
     kept::KeptCamera,
     lens::check_glasses,
-    lit_still_life::{self, RadiantStillLife},
     spec::{GeometryInputs, IrradianceInputs, SceneInputs},
-    world::{self, WorldRender, WorldStage},
+    world::{self, WorldRender},
 };
-use crate::{PipelineError, Progress, SceneSource};
+use crate::{PipelineError, Progress};
 
 impl KeptCamera {
     /// Returns the world before the camera, read now where it is not kept.
@@ -27,15 +25,6 @@ impl KeptCamera {
         let scene = SceneInputs::of(&self.camera, &self.given, self.quality);
         let chain = self.chain(progress, cancel);
         chain.world(&scene.geometry)
-    }
-
-    /// Returns the world of a file before the camera; `None` where that is the built-in still life.
-    ///
-    /// # Errors
-    /// As [`world`](Self::world).
-    pub fn world_of_file(&self, progress: &dyn Progress, cancel: &Cancel) -> Result<Option<Arc<World>>, PipelineError> {
-        let is_still_life = matches!(&self.camera.scene.source, SceneSource::World(spec) if spec.is_still_life());
-        if is_still_life { Ok(None) } else { self.world(progress, cancel).map(Some) }
     }
 
     /// Returns the world before the camera as its lens sees it, to be rendered pass by pass.
@@ -62,21 +51,6 @@ impl KeptCamera {
         check_glasses(&lens, Some(grid))?;
         check_depth_map(&lens.lens, grid, resolved.scene.require_depth()?)?;
         chain.world_render(&inputs)
-    }
-
-    /// Returns the built-in still life as the lens sees it, for a look at the picture before it is lit: at once, but slow and with more
-    /// noise; `None` of a world, which needs no light before.
-    ///
-    /// # Errors
-    /// As [`world_render`](Self::world_render).
-    pub fn unlit_render(&self, progress: &dyn Progress, cancel: &Cancel) -> Result<Option<WorldRender>, PipelineError> {
-        self.camera.validate()?;
-        let inputs = self.irradiance_inputs()?;
-        let chain = self.chain(progress, cancel);
-        let Some(spec) = inputs.scene.geometry.still_life() else { return Ok(None) };
-        let (life, _) = lit_still_life::picture_of(&inputs.scene.geometry, spec);
-        let stage = WorldStage::StillLife(Arc::new(RadiantStillLife::unlit(&life)?));
-        chain.through_lens(stage, &inputs).map(Some)
     }
 
     /// Whether the irradiance on the film is kept, so that a capture starts behind it.
@@ -106,37 +80,17 @@ impl KeptCamera {
 impl Chain<'_> {
     pub(super) fn world(&self, geometry: &GeometryInputs) -> Result<Arc<World>, PipelineError> {
         let Some((inputs, _)) = geometry.world() else {
-            let reason = match geometry.still_life() {
-                Some(_) => "the still life is built in and no world that is read, expected one of a file",
-                None => "it is no world, expected 'source: World((file: ...))'",
-            };
-            let reason = reason.to_owned();
+            let reason = "it is no world, expected 'source: World((file: ...))'".to_owned();
             return Err(PipelineError::Unsuitable { what: "scene", reason });
         };
         self.kept.world.get_or_make(inputs, |inputs| world::read(inputs, &self.watch))
     }
 
     pub(super) fn world_render(&self, inputs: &IrradianceInputs) -> Result<WorldRender, PipelineError> {
-        let geometry = &inputs.scene.geometry;
-        let stage = match geometry.still_life() {
-            Some(spec) => {
-                let (life, _) = lit_still_life::picture_of(geometry, spec);
-                let light = |life: &StillLife| RadiantStillLife::new(life, &self.watch);
-                WorldStage::StillLife(self.kept.lit.get_or_make(life, light)?)
-            }
-            None => WorldStage::World(self.world(geometry)?),
-        };
-        self.through_lens(stage, inputs)
-    }
-
-    pub(super) fn through_lens(
-        &self,
-        stage: WorldStage,
-        inputs: &IrradianceInputs,
-    ) -> Result<WorldRender, PipelineError> {
+        let world = self.world(&inputs.scene.geometry)?;
         let film = &inputs.plan.bank.film;
         let grid = self.summary(&inputs.scene)?.grid()?;
         let (lens, place) = (self.lens(&film.lens)?, self.film(film, &inputs.scene)?);
-        WorldRender::through_lens(stage, inputs, (&lens, &place), grid)
+        WorldRender::through_lens(world, inputs, (&lens, &place), grid)
     }
 }

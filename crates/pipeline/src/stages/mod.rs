@@ -33,7 +33,6 @@ mod kept_world;
 mod lens;
 mod lens_tables;
 mod light_field;
-mod lit_still_life;
 mod memory;
 mod narrow_surfaces;
 mod painting;

@@ -1,7 +1,7 @@
 //! The still life as previews see it: painted on a canvas from which others are taken, so that another light, another field of view or another
 //! shape paints nothing.
 
-use dioptric_scene::{Scene, StillLife};
+use dioptric_scene::Scene;
 use dioptric_spectrum::WavelengthGrid;
 
 use super::{
@@ -9,7 +9,7 @@ use super::{
     canvas::{AHEAD_DEG, STEPS_AHEAD, Viewing, canvas_of, canvases_within, steps_of, view_of},
     slot::Slot,
 };
-use crate::{PaintingFolder, PipelineError, Stage};
+use crate::{PaintingFolder, PipelineError, Stage, still_life::StillLife};
 
 /// A picture of the still life on these bands.
 pub(crate) type PaintingInputs = (StillLife, WavelengthGrid);
@@ -72,9 +72,9 @@ impl Paintings<'_> {
         let Some(folder) = self.folder.filter(|_| reach == PaintReach::All) else { return Ok(()) };
         let [narrowest, widest] = AHEAD_DEG.map(steps_of);
         for canvas in canvases_within(life, viewing, narrowest..widest) {
-            if folder.lacks(&canvas, grid) {
+            if canvas.is_lacked_by(folder, grid)? {
                 self.painted(&canvas, grid, watch)?;
-                if folder.lacks(&canvas, grid) {
+                if canvas.is_lacked_by(folder, grid)? {
                     // It takes no file: what else is painted would be painted again each time.
                     break;
                 }
@@ -86,9 +86,6 @@ impl Paintings<'_> {
     fn painted(&self, life: &StillLife, grid: &WavelengthGrid, watch: &Watch<'_>) -> Result<Scene, PipelineError> {
         let report = |part| watch.progress.at(Stage::Scene, part);
         let (cancel, folder, life, grid) = (watch.cancel.clone(), self.folder.cloned(), *life, grid.clone());
-        watch.run_reporting(&report, move |progress| match folder {
-            Some(folder) => folder.scene(&life, &grid, progress, &cancel),
-            None => Ok(life.scene_with(&grid, progress, &cancel)?),
-        })
+        watch.run_reporting(&report, move |progress| life.scene(&grid, folder.as_ref(), progress, &cancel))
     }
 }

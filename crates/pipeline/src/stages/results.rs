@@ -2,7 +2,7 @@
 
 use dioptric_forward::ImagingPlan;
 use dioptric_psf::LensImageModel;
-use dioptric_scene::{Scene, StillLife};
+use dioptric_scene::Scene;
 use dioptric_sensor::Developed;
 use dioptric_spectrum::DepthMap;
 use dioptric_world::World;
@@ -14,7 +14,6 @@ use super::{
     irradiance::Irradiance,
     lens::ResolvedLens,
     lens_tables::LensAberrations,
-    lit_still_life::RadiantStillLife,
     memory::scene_bytes,
     painting::PaintingInputs,
     scene::{ResolvedScene, SceneSummary},
@@ -31,7 +30,6 @@ pub(super) struct KeptResults {
     pub(super) lens: Slot<LensInputs, ResolvedLens>,
     pub(super) world: Slot<WorldInputs, World>,
     pub(super) painting: Slot<PaintingInputs, Scene>,
-    pub(super) lit: Slot<StillLife, RadiantStillLife>,
     pub(super) scene: Slot<SceneInputs, ResolvedScene>,
     pub(super) summary: Slot<SceneInputs, SceneSummary>,
     pub(super) depth: Slot<GeometryInputs, DepthMap>,
@@ -52,7 +50,6 @@ impl Default for KeptResults {
             lens: Slot::new(8),
             world: Slot::new(2),
             painting: Slot::new(10),
-            lit: Slot::new(1),
             scene: Slot::new(2),
             summary: Slot::new(8),
             depth: Slot::new(2),
@@ -105,7 +102,6 @@ impl KeptResults {
         self.plan.clear();
         self.scene.clear();
         self.painting.clear();
-        self.lit.clear();
         self.world.clear();
     }
 

@@ -187,7 +187,7 @@ fn read(
             watch.run(move || scene.open_with(Some(&grid), None, |_, _| Ok(painting)))
         }
         SceneSource::File(_) | SceneSource::Target { .. } | SceneSource::World(_) => {
-            watch.run(move || scene.open_with(wanted.as_ref(), finest, |life, grid| Ok(life.scene(grid)?)))
+            watch.run(move || scene.open_with(wanted.as_ref(), finest, |_, _| unreachable!("it is no still life")))
         }
     }
 }

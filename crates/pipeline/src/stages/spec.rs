@@ -264,18 +264,9 @@ impl GeometryInputs {
         Viewing { quality: self.quality, frame: self.frame }
     }
 
-    /// Returns the built-in still life as a world, or `None` for any other scene.
-    pub(crate) fn still_life(&self) -> Option<&WorldSpec> {
-        let SceneSource::World(spec) = &self.source else { return None };
-        spec.is_still_life().then_some(spec)
-    }
-
-    /// Returns what the world of this geometry is read from, or `None` for a scene that is none or is built in.
+    /// Returns what the world of this geometry is read from, or `None` for a scene that is none.
     pub(crate) fn world(&self) -> Option<(WorldInputs, &WorldSpec)> {
         let SceneSource::World(spec) = &self.source else { return None };
-        if spec.is_still_life() {
-            return None;
-        }
         let inputs = WorldInputs {
             file: spec.file.clone(),
             unit_m: spec.unit_m,

@@ -3,8 +3,9 @@
 use std::{fs, path::Path, sync::Arc};
 
 use dioptric_backward::{
-    Auxiliary, Bands, Camera, LensCamera, LensCameraSettings, LensOrigin, LightPaths, Pinhole, PixelGrid, Placement,
-    RenderSettings, Renderer, Rendering, Subject, auxiliary, layered_depth, write_auxiliary_exr, write_rendering_exr,
+    Auxiliary, Bands, Camera, GatheredView, LensCamera, LensCameraSettings, LensOrigin, LightPaths, Pinhole, PixelGrid,
+    RenderSettings, Renderer, Rendering, ViewDetail, auxiliary, gathered_view, layered_depth, write_auxiliary_exr,
+    write_rendering_exr,
 };
 use dioptric_optics::{Lens, glam::DVec2};
 use dioptric_scene::{HiddenLayer, Scene, SceneLight, View};
@@ -16,7 +17,6 @@ use super::{
     IRRADIANCE_FILE, Watch,
     film::FilmPlace,
     lens::ResolvedLens,
-    lit_still_life::RadiantStillLife,
     scene::ResolvedScene,
     spec::{IrradianceInputs, SceneInputs, WorldInputs},
     world_light::light_on,
@@ -24,8 +24,8 @@ use super::{
     world_view::{horizontal_fov_deg, placement, world_camera},
 };
 use crate::{
-    Diffraction, PipelineError, Progress, RenderEffort, RenderMethod, SceneSource, Stage, WorldLamp, WorldSky,
-    WorldSpec,
+    Diffraction, PaintingFolder, PipelineError, Progress, Quality, RenderEffort, RenderMethod, SceneSource, Stage,
+    WorldLamp, WorldSky, WorldSpec, gathered::GatheredPicture, still_life,
 };
 
 /// Samples of a pass: as many as spread well, and few enough for a first picture soon.
@@ -35,13 +35,15 @@ const MOST_SAMPLES_PER_PASS: u32 = 1024;
 const TELLING_PASSES: u32 = 16;
 /// Passes that noise is judged by.
 const PILOT_PASSES: u32 = 4;
+/// The most columns of a first look at what a pinhole sees.
+const CLEAN_COLUMNS: usize = 480;
 /// The most passes where noise decides.
 const MOST_PASSES: u32 = 4096;
 
 /// A world as a camera sees it, to be rendered pass by pass.
 #[derive(Clone, Debug)]
 pub struct WorldRender {
-    stage: WorldStage,
+    world: Arc<World>,
     camera: Camera,
     bands: Bands,
     paths: LightPaths,
@@ -50,42 +52,12 @@ pub struct WorldRender {
     identity: String,
 }
 
-/// What rays from the film meet.
-#[derive(Clone, Debug)]
-pub(super) enum WorldStage {
-    /// The world of a file.
-    World(Arc<World>),
-    /// The built-in still life.
-    StillLife(Arc<RadiantStillLife>),
-}
-
-impl WorldStage {
-    fn subject(&self) -> Subject<'_> {
-        match self {
-            Self::World(world) => (&**world).into(),
-            Self::StillLife(life) => Subject::Radiant(&**life),
-        }
-    }
-
-    fn placement(&self, spec: &WorldSpec, fov_deg: Option<f64>) -> Result<Placement, PipelineError> {
-        match self {
-            Self::World(world) => placement(world, spec, fov_deg),
-            Self::StillLife(life) => Ok(life.placement()),
-        }
-    }
-
-    /// Returns words that differ between worlds.
-    fn fingerprint(&self, spec: &WorldSpec) -> String {
-        match self {
-            Self::World(world) => fingerprint(world, spec),
-            Self::StillLife(life) => life.identity(),
-        }
-    }
-}
-
 /// Reads a world.
 pub(super) fn read(inputs: &WorldInputs, watch: &Watch<'_>) -> Result<World, PipelineError> {
     watch.progress.at(Stage::Scene, 0.0);
+    if inputs.file.as_os_str() == WorldSpec::STILL_LIFE {
+        return Ok(World::still_life());
+    }
     let mut builder = open_world(&inputs.file, &ReadOptions { metres_per_unit: inputs.unit_m }, watch.cancel)?;
     for WorldLamp { at_m: (x, y, z), lumens } in &inputs.lamps {
         let intensity = Flux::Lumens(*lumens).spectrum(&Illuminant::D65.spectrum(), 4.0 * std::f64::consts::PI)?;
@@ -118,21 +90,28 @@ pub(super) fn read(inputs: &WorldInputs, watch: &Watch<'_>) -> Result<World, Pip
 /// Worlds wider than this are seldom in metres.
 const MOST_LIKELY_M: f64 = 1000.0;
 
-/// Renders the view from the middle of the entrance pupil: radiance and depth.
+/// The most columns of a view of the still life that is no more than the summary of a picture.
+const SUMMARY_COLUMNS: usize = 270;
+
+/// Returns the view from the middle of the entrance pupil: radiance and depth.
 ///
-/// Where rays from the film make the picture, the view is but its summary, and one pass does. `has_room` tells whether so many rows, columns, bands and
-/// layers may take the memory that they do.
+/// At full quality it is rendered by paths as carefully as was asked for. It is gathered (`docs/backward.md`) for previews, where rays
+/// from the film make the picture and it is but the summary, and of the still life; unless light is to be followed otherwise than in full.
+/// `has_room` tells whether so many rows, columns, bands and layers may take the memory that they do; views that are gathered are kept in a folder.
 pub(super) fn view(
     inputs: &SceneInputs,
     spec: &WorldSpec,
     world: &Arc<World>,
-    has_room: &dyn Fn((usize, usize), usize, u32) -> Result<(), PipelineError>,
+    (has_room, folder): (HasRoom<'_>, Option<&PaintingFolder>),
     watch: &Watch<'_>,
 ) -> Result<ResolvedScene, PipelineError> {
     let geometry = &inputs.geometry;
     let of_view = world_camera(world, spec, geometry.field_of_view_deg)?;
     let (columns, rows) = spec.size.unwrap_or(of_view.resolution);
-    let binning = geometry.quality.scene_binning(columns);
+    let mut binning = geometry.quality.scene_binning(columns);
+    if geometry.is_summary {
+        binning *= (columns / binning).div_ceil(SUMMARY_COLUMNS).max(1);
+    }
     let (columns, rows) = ((columns / binning).max(1), (rows / binning).max(1));
     let fov_deg = geometry.field_of_view_deg.or_else(|| horizontal_fov_deg(&of_view));
     let fov_deg = fov_deg.ok_or_else(|| PipelineError::Unsuitable {
@@ -142,62 +121,107 @@ pub(super) fn view(
     let view = View::from_horizontal_fov_deg(fov_deg, columns, rows)?;
     let wanted = geometry.wavelengths.of_world()?;
     let bands = Bands { grid: geometry.quality.bands_of(&wanted)?, sampling: spec.bands };
-    let n_layers = if spec.method == RenderMethod::Forward { spec.layers } else { 1 };
+    let is_forward = spec.method == RenderMethod::Forward;
+    let n_layers = if is_forward { spec.layers } else { 1 };
     has_room((rows, columns), bands.grid.len(), n_layers)?;
-    let half_tangents = 0.5 * DVec2::new(columns as f64, rows as f64) / view.focal_px;
-    let pixels = PixelGrid::new(columns, rows);
-    let pinhole =
-        Pinhole { placement: placement(world, spec, geometry.field_of_view_deg)?, pixels, half_tangents, layer: 0 };
+    let pinhole = Pinhole {
+        placement: placement(world, spec, geometry.field_of_view_deg)?,
+        pixels: PixelGrid::new(columns, rows),
+        half_tangents: 0.5 * DVec2::new(columns as f64, rows as f64) / view.focal_px,
+        layer: 0,
+    };
+    let is_rough = !is_forward || geometry.quality != Quality::Full || spec.is_still_life();
+    let mut layers = match is_rough && spec.paths == LightPaths::Full {
+        true => {
+            let is_fine = is_forward && geometry.quality >= Quality::Draft;
+            let picture = GatheredPicture {
+                world: world.clone(),
+                world_words: if folder.is_some() { fingerprint(world, spec) } else { String::new() },
+                view: pinhole,
+                grid: bands.grid,
+                detail: if is_fine { ViewDetail::Fine } else { ViewDetail::Quick },
+                seed: spec.seed,
+            };
+            gathered_layers(&picture, n_layers, folder, watch)?
+        }
+        false => rendered_layers(world, spec, (pinhole, n_layers), bands, watch)?,
+    }
+    .into_iter();
+    let first = layers.next().expect("there is one layer at least");
+    let hidden = layers.next().map(|behind| hidden_layer(&first, behind)).transpose()?;
+    let name = spec.file.file_stem().unwrap_or(spec.file.as_os_str()).to_string_lossy().into_owned();
+    let light = match &inputs.light {
+        Some(stated) => Some(SceneLight { illuminant: stated.clone(), illuminance_lux: None }),
+        None if spec.is_still_life() => Some(still_life::light()?),
+        None => light_on(world, &pinhole)?,
+    };
+    let (first_nm, last_nm) = first.radiance.grid().range_nm();
+    let notes = world.note_on_bands(first_nm, last_nm).map(|note| format!("{name}: {note}")).into_iter().collect();
+    let scene =
+        Scene { depth: Some(first.depth), view: Some(view), hidden, light, notes, ..Scene::new(name, first.radiance) };
+    Ok(ResolvedScene { scene, binning })
+}
+
+/// Tells whether so many rows and columns, bands and layers may take the memory that they do.
+type HasRoom<'a> = &'a dyn Fn((usize, usize), usize, u32) -> Result<(), PipelineError>;
+
+/// Gathers a view and what it hides.
+fn gathered_layers(
+    picture: &GatheredPicture,
+    n_layers: u32,
+    folder: Option<&PaintingFolder>,
+    watch: &Watch<'_>,
+) -> Result<Vec<GatheredView>, PipelineError> {
+    let seen = |layer: u32| {
+        let report = |part| watch.progress.at(Stage::Scene, (f64::from(layer) + part) / f64::from(n_layers));
+        let mut picture = picture.clone();
+        picture.view.layer = layer;
+        let (folder, cancel) = (folder.cloned(), watch.cancel.clone());
+        watch.run_reporting(&report, move |progress| picture.seen(folder.as_ref(), progress, &cancel))
+    };
+    (0..n_layers).map(seen).collect()
+}
+
+/// Renders a view and what it hides by paths.
+fn rendered_layers(
+    world: &Arc<World>,
+    spec: &WorldSpec,
+    (pinhole, n_layers): (Pinhole, u32),
+    bands: Bands,
+    watch: &Watch<'_>,
+) -> Result<Vec<GatheredView>, PipelineError> {
     let (effort, samples_per_pass) = match spec.method {
         // As few as reach every band.
         RenderMethod::Backward => (RenderEffort::Samples(1), 1),
         RenderMethod::Forward => (spec.effort, SAMPLES_PER_PASS),
     };
-    let stage = WorldStage::World(world.clone());
     let camera = Camera::Pinhole(pinhole);
     let (paths, seed) = (spec.paths, spec.seed);
-    let render = WorldRender { stage, camera, bands, paths, seed, samples_per_pass, identity: String::new() };
-    let seen = |layer: u32| -> Result<SpectralImage, PipelineError> {
+    let render =
+        WorldRender { world: world.clone(), camera, bands, paths, seed, samples_per_pass, identity: String::new() };
+    let seen = |(layer, z_m): (u32, Array2<f32>)| -> Result<GatheredView, PipelineError> {
         let render = WorldRender { camera: Camera::Pinhole(Pinhole { layer, ..pinhole }), ..render.clone() };
         let mut renderer = render.renderer()?;
         let share = f64::from(n_layers).recip();
         let range = (share * f64::from(layer), share * f64::from(layer + 1));
         let progress = AtStage { progress: watch.progress, stage: Stage::Scene, range };
         render.refine(&mut renderer, effort, &progress, watch.cancel, &mut |_| Ok(true))?;
-        Ok(renderer.picture())
+        Ok(GatheredView { radiance: renderer.picture(), depth: DepthMap::new(z_m)? })
     };
-    let radiance = seen(0)?;
-    let mut depths = layered_depth(world, &pinhole, n_layers as usize, watch.cancel)?.into_iter();
-    let depth = DepthMap::new(depths.next().unwrap_or_default())?;
-    let hidden = match depths.next() {
-        Some(behind_m) => Some(hidden_layer((&radiance, &depth), seen(1)?, behind_m)?),
-        None => None,
-    };
-    let name = spec.file.file_stem().unwrap_or(spec.file.as_os_str()).to_string_lossy().into_owned();
-    let light = match &inputs.light {
-        Some(stated) => Some(SceneLight { illuminant: stated.clone(), illuminance_lux: None }),
-        None => light_on(world, &pinhole)?,
-    };
-    let (first_nm, last_nm) = radiance.grid().range_nm();
-    let notes = world.note_on_bands(first_nm, last_nm).map(|note| format!("{name}: {note}")).into_iter().collect();
-    let scene = Scene { depth: Some(depth), view: Some(view), hidden, light, notes, ..Scene::new(name, radiance) };
-    Ok(ResolvedScene { scene, binning })
+    (0..).zip(layered_depth(world, &pinhole, n_layers as usize, watch.cancel)?).map(seen).collect()
 }
 
 /// Returns what the first surfaces hide; where they hide nothing, the layer repeats them.
-fn hidden_layer(
-    (radiance, depth): (&SpectralImage, &DepthMap),
-    mut behind: SpectralImage,
-    mut behind_m: Array2<f32>,
-) -> Result<HiddenLayer, PipelineError> {
-    for (at, &first_m) in depth.z_m().indexed_iter() {
+fn hidden_layer(first: &GatheredView, behind: GatheredView) -> Result<HiddenLayer, PipelineError> {
+    let (mut radiance, mut behind_m) = (behind.radiance, behind.depth.z_m().clone());
+    for (at, &first_m) in first.depth.z_m().indexed_iter() {
         // Through the sky nothing is hidden.
         if first_m == f32::INFINITY {
             behind_m[at] = first_m;
-            behind.planes_mut().zip(radiance.planes()).for_each(|(mut behind, first)| behind[at] = first[at]);
+            radiance.planes_mut().zip(first.radiance.planes()).for_each(|(mut behind, first)| behind[at] = first[at]);
         }
     }
-    Ok(HiddenLayer { radiance: behind, depth: DepthMap::new(behind_m)? })
+    Ok(HiddenLayer { radiance, depth: DepthMap::new(behind_m)? })
 }
 
 /// Progress of one stage reported as another's.
@@ -217,7 +241,7 @@ impl Progress for AtStage<'_> {
 impl WorldRender {
     /// Returns the world as the lens of a camera file sees it.
     pub(super) fn through_lens(
-        stage: WorldStage,
+        world: Arc<World>,
         inputs: &IrradianceInputs,
         (lens, place): (&ResolvedLens, &FilmPlace),
         grid: WavelengthGrid,
@@ -236,15 +260,15 @@ impl WorldRender {
             film_distance_mm: place.film_distance_mm + inputs.micro_array.map_or(0.0, |array| array.gap_mm),
             film_size_mm: DVec2::new(columns as f64, rows as f64) * (1e-3 * place.pitch_um),
             pixels: PixelGrid::new(columns, rows),
-            placement: stage.placement(spec, inputs.scene.geometry.field_of_view_deg)?,
+            placement: placement(&world, spec, inputs.scene.geometry.field_of_view_deg)?,
             origin: LensOrigin::EntrancePupil,
             diffraction: inputs.plan.bank.diffraction.hurb(),
             micro_array: inputs.micro_array,
         };
-        let identity = format!("{} {:?} {settings:?}", stage.fingerprint(spec), lens.lens);
+        let identity = format!("{} {:?} {settings:?}", fingerprint(&world, spec), lens.lens);
         let camera = Camera::Lens(Box::new(LensCamera::new(&lens.lens, &bands, settings)?));
         let (paths, seed) = (spec.paths, spec.seed);
-        let whole = Self { stage, camera, bands, paths, seed, samples_per_pass: SAMPLES_PER_PASS, identity };
+        let whole = Self { world, camera, bands, paths, seed, samples_per_pass: SAMPLES_PER_PASS, identity };
         match place.part {
             Some(part) => whole.cropped((part.first_column, part.first_row), (place.columns, place.rows)),
             None => Ok(whole),
@@ -276,8 +300,7 @@ impl WorldRender {
         let identity = format!("{} {camera:?} {lens:?}", fingerprint(&world, spec));
         let camera = Camera::from_world(&camera, &bands, &read_lens)?;
         let (paths, seed) = (spec.paths, spec.seed);
-        let stage = WorldStage::World(world);
-        Ok(Self { stage, camera, bands, paths, seed, samples_per_pass: SAMPLES_PER_PASS, identity })
+        Ok(Self { world, camera, bands, paths, seed, samples_per_pass: SAMPLES_PER_PASS, identity })
     }
 
     /// Returns the rendering of a part of the picture: from this column and row on, so many of each; its samples are those of
@@ -291,17 +314,25 @@ impl WorldRender {
         Ok(self)
     }
 
-    /// Returns a first look at the picture: one pass with as few samples as reach every band, on pixels so many times as wide
-    /// and as high.
+    /// Returns a first look at the picture, and how many of its pixels are one each way: gathered and clean of a pinhole; behind a lens one
+    /// pass with as few samples as reach every band, on pixels `factor` times as wide and as high.
     ///
     /// # Errors
     /// When the work is cancelled.
-    pub fn preview(&self, factor: usize, cancel: &Cancel) -> Result<SpectralImage, PipelineError> {
-        let pixels = self.camera.pixels().coarser(factor);
-        let coarse = Self { camera: self.camera.clone().with_pixels(pixels), samples_per_pass: 1, ..self.clone() };
+    pub fn first_look(&self, factor: usize, cancel: &Cancel) -> Result<(SpectralImage, usize), PipelineError> {
+        let pixels = self.camera.pixels();
+        if let (Camera::Pinhole(view), LightPaths::Full) = (&self.camera, self.paths) {
+            let factor = pixels.size().1.div_ceil(CLEAN_COLUMNS).max(1);
+            let view = Pinhole { pixels: pixels.coarser(factor), ..*view };
+            let seen =
+                gathered_view(&self.world, &view, &self.bands.grid, (ViewDetail::Quick, self.seed), &|_| {}, cancel)?;
+            return Ok((seen.radiance, factor));
+        }
+        let camera = self.camera.clone().with_pixels(pixels.coarser(factor));
+        let coarse = Self { camera, samples_per_pass: 1, ..self.clone() };
         let mut renderer = coarse.renderer()?;
         renderer.pass(cancel, &|_| {})?;
-        Ok(renderer.picture())
+        Ok((renderer.picture(), factor))
     }
 
     /// Returns the same in passes of as many samples as leave some that tell the noise, where their number is known: a large
@@ -338,7 +369,7 @@ impl WorldRender {
             seed: self.seed,
             clamp: None,
         };
-        Ok(Renderer::new(self.stage.subject(), &self.camera, settings)?)
+        Ok(Renderer::new(&self.world, &self.camera, settings)?)
     }
 
     /// Makes passes until the picture is good enough, or `is_wanted`, which is called after each, returns false.
@@ -391,7 +422,7 @@ impl WorldRender {
     /// # Errors
     /// When the work is cancelled.
     pub fn auxiliary(&self, cancel: &Cancel) -> Result<Auxiliary, PipelineError> {
-        Ok(auxiliary(self.stage.subject(), &self.camera, &self.bands.grid, cancel)?)
+        Ok(auxiliary(&self.world, &self.camera, &self.bands.grid, cancel)?)
     }
 
     /// Writes a picture with its standard errors and its depth, and beside it `auxiliary.exr`; returns the names of the files.

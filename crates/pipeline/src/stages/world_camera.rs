@@ -6,10 +6,7 @@ use dioptric_backward::{Camera, LensOrigin, distance_ahead_m};
 use dioptric_optics::Lens;
 use dioptric_world::{CameraKind, World, WorldCamera};
 
-use super::{
-    lit_still_life::{RadiantStillLife, picture_at},
-    world_view::{placement, reference_band},
-};
+use super::world_view::{placement, reference_band};
 use crate::{
     Camera as CameraFile, Diffraction, FilmSpec, FocusSpec, LensReadOptions, LensSpec, PipelineError,
     REFERENCE_WAVELENGTH_NM, SceneSource, StopSpec,
@@ -69,18 +66,14 @@ impl CameraFile {
         Ok(true)
     }
 
-    /// Returns the focus on what stands before the middle of the picture; on infinity where nothing does. No world is that of
-    /// the built-in still life.
+    /// Returns the focus on what stands before the middle of the picture; on infinity where nothing does.
     ///
     /// # Errors
     /// When the lens cannot be read, or the camera stands outside the room of the still life.
-    pub fn focus_ahead(&self, world: Option<&World>) -> Result<FocusSpec, PipelineError> {
+    pub fn focus_ahead(&self, world: &World) -> Result<FocusSpec, PipelineError> {
         let SceneSource::World(spec) = &self.scene.source else { return Ok(self.focus) };
         let lens = self.stopped_lens()?.at(REFERENCE_WAVELENGTH_NM)?;
-        let ahead_m = match world {
-            Some(world) => distance_ahead_m(world, &placement(world, spec, self.scene.field_of_view_deg)?),
-            None => RadiantStillLife::unlit(&picture_at(spec))?.distance_ahead_m(),
-        };
+        let ahead_m = distance_ahead_m(world, &placement(world, spec, self.scene.field_of_view_deg)?);
         let ahead_m = ahead_m.unwrap_or(f64::INFINITY);
         // The center of the entrance pupil stands at the camera's place, the first vertex before or behind it.
         Ok(FocusSpec::DistanceMm(1e3 * ahead_m - lens.projection_center_z_mm()))

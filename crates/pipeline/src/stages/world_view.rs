@@ -84,10 +84,21 @@ pub fn world_camera(world: &World, spec: &WorldSpec, fov_deg: Option<f64>) -> Re
 }
 
 /// Returns where the view that is asked for is taken from, the camera moved as the file says.
+///
+/// # Errors
+/// As [`world_camera`], and when the camera stands outside the room of the still life.
 pub(super) fn placement(world: &World, spec: &WorldSpec, fov_deg: Option<f64>) -> Result<Placement, PipelineError> {
     let of_view = world_camera(world, spec, fov_deg)?.world_from_camera;
     let advance = DAffine3::from_translation(1e-3 * DVec3::new(spec.aside_mm.0, spec.aside_mm.1, spec.advance_mm));
-    Ok(Placement { world_from_camera: of_view * advance })
+    let world_from_camera = of_view * advance;
+    let eye_m = world_from_camera.translation;
+    let is_inside = |(low, high): (DVec3, DVec3)| low.cmplt(eye_m).all() && eye_m.cmplt(high).all();
+    // Of a closed room nothing is seen from outside.
+    if spec.is_still_life() && !world.bounds().is_some_and(is_inside) {
+        let reason = format!("it stands at {eye_m} m, expected a place within the room of the still life");
+        return Err(PipelineError::Unsuitable { what: "the place of the camera", reason });
+    }
+    Ok(Placement { world_from_camera })
 }
 
 /// Returns the angle across the picture of a camera that states one, degrees.

@@ -4,8 +4,6 @@ mod leaves;
 mod levels;
 mod pattern;
 
-pub(crate) use pattern::patch_at;
-
 use dioptric_spectrum::{
     Illuminant, Observer, Quantity, SpectralImage, Spectrum, WavelengthGrid, color_checker_reflectances,
 };

@@ -95,7 +95,7 @@ pub(super) fn patch_shares(target: &Target) -> Array2<PatchShares> {
 }
 
 /// Returns the patch at a place of the chart, 0–6 across and 0–4 down, or `None` on the frame.
-pub(crate) fn patch_at(u: f64, v: f64) -> Option<u8> {
+fn patch_at(u: f64, v: f64) -> Option<u8> {
     let is_inside = |at: f64| (FRAME..=1.0 - FRAME).contains(&at.fract());
     let on_chart = (0.0..6.0).contains(&u) && (0.0..4.0).contains(&v);
     (on_chart && is_inside(u) && is_inside(v)).then(|| 6 * v as u8 + u as u8)

@@ -132,6 +132,7 @@ impl FaceAreas {
         let one = |area: f64| Self { n: 1, sum: area, are_alike: true };
         match shape {
             Shape::Sphere { radius_m } => one(4.0 * PI * radius_m * radius_m * stretch),
+            Shape::Lathe(lathe) => one(lathe.area() * stretch),
             Shape::Cylinder { radius_m, z_min_m, z_max_m } => one(2.0 * PI * radius_m * (z_max_m - z_min_m) * stretch),
             Shape::Disc { radius_m, inner_radius_m } => {
                 let ratio = m.x_axis.cross(m.y_axis).length();

@@ -6,7 +6,7 @@ use glam::{Affine3A, DAffine3, DMat3, DMat4, DVec3, Vec2, Vec3};
 
 use super::{Fault, Reader, Version, params::Params, spectra::SpectrumUse, text, tokens::Tokens};
 use crate::{
-    Coordinates, Encoding, ImageTexture, NoiseKind, Pattern, SpectralCurve, Texture, TextureId, UvMapping, Wrap,
+    Coordinates, Encoding, ImageTexture, NoiseKind, Procedural, SpectralCurve, Texture, TextureId, UvMapping, Wrap,
 };
 
 impl Reader<'_> {
@@ -33,14 +33,14 @@ impl Reader<'_> {
                 let a = self.part(&params, &["tex1"], is_number, 1.0)?;
                 let b = self.part(&params, &["tex2"], is_number, 0.0)?;
                 match params.number("dimension") {
-                    Some(3.0) => pattern(Pattern::Blocks { of: [a, b], frame: self.texture_from_world()? }),
+                    Some(3.0) => procedural(Procedural::Blocks { of: [a, b], frame: self.texture_from_world()? }),
                     _ => Texture::Checkerboard { fields: [a, b], mapping: self.mapping(name, &params)? },
                 }
             }
             "dots" => {
                 let inside = self.part(&params, &["inside"], is_number, 1.0)?;
                 let outside = self.part(&params, &["outside"], is_number, 0.0)?;
-                pattern(Pattern::Dots { of: [inside, outside], mapping: self.mapping(name, &params)? })
+                procedural(Procedural::Dots { of: [inside, outside], mapping: self.mapping(name, &params)? })
             }
             "bilerp" => {
                 let mut of = Vec::with_capacity(4);
@@ -48,9 +48,9 @@ impl Reader<'_> {
                     of.push(self.part(&params, &[corner], is_number, default)?);
                 }
                 let of = <[TextureId; 4]>::try_from(of).map_err(|_| "a bilerp has four corners".to_owned())?;
-                pattern(Pattern::Corners { of, mapping: self.mapping(name, &params)? })
+                procedural(Procedural::Corners { of, mapping: self.mapping(name, &params)? })
             }
-            "uv" => pattern(Pattern::Coordinates { mapping: self.mapping(name, &params)? }),
+            "uv" => procedural(Procedural::Coordinates { mapping: self.mapping(name, &params)? }),
             "fbm" | "wrinkled" | "windy" | "marble" => {
                 let octaves = params.number("octaves").unwrap_or(8.0).clamp(0.0, 32.0) as u32;
                 let roughness = params.number("roughness").unwrap_or(0.5) as f32;
@@ -63,11 +63,11 @@ impl Reader<'_> {
                         let scale = params.number("scale").unwrap_or(1.0) as f32;
                         let variation = params.number("variation").unwrap_or(0.2) as f32;
                         let frame = Affine3A::from_scale(Vec3::splat(scale)) * frame;
-                        let marble = Pattern::Marble { octaves, roughness, variation, frame };
-                        return self.add_named_texture(name, is_number, pattern(marble), &params);
+                        let marble = Procedural::Marble { octaves, roughness, variation, frame };
+                        return self.add_named_texture(name, is_number, procedural(marble), &params);
                     }
                 };
-                pattern(Pattern::Noise { kind, octaves, roughness, frame })
+                procedural(Procedural::Noise { kind, octaves, roughness, frame })
             }
             _ => {
                 let sentence = format!("textures of kind '{kind}': not supported, an even 0.5 in their place");
@@ -237,6 +237,6 @@ impl Reader<'_> {
     }
 }
 
-fn pattern(pattern: Pattern) -> Texture {
-    Texture::Pattern(Box::new(pattern))
+fn procedural(procedural: Procedural) -> Texture {
+    Texture::Procedural(Box::new(procedural))
 }

@@ -13,10 +13,10 @@ pub(super) const WINDOW_HIGH: DVec3 = DVec3::new(-2.2, 0.95, 1.45);
 /// Half the sides of the cloth on the table.
 pub(super) const CLOTH_HALF: DVec3 = DVec3::new(0.25, 0.0012, 0.46);
 
-/// Luminance of the sky in the window at its middle, cd/m².
-pub(super) const WINDOW_CD_M2: f64 = 3300.0;
+/// Luminance of the sky in the window 0.3 of the way up, cd/m²: brighter above.
+pub(super) const WINDOW_CD_M2: f64 = 2450.0;
 
-/// A lamp that shines like a ball.
+/// A lamp.
 pub(super) struct Bulb {
     pub(super) center: DVec3,
     pub(super) radius: f64,
@@ -25,6 +25,6 @@ pub(super) struct Bulb {
 
 /// The bare bulb above the table, out of the picture, and the shaded lamp at the back.
 pub(super) const BULBS: [Bulb; 2] = [
-    Bulb { center: DVec3::new(0.85, 0.95, 0.60), radius: 0.045, luminance: 42_000.0 },
-    Bulb { center: DVec3::new(0.93, 0.30, 3.62), radius: 0.10, luminance: 2_600.0 },
+    Bulb { center: DVec3::new(0.85, 0.95, 0.60), radius: 0.045, luminance: 33_000.0 },
+    Bulb { center: DVec3::new(0.93, 0.30, 3.62), radius: 0.10, luminance: 3_900.0 },
 ];

@@ -1,14 +1,14 @@
-//! What the surfaces of the still life are made of.
+//! How the surfaces of the still life are painted: which pigments share them, and their relief.
 
 use glam::DVec3;
 
 use super::{
-    floor_plan::{CLOTH_HALF, WINDOW_CD_M2, WINDOW_HIGH, WINDOW_LOW},
+    floor_plan::CLOTH_HALF,
+    marks::{cover, line, print, star, stripes},
     noise::{cloudy, smooth, unit},
-    pattern::{cover, line, print, star, stripes},
     pigment::{Pigment, PigmentIndex},
 };
-use crate::targets::patch_at;
+use crate::{Pattern, PatternPoint};
 
 /// A mixture of pigments: which, and the share of each.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,13 +18,13 @@ pub(super) struct Mix {
 }
 
 impl Mix {
-    pub(super) fn one(pigment: PigmentIndex) -> Self {
+    fn one(pigment: PigmentIndex) -> Self {
         Self { parts: [(pigment, 1.0), (0, 0.0), (0, 0.0), (0, 0.0)], len: 1 }
     }
 
     /// Covers a share of the mixture, 0–1, with another pigment.
     #[must_use]
-    pub(super) fn under(mut self, pigment: PigmentIndex, share: f64) -> Self {
+    fn under(mut self, pigment: PigmentIndex, share: f64) -> Self {
         let share = share.clamp(0.0, 1.0) as f32;
         if share > 0.0 && self.len < self.parts.len() {
             self.parts[..self.len].iter_mut().for_each(|part| part.1 *= 1.0 - share);
@@ -36,63 +36,23 @@ impl Mix {
 
     /// Darkens or lightens the whole.
     #[must_use]
-    pub(super) fn times(mut self, factor: f64) -> Self {
+    fn times(mut self, factor: f64) -> Self {
         self.parts[..self.len].iter_mut().for_each(|part| part.1 *= factor as f32);
         self
     }
 
-    pub(super) fn parts(&self) -> &[(PigmentIndex, f32)] {
+    fn parts(&self) -> &[(PigmentIndex, f32)] {
         &self.parts[..self.len]
     }
 }
 
-/// What lies over a pigment: clear varnish, or bare metal in its stead.
+/// What is painted.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Coat {
-    /// Reflectance straight on; 0 for none.
-    pub(super) f0: f64,
-    /// Spread of what it mirrors, as the tangent of an angle.
-    pub(super) roughness: f64,
-    /// The pigment that colors what a metal mirrors.
-    pub(super) metal: Option<PigmentIndex>,
-}
-
-impl Coat {
-    const NONE: Self = Self { f0: 0.0, roughness: 0.0, metal: None };
-
-    const fn clear(f0: f64, roughness: f64) -> Self {
-        Self { f0, roughness, metal: None }
-    }
-}
-
-/// Which light a glowing thing is made of.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Light {
-    /// Through the window.
-    Day,
-    /// From lamps.
-    Warm,
-}
-
-/// A point of a surface, in the frame of its shape.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Surface {
-    pub(super) mix: Mix,
-    pub(super) normal: DVec3,
-    pub(super) coat: Coat,
-    /// Its own luminance, cd/m².
-    pub(super) glow: Option<(Light, f64)>,
-}
-
-/// What a thing is made of.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Material {
+pub(super) enum Paint {
     Room,
     Planks,
     Cloth,
-    Matte(PigmentIndex),
-    Glossy(PigmentIndex),
-    Metal { pigment: PigmentIndex, roughness: f64 },
+    Plain(PigmentIndex),
     Apple { seed: u8 },
     Pear,
     Lemon,
@@ -102,88 +62,167 @@ pub(super) enum Material {
     Card,
     Spine { pigment: PigmentIndex, seed: u8 },
     Pages,
-    Bottle,
+    Label,
     Die,
     Picture,
     Walnut,
-    Candle,
     Pencil(PigmentIndex),
-    Glow { light: Light, luminance: f64 },
-    Shade { luminance: f64 },
 }
 
-impl Material {
-    /// Returns the surface at a point; details finer than `footprint`, in metres, are blurred away.
-    pub(super) fn surface(self, point: DVec3, normal: DVec3, footprint: f64) -> Surface {
-        let plain = |mix| Surface { mix, normal, coat: Coat::NONE, glow: None };
-        let coated = |mix, f0, roughness| Surface { mix, normal, coat: Coat::clear(f0, roughness), glow: None };
+impl Paint {
+    /// The pigments that it mixes.
+    pub(super) fn pigments(self) -> Vec<PigmentIndex> {
+        use Pigment as P;
+        let all = |pigments: &[P]| pigments.iter().map(|pigment| pigment.index()).collect::<Vec<_>>();
+        let and = |pigment: PigmentIndex, others: &[P]| [vec![pigment], all(others)].concat();
+        match self {
+            Self::Room => all(&[P::Plaster, P::WallGreen, P::OakDark]),
+            Self::Planks => all(&[P::OakLight, P::OakDark, P::Ink]),
+            Self::Cloth => all(&[P::Linen, P::LinenShade, P::Indigo]),
+            Self::Plain(pigment) => vec![pigment],
+            Self::Apple { .. } => all(&[P::AppleRed, P::AppleYellow, P::PearGreen, P::Linen]),
+            Self::Pear => all(&[P::PearGreen, P::AppleYellow, P::PearBrown]),
+            Self::Lemon => all(&[P::Lemon]),
+            Self::Orange => all(&[P::Orange]),
+            Self::Vase => all(&[P::Porcelain, P::Cobalt]),
+            Self::Chart => (0..24).map(Pigment::patch).chain(all(&[P::Ink, P::Charcoal])).collect(),
+            Self::Card => all(&[P::Paper, P::Ink]),
+            Self::Spine { pigment, .. } => and(pigment, &[P::Ochre]),
+            Self::Pages => all(&[P::Paper]),
+            Self::Label => all(&[P::Linen, P::Crimson, P::Ink]),
+            Self::Die => all(&[P::Porcelain, P::Ink]),
+            Self::Picture => [all(&[P::Paper, P::Linen, P::Orange, P::Indigo]), vec![Pigment::patch(12)]].concat(),
+            Self::Walnut => all(&[P::WalnutLight, P::WalnutDark]),
+            Self::Pencil(pigment) => and(pigment, &[P::Charcoal, P::OakLight]),
+        }
+    }
+
+    /// Whether it has relief.
+    pub(super) fn has_relief(self) -> bool {
+        matches!(self, Self::Planks | Self::Cloth | Self::Lemon | Self::Orange)
+    }
+
+    /// Returns the mixture at a point, y up; details finer than `footprint`, in metres, are blurred away.
+    fn mix(self, point: DVec3, normal: DVec3, footprint: f64) -> Mix {
         match self {
             Self::Room => room(point, normal, footprint),
-            Self::Planks => planks(point, normal, footprint),
-            Self::Cloth => cloth(point, normal, footprint),
-            Self::Matte(pigment) => plain(Mix::one(pigment)),
-            Self::Glossy(pigment) => coated(Mix::one(pigment), 0.045, 0.0),
-            Self::Metal { pigment, roughness } => Surface {
-                mix: Mix::one(pigment),
-                normal,
-                coat: Coat { f0: 1.0, roughness, metal: Some(pigment) },
-                glow: None,
-            },
-            Self::Apple { seed } => apple(point, normal, seed, footprint),
-            Self::Pear => pear(point, normal, footprint),
-            Self::Lemon => dimpled(point, normal, Pigment::Lemon, 900.0, footprint),
-            Self::Orange => dimpled(point, normal, Pigment::Orange, 700.0, footprint),
-            Self::Vase => coated(vase(point, footprint), 0.05, 0.0),
-            Self::Chart => plain(chart(point, normal)),
-            Self::Card => plain(card(point, normal, footprint)),
-            Self::Spine { pigment, seed } => coated(spine(point, normal, pigment, seed, footprint), 0.03, 0.2),
-            Self::Pages => plain(
-                Mix::one(Pigment::Paper.index()).times(0.8 + 0.2 * smooth(DVec3::new(9.0, 1500.0 * point.y, 3.0))),
-            ),
-            Self::Bottle => bottle(point, normal, footprint),
-            Self::Die => coated(die(point, normal, footprint), 0.045, 0.0),
-            Self::Picture => plain(picture(point, normal, footprint)),
-            Self::Walnut => coated(grain(point, Pigment::WalnutLight, Pigment::WalnutDark, footprint), 0.04, 0.12),
-            Self::Candle => coated(Mix::one(Pigment::Wax.index()), 0.03, 0.15),
-            Self::Pencil(pigment) => coated(pencil(point, pigment), 0.045, 0.0),
-            Self::Glow { light, luminance } => {
-                Surface { glow: Some((light, luminance)), ..plain(Mix::one(Pigment::Ink.index())) }
+            Self::Planks => planks(point, footprint),
+            Self::Cloth => cloth(point, footprint),
+            Self::Plain(pigment) => Mix::one(pigment),
+            Self::Apple { seed } => apple(point, seed, footprint),
+            Self::Pear => pear(point, footprint),
+            Self::Lemon => peel(point, Pigment::Lemon, LEMON_PORES_PER_M, footprint),
+            Self::Orange => peel(point, Pigment::Orange, ORANGE_PORES_PER_M, footprint),
+            Self::Vase => vase(point, footprint),
+            Self::Chart => chart(point, normal),
+            Self::Card => card(point, normal, footprint),
+            Self::Spine { pigment, seed } => spine(point, normal, pigment, seed, footprint),
+            Self::Pages => {
+                Mix::one(Pigment::Paper.index()).times(0.8 + 0.2 * smooth(DVec3::new(9.0, 1500.0 * point.y, 3.0)))
             }
-            Self::Shade { luminance } => {
-                // Pleated cloth, brightest half-way up where the bulb is.
-                let pleats = 0.85 + 0.15 * (60.0 * point.z.atan2(point.x)).cos();
-                let bulb = (-((point.y - 0.10) / 0.09).powi(2)).exp();
-                let luminance = luminance * pleats * (0.30 + 0.70 * bulb);
-                Surface { glow: Some((Light::Warm, luminance)), ..plain(Mix::one(Pigment::Linen.index())) }
-            }
+            Self::Label => label(point, footprint),
+            Self::Die => die(point, normal, footprint),
+            Self::Picture => picture(point, normal, footprint),
+            Self::Walnut => grain(point, Pigment::WalnutLight, Pigment::WalnutDark, footprint),
+            Self::Pencil(pigment) => pencil(point, pigment),
+        }
+    }
+
+    /// Returns what is added to the normal.
+    fn tilt(self, point: DVec3, normal: DVec3, footprint: f64) -> DVec3 {
+        match self {
+            Self::Planks => grain_tilt(point, footprint),
+            Self::Cloth if normal.y > 0.5 => 0.35 * folds(point),
+            Self::Lemon => pores_tilt(point, LEMON_PORES_PER_M, footprint),
+            Self::Orange => pores_tilt(point, ORANGE_PORES_PER_M, footprint),
+            _ => DVec3::ZERO,
         }
     }
 }
 
-/// The walls, with the window in the left one.
-fn room(point: DVec3, normal: DVec3, footprint: f64) -> Surface {
-    let mut surface =
-        Surface { mix: Mix::one(Pigment::Plaster.index()), normal: -normal, coat: Coat::NONE, glow: None };
-    if normal.z > 0.5 {
-        let blotches = 0.92 + 0.16 * cloudy(6.0 * point, 6.0 * footprint);
-        surface.mix = Mix::one(Pigment::WallGreen.index()).times(blotches);
-    } else if normal.y < -0.5 {
-        surface.mix = Mix::one(Pigment::OakDark.index());
-    } else if normal.x < -0.5 {
-        let (y, z) = (point.y, point.z);
-        if (WINDOW_LOW.y..WINDOW_HIGH.y).contains(&y) && (WINDOW_LOW.z..WINDOW_HIGH.z).contains(&z) {
-            // Two by three panes; the sky is brighter higher up.
-            let pane = |at: f64, low: f64, high: f64, n: f64| (n * (at - low) / (high - low)).fract();
-            let is_bar = |f: f64, width: f64| f < width || f > 1.0 - width;
-            let bar = is_bar(pane(z, WINDOW_LOW.z, WINDOW_HIGH.z, 2.0), 0.035)
-                || is_bar(pane(y, WINDOW_LOW.y, WINDOW_HIGH.y, 3.0), 0.05);
-            if !bar {
-                let height = (y - WINDOW_LOW.y) / (WINDOW_HIGH.y - WINDOW_LOW.y);
-                surface.glow = Some((Light::Day, WINDOW_CD_M2 * (0.85 + 0.5 * height)));
+/// A paint with the pigments that it mixes, in the order of its textures.
+#[derive(Debug)]
+pub(super) struct Painted {
+    pub(super) paint: Paint,
+    pub(super) pigments: Vec<PigmentIndex>,
+}
+
+impl Pattern for Painted {
+    fn shares(&self, at: &PatternPoint, shares: &mut [f32]) {
+        let mix = self.paint.mix(y_up(at.point_m), y_up(at.normal), at.footprint_m);
+        for (pigment, part) in mix.parts() {
+            if let Some(place) = self.pigments.iter().position(|own| own == pigment) {
+                shares[place] += part;
             }
         }
     }
-    surface
+
+    fn tilt(&self, at: &PatternPoint) -> DVec3 {
+        let tilt = self.paint.tilt(y_up(at.point_m), y_up(at.normal), at.footprint_m);
+        DVec3::new(tilt.x, -tilt.z, tilt.y)
+    }
+}
+
+/// Where the second of two materials lies over the first.
+#[derive(Debug)]
+pub(super) enum Where {
+    /// The label of the bottle.
+    Label,
+}
+
+impl Pattern for Where {
+    fn shares(&self, at: &PatternPoint, shares: &mut [f32]) {
+        shares[0] = match self {
+            Self::Label => f32::from(u8::from(is_label(y_up(at.point_m), at.footprint_m))),
+        };
+    }
+}
+
+/// How the glow of a surface varies.
+#[derive(Debug)]
+pub(super) enum Glow {
+    /// Of the sky in the window of this height, from its lower edge: brighter higher up.
+    Window {
+        /// Where the lower edge of the whole window lies, m.
+        low_m: f64,
+        /// The height of the whole window, m.
+        height_m: f64,
+    },
+    /// Of pleated cloth, brightest half-way up where the bulb is.
+    Shade,
+}
+
+impl Pattern for Glow {
+    fn shares(&self, at: &PatternPoint, shares: &mut [f32]) {
+        let point = y_up(at.point_m);
+        shares[0] = match self {
+            Self::Window { low_m, height_m } => 0.85 + 0.5 * (point.y - low_m) / height_m,
+            Self::Shade => {
+                let pleats = 0.85 + 0.15 * (60.0 * point.z.atan2(point.x)).cos();
+                let bulb = (-((point.y - 0.10) / 0.09).powi(2)).exp();
+                pleats * (0.30 + 0.70 * bulb)
+            }
+        } as f32;
+    }
+}
+
+/// Returns a vector of a shape, whose axis is z, in the frame in which y is up.
+fn y_up(v: DVec3) -> DVec3 {
+    DVec3::new(v.x, v.z, -v.y)
+}
+
+const LEMON_PORES_PER_M: f64 = 900.0;
+const ORANGE_PORES_PER_M: f64 = 700.0;
+
+/// The walls: one green, a floor of oak, the rest plaster. The normal points out of the room.
+fn room(point: DVec3, normal: DVec3, footprint: f64) -> Mix {
+    if normal.z > 0.5 {
+        Mix::one(Pigment::WallGreen.index()).times(0.92 + 0.16 * cloudy(6.0 * point, 6.0 * footprint))
+    } else if normal.y < -0.5 {
+        Mix::one(Pigment::OakDark.index())
+    } else {
+        Mix::one(Pigment::Plaster.index())
+    }
 }
 
 /// Wood: long fibres along z, and rings.
@@ -194,24 +233,32 @@ fn grain(point: DVec3, light: Pigment, dark: Pigment, footprint: f64) -> Mix {
     Mix::one(light.index()).under(dark.index(), 0.08 + 0.60 * rings.powi(3) + 0.55 * (fibres - 0.45))
 }
 
-fn planks(point: DVec3, normal: DVec3, footprint: f64) -> Surface {
-    const WIDTH: f64 = 0.145;
-    let board = (point.x / WIDTH).floor();
-    let shift = DVec3::new(3.7 * board, 0.0, 5.3 * board);
+const PLANK_M: f64 = 0.145;
+
+fn of_board(point: DVec3) -> (f64, DVec3) {
+    let board = (point.x / PLANK_M).floor();
+    (board, DVec3::new(3.7 * board, 0.0, 5.3 * board))
+}
+
+fn planks(point: DVec3, footprint: f64) -> Mix {
+    let (board, shift) = of_board(point);
     let tone = 0.86 + 0.22 * unit(board as i64, 1, 5);
-    let gap = line((point.x / WIDTH - board - 0.5).abs() * WIDTH - 0.5 * WIDTH, 0.0012, footprint);
-    let mix = grain(point + shift, Pigment::OakLight, Pigment::OakDark, footprint)
+    let gap = line((point.x / PLANK_M - board - 0.5).abs() * PLANK_M - 0.5 * PLANK_M, 0.0012, footprint);
+    grain(point + shift, Pigment::OakLight, Pigment::OakDark, footprint)
         .times(tone)
-        .under(Pigment::Ink.index(), 0.85 * gap);
-    // The grain stands up a little, so that the varnish breaks what it mirrors.
+        .under(Pigment::Ink.index(), 0.85 * gap)
+}
+
+/// The grain stands up a little, so that the varnish breaks what it mirrors.
+fn grain_tilt(point: DVec3, footprint: f64) -> DVec3 {
+    let (_, shift) = of_board(point);
     let fade = (1.0 - footprint / 0.004).clamp(0.0, 1.0);
     let wave = cloudy(DVec3::new(160.0 * point.x, 0.0, 5.0 * point.z) + shift, 160.0 * footprint) - 0.5;
-    let normal = (normal + DVec3::new(0.05 * fade * wave, 0.0, 0.0)).normalize();
-    Surface { mix, normal, coat: Coat::clear(0.035, 0.09), glow: None }
+    DVec3::new(0.05 * fade * wave, 0.0, 0.0)
 }
 
 /// Woven linen with a border of indigo checks.
-fn cloth(point: DVec3, normal: DVec3, footprint: f64) -> Surface {
+fn cloth(point: DVec3, footprint: f64) -> Mix {
     const PITCH: f64 = 0.0038;
     let border = |at: f64, edge: f64| {
         let from_edge = edge - at.abs();
@@ -230,20 +277,22 @@ fn cloth(point: DVec3, normal: DVec3, footprint: f64) -> Surface {
         + cloudy(DVec3::new(12.0 * point.x, 5.0, 300.0 * point.z), 300.0 * footprint);
     let gap = (1.0 - over.abs()).powi(4) * fade;
     // Threads are round: the side to the window is the lighter one.
-    let mix = Mix::one(Pigment::Linen.index())
+    Mix::one(Pigment::Linen.index())
         .under(Pigment::LinenShade.index(), 0.5 * (slub - 0.7) + 0.25)
         .under(Pigment::Indigo.index(), 0.92 * dyed)
-        .times((1.0 - 0.35 * gap) * (1.0 - 0.16 * fade * u.cos() * v.sin()));
-    let folds = DVec3::new(
+        .times((1.0 - 0.35 * gap) * (1.0 - 0.16 * fade * u.cos() * v.sin()))
+}
+
+/// The slopes of its folds.
+fn folds(point: DVec3) -> DVec3 {
+    DVec3::new(
         smooth(DVec3::new(7.0 * point.x, 1.0, 4.0 * point.z)) - 0.5,
         0.0,
         smooth(DVec3::new(6.0 * point.x, 9.0, 5.0 * point.z)) - 0.5,
-    );
-    let normal = if normal.y > 0.5 { (normal + 0.35 * folds).normalize() } else { normal };
-    Surface { mix, normal, coat: Coat::NONE, glow: None }
+    )
 }
 
-fn apple(point: DVec3, normal: DVec3, seed: u8, footprint: f64) -> Surface {
+fn apple(point: DVec3, seed: u8, footprint: f64) -> Mix {
     let shift = DVec3::splat(11.3 * f64::from(seed));
     let around = DVec3::new(point.x, 0.0, point.z).normalize_or_zero();
     let streaks = cloudy(13.0 * around + DVec3::new(0.0, 14.0 * point.y, 0.0) + shift, 300.0 * footprint);
@@ -252,38 +301,38 @@ fn apple(point: DVec3, normal: DVec3, seed: u8, footprint: f64) -> Surface {
     // The crown about the stem stays greenish.
     let crown = (1.0 - point.x.hypot(point.z) / 0.016).clamp(0.0, 1.0) * cover(point.y - 0.04, 0.01);
     let dots = dots(420.0 * point + shift, footprint * 420.0);
-    let mix = Mix::one(Pigment::AppleRed.index())
+    Mix::one(Pigment::AppleRed.index())
         .under(Pigment::AppleYellow.index(), yellow)
         .under(Pigment::PearGreen.index(), 0.7 * crown)
         .under(Pigment::Linen.index(), 0.5 * dots)
-        .times(0.85 + 0.3 * streaks);
-    Surface { mix, normal, coat: Coat::clear(0.040, 0.0), glow: None }
+        .times(0.85 + 0.3 * streaks)
 }
 
-fn pear(point: DVec3, normal: DVec3, footprint: f64) -> Surface {
+fn pear(point: DVec3, footprint: f64) -> Mix {
     let rust = cloudy(45.0 * point, 45.0 * footprint) + 0.5 * cloudy(200.0 * point, 200.0 * footprint) - 0.62;
-    let mix = Mix::one(Pigment::PearGreen.index())
+    Mix::one(Pigment::PearGreen.index())
         .under(Pigment::AppleYellow.index(), (1.6 * smooth(18.0 * point) - 0.5).clamp(0.0, 0.6))
         .under(Pigment::PearBrown.index(), (2.0 * rust).clamp(0.0, 0.75))
-        .under(Pigment::PearBrown.index(), 0.8 * dots(520.0 * point, footprint * 520.0));
-    Surface { mix, normal, coat: Coat::clear(0.035, 0.12), glow: None }
+        .under(Pigment::PearBrown.index(), 0.8 * dots(520.0 * point, footprint * 520.0))
 }
 
-/// Peel: the color, and pores that break the light.
-fn dimpled(point: DVec3, normal: DVec3, pigment: Pigment, pores_per_m: f64, footprint: f64) -> Surface {
+/// Peel: the color, darker in its pores.
+fn peel(point: DVec3, pigment: Pigment, pores_per_m: f64, footprint: f64) -> Mix {
+    let pores = pores_fade(pores_per_m, footprint) * smooth(pores_per_m * point);
+    Mix::one(pigment.index()).times(0.88 + 0.2 * cloudy(25.0 * point, 25.0 * footprint) - 0.08 * pores)
+}
+
+fn pores_fade(pores_per_m: f64, footprint: f64) -> f64 {
+    (1.0 - footprint * pores_per_m * 0.5).clamp(0.0, 1.0)
+}
+
+/// Pores that break the light.
+fn pores_tilt(point: DVec3, pores_per_m: f64, footprint: f64) -> DVec3 {
+    const STEP: f64 = 0.05;
     let at = pores_per_m * point;
-    let height = |p: DVec3| smooth(p);
-    let step = 0.05;
-    let slope = DVec3::new(
-        height(at + DVec3::new(step, 0.0, 0.0)),
-        height(at + DVec3::new(0.0, step, 0.0)),
-        height(at + DVec3::new(0.0, 0.0, step)),
-    ) - DVec3::splat(height(at));
-    let fade = (1.0 - footprint * pores_per_m * 0.5).clamp(0.0, 1.0);
-    let normal = (normal - 0.16 * fade * slope / step).normalize();
-    let mix =
-        Mix::one(pigment.index()).times(0.88 + 0.2 * cloudy(25.0 * point, 25.0 * footprint) - 0.08 * fade * height(at));
-    Surface { mix, normal, coat: Coat::clear(0.045, 0.05), glow: None }
+    let here = smooth(at);
+    let slope = DVec3::AXES.map(|axis| smooth(at + STEP * axis) - here);
+    -0.16 * pores_fade(pores_per_m, footprint) / STEP * DVec3::from_array(slope)
 }
 
 /// Small round specks on a lattice of cells.
@@ -323,14 +372,15 @@ fn vase(point: DVec3, footprint: f64) -> Mix {
 
 /// The 24 patches on a black board.
 fn chart(point: DVec3, normal: DVec3) -> Mix {
+    /// The part of a patch's field on each side that the black frame takes.
+    const FRAME: f64 = 0.07;
     if normal.z > -0.5 {
         return Mix::one(Pigment::Charcoal.index());
     }
     let (u, v) = ((point.x + 0.099) / 0.198 * 6.0, (0.066 - point.y) / 0.132 * 4.0);
-    match patch_at(u, v) {
-        Some(patch) => Mix::one(Pigment::patch(patch)),
-        None => Mix::one(Pigment::Ink.index()),
-    }
+    let is_inside = |at: f64| (FRAME..=1.0 - FRAME).contains(&at.fract());
+    let is_patch = (0.0..6.0).contains(&u) && (0.0..4.0).contains(&v) && is_inside(u) && is_inside(v);
+    Mix::one(if is_patch { Pigment::patch(6 * v as u8 + u as u8) } else { Pigment::Ink.index() })
 }
 
 /// A printed card: a star over lines of print.
@@ -365,20 +415,23 @@ fn spine(point: DVec3, normal: DVec3, pigment: PigmentIndex, seed: u8, footprint
     cover_mix.under(Pigment::Ochre.index(), 0.85 * gilt.max(title))
 }
 
-/// A dark bottle with a paper label.
-fn bottle(point: DVec3, normal: DVec3, footprint: f64) -> Surface {
-    let (x, y) = (0.037 * point.x.atan2(-point.z), point.y - 0.095);
-    let is_label = cover(0.034 - x.abs(), footprint) * cover(0.042 - y.abs(), footprint);
-    if is_label > 0.5 {
-        let ink = print(x + 0.028, 0.004 - y, [0.0030, 0.0075], 18, footprint) * cover(-y, footprint);
-        let crest = stripes(x.hypot(y - 0.022), 0.0035, footprint) * cover(0.013 - x.hypot(y - 0.022), footprint);
-        let rule = line(y.abs() - 0.039, 0.0012, footprint);
-        let mix = Mix::one(Pigment::Linen.index())
-            .under(Pigment::Crimson.index(), crest.max(rule))
-            .under(Pigment::Ink.index(), ink);
-        return Surface { mix, normal, coat: Coat::NONE, glow: None };
-    }
-    Surface { mix: Mix::one(Pigment::BottleGreen.index()), normal, coat: Coat::clear(0.045, 0.0), glow: None }
+/// The place on the label of the bottle: across and up.
+fn on_label(point: DVec3) -> (f64, f64) {
+    (0.037 * point.x.atan2(-point.z), point.y - 0.095)
+}
+
+fn is_label(point: DVec3, footprint: f64) -> bool {
+    let (x, y) = on_label(point);
+    cover(0.034 - x.abs(), footprint) * cover(0.042 - y.abs(), footprint) > 0.5
+}
+
+/// A paper label with a crest and print.
+fn label(point: DVec3, footprint: f64) -> Mix {
+    let (x, y) = on_label(point);
+    let ink = print(x + 0.028, 0.004 - y, [0.0030, 0.0075], 18, footprint) * cover(-y, footprint);
+    let crest = stripes(x.hypot(y - 0.022), 0.0035, footprint) * cover(0.013 - x.hypot(y - 0.022), footprint);
+    let rule = line(y.abs() - 0.039, 0.0012, footprint);
+    Mix::one(Pigment::Linen.index()).under(Pigment::Crimson.index(), crest.max(rule)).under(Pigment::Ink.index(), ink)
 }
 
 fn die(point: DVec3, normal: DVec3, footprint: f64) -> Mix {
