@@ -128,8 +128,12 @@ impl Lens {
     }
 
     /// Returns the lens of a text, and of what a camera file says of it.
-    pub(crate) fn restored(file: LensFile, choice: Option<(LensSpec, LensReadOptions)>, stop: StopSpec) -> Self {
-        Self { file, choice, stop, mono: Mutex::default() }
+    pub(crate) fn restored(
+        file: LensFile,
+        choice: Option<(LensSpec, LensReadOptions)>,
+        (stop, iris): (StopSpec, Option<Iris>),
+    ) -> Self {
+        Self { file, choice, stop, iris, mono: Mutex::default() }
     }
 
     fn used(&self) -> LensDefaults {
@@ -290,9 +294,11 @@ impl Lens {
             let Some((lens, reading)) = &self.choice else {
                 let reading = LensReadOptions { coating, ..LensReadOptions::default() };
                 let file = reading.coated(self.file.clone()).map_err(exception)?;
-                return Ok(Self { stop: self.stop, ..Self::new(file, None) });
+                return Ok(Self { stop: self.stop, iris: self.iris, ..Self::new(file, None) });
             };
-            Self::of_choice(lens.clone(), LensReadOptions { coating, ..reading.clone() })?.stopped(self.stop)
+            let lens = Self::of_choice(lens.clone(), LensReadOptions { coating, ..reading.clone() })?;
+            let lens = if self.iris.is_some() { lens.bladed(self.iris)? } else { lens };
+            lens.stopped(self.stop)
         })
     }
 
@@ -437,7 +443,7 @@ impl Lens {
     /// radius_mm, thickness_mm, semi_aperture_mm, medium, stop, conic, coefficients, shape, mirror, comment
     ///     As of `from_surfaces`. Rims and all else stay as they are.
     #[pyo3(signature = (surface, **changes), text_signature = "($self, surface, *, radius_mm=None, thickness_mm=None, \
-semi_aperture_mm=None, medium=None, stop=None, conic=None, coefficients=None, shape=None, mirror=None, comment=None)")]
+semi_aperture_mm=None, medium=None, stop=None, conic=None, coefficients=None, shape=None, mirror=None, coating=None, comment=None)")]
     fn with_surface(&self, py: Python<'_>, surface: usize, changes: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
         let none = PyDict::new(py);
         let changes = changes.unwrap_or(&none);
@@ -677,7 +683,7 @@ focus_mm=None, rings=None)")]
     /// Copies by the text of the lens file and the name or path that a camera file has for it, so that lenses can be sent to other
     /// processes.
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
-        let choice = self.choice.as_ref().map(|(lens, reading)| (lens, reading, self.stop));
+        let choice = self.choice.as_ref().map(|(lens, reading)| (lens, reading, self.stop, self.iris));
         let lens = &self.file.lens;
         let open = lens.with_stop_diameter_mm(2.0 * lens.full_stop_semi_aperture_mm()).map_err(exception)?;
         let stop_mm = 2.0 * lens.stop_semi_aperture_mm();
@@ -685,6 +691,7 @@ focus_mm=None, rings=None)")]
             LensFile { lens: open, ..self.file.clone() }.to_ron().into_bound_py_any(py)?,
             stop_mm.into_bound_py_any(py)?,
             to_python(py, &lens.glass_range())?,
+            to_python(py, &lens.other_coating())?,
             self.file.notes.clone().into_bound_py_any(py)?,
             to_python(py, &choice)?,
         ];

@@ -1,6 +1,7 @@
 //! The surfaces of a lens as rows that can be changed, and a lens made of such rows.
 
 use dioptric_optics::{GlassCatalogue, LensFile};
+use dioptric_pipeline::LensReadOptions;
 use pyo3::{
     exceptions::PyTypeError,
     prelude::*,
@@ -24,6 +25,7 @@ const ENTRIES: &[&str] = &[
     "coefficients",
     "shape",
     "mirror",
+    "coating",
     "comment",
 ];
 
@@ -123,7 +125,8 @@ pub(crate) fn lens_of(
     if let Some(film_mm) = film_mm {
         data.set_item("film_distance_mm", film_mm)?;
     }
-    from_python("the lens", data.as_any())
+    let file = from_python("the lens", data.as_any())?;
+    LensReadOptions::default().coated(file).map_err(exception)
 }
 
 /// Returns the lens with some entries of a surface changed.
@@ -153,7 +156,8 @@ pub(crate) fn with_surface(file: &LensFile, surface: usize, changes: &Bound<'_, 
     data.set_item("surfaces", list)?;
     let name = format!("{}, changed", file.lens.name().trim_end_matches(", changed"));
     data.set_item("name", name)?;
-    let changed: LensFile = from_python("the lens", data.as_any())?;
+    let mut changed: LensFile = from_python("the lens", data.as_any())?;
+    changed.lens = changed.lens.with_light_loss(lens.other_coating().cloned()).map_err(exception)?;
     let is_of_stop = changes.contains("stop")? || (surface == lens.stop() && changes.contains("semi_aperture_mm")?);
     let changed = match is_of_stop {
         true => changed,
@@ -229,8 +233,10 @@ fn row_of_file<'py>(surface: usize, row: &Bound<'py, PyAny>) -> PyResult<Bound<'
             out.set_item(entry, PyBool::new(py, flag.is_truthy()?))?;
         }
     }
-    if let Some(comment) = given("comment")? {
-        out.set_item("comment", comment)?;
+    for entry in ["coating", "comment"] {
+        if let Some(value) = given(entry)? {
+            out.set_item(entry, value)?;
+        }
     }
     if let Some(medium) = given("medium")? {
         out.set_item("medium", medium_of_file(&key("medium"), &medium)?)?;

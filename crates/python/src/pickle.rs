@@ -4,7 +4,7 @@
 
 use std::path::Path;
 
-use dioptric_optics::{GlassRange, LensFile, ReadOptions};
+use dioptric_optics::{Coating, GlassRange, Iris, LensFile, ReadOptions};
 use dioptric_pipeline::{
     Camera as CameraFile, Imaged, KeptCamera, LensReadOptions, LensSpec, Quality, SceneSpec, SensorSpec, StopSpec,
 };
@@ -31,25 +31,28 @@ pub(crate) fn restorer<'py>(py: Python<'py>, name: &str) -> PyResult<Bound<'py, 
     py.import("dioptric._native")?.getattr(name)
 }
 
-/// Makes a lens again of the text of its file fully open, how far its stop is open, and what becomes of glasses beyond their range; pickles call
-/// it.
+/// Makes a lens again of the text of its file fully open, how far its stop is open, what becomes of glasses beyond their range, and what covers the
+/// surfaces of which its file says nothing; pickles call it.
 #[pyfunction]
 pub(crate) fn _restore_lens(
     text: &str,
     stop_mm: f64,
     glass_range: &Bound<'_, PyAny>,
+    other_coating: &Bound<'_, PyAny>,
     notes: Vec<String>,
     choice: &Bound<'_, PyAny>,
 ) -> PyResult<Lens> {
-    let choice: Option<(LensSpec, LensReadOptions, StopSpec)> = from_python("the lens", choice)?;
+    let choice: Option<(LensSpec, LensReadOptions, StopSpec, Option<Iris>)> = from_python("the lens", choice)?;
+    let other_coating: Option<Coating> = from_python("the lens", other_coating)?;
     let glass_range: GlassRange = from_python("the lens", glass_range)?;
     let file = LensFile::from_bytes(Path::new("lens.ron"), text.as_bytes(), &ReadOptions::default());
     let file = file.map_err(exception)?;
     let lens = file.lens.with_stop_diameter_mm(stop_mm).map_err(exception)?.with_glass_range(glass_range);
+    let lens = lens.with_light_loss(other_coating).map_err(exception)?;
     let file = LensFile { lens, notes, ..file };
     Ok(match choice {
-        Some((lens, reading, stop)) => Lens::restored(file, Some((lens, reading)), stop),
-        None => Lens::restored(file, None, StopSpec::AsGiven),
+        Some((lens, reading, stop, iris)) => Lens::restored(file, Some((lens, reading)), (stop, iris)),
+        None => Lens::restored(file, None, (StopSpec::AsGiven, None)),
     })
 }
 

@@ -413,6 +413,7 @@ class Lens:
         coefficients: Sequence[float] | None = ...,
         shape: Any = ...,
         mirror: bool | None = ...,
+        coating: Any = ...,
         comment: str | None = ...,
     ) -> Lens: ...
     @staticmethod
