@@ -41,6 +41,9 @@ pub(crate) struct Transmission {
     pub(crate) forward: Vec<LightPass<f64>>,
     pub(crate) backward: Vec<LightPass<f64>>,
     pub(crate) backward_f32: Vec<LightPass<f32>>,
+    /// Backward on to the stop, which does nothing yet.
+    pub(crate) to_stop: Vec<LightPass<f64>>,
+    pub(crate) to_stop_f32: Vec<LightPass<f32>>,
 }
 
 impl SurfaceLoss {
@@ -227,16 +230,25 @@ fn terms(s: num_complex::Complex64, p: num_complex::Complex64) -> [f64; 4] {
     [0.5 * (of_s + of_p), 0.5 * (of_s - of_p), both.re, both.im]
 }
 
+/// Returns the first so many passes, the last of which leaves light as it is.
+fn to_stop_of<T: Real>(passes: &[LightPass<T>], n: usize) -> Vec<LightPass<T>> {
+    let mut own = passes[..n].to_vec();
+    own[n - 1].series = None;
+    own
+}
+
 impl Transmission {
     /// Returns that of these surfaces; `per_mm` is the absorption behind each. That before the first and behind the last is left out.
-    pub(crate) fn of(losses: &[SurfaceLoss], per_mm: &[f64]) -> Self {
+    pub(crate) fn of(losses: &[SurfaceLoss], per_mm: &[f64], stop: usize) -> Self {
         let n = losses.len();
         let before = |i: usize| if i == 0 { 0.0 } else { per_mm[i - 1] };
         let behind = |i: usize| if i + 1 == n { 0.0 } else { per_mm[i] };
         let forward: Vec<LightPass<f64>> = (0..n).map(|i| losses[i].pass(before(i), EXACT_TERMS)).collect();
-        let backward = (0..n).rev().map(|i| LightPass { per_mm: behind(i), ..forward[i].clone() }).collect();
-        let backward_f32 = (0..n).rev().map(|i| losses[i].pass(behind(i), SINGLE_TERMS)).collect();
-        Self { forward, backward, backward_f32 }
+        let backward: Vec<LightPass<f64>> =
+            (0..n).rev().map(|i| LightPass { per_mm: behind(i), ..forward[i].clone() }).collect();
+        let backward_f32: Vec<LightPass<f32>> = (0..n).rev().map(|i| losses[i].pass(behind(i), SINGLE_TERMS)).collect();
+        let (to_stop, to_stop_f32) = (to_stop_of(&backward, n - stop), to_stop_of(&backward_f32, n - stop));
+        Self { forward, backward, backward_f32, to_stop, to_stop_f32 }
     }
 }
 
