@@ -110,7 +110,7 @@ impl SurfaceLoss {
         }
     }
 
-    /// Returns half the sum and half the difference of the shares of s and p that go on, and t_s t_p* of amplitudes whose squares are these
+    /// Returns half the sum and half the difference of the shares of s and p that go on, and `t_s t_p*` of amplitudes whose squares are these
     /// shares, for rays whose directions before and behind have this product; of a mirror, for this cosine of incidence.
     fn at(&self, product: f64) -> [f64; 4] {
         // Refraction: n d of the denser medium less that of the other is along the normal.
@@ -160,7 +160,7 @@ impl SurfaceLoss {
     /// Returns the pass of light that the surface sends back where it comes from before or, with `is_from_behind`, from behind it; `None`
     /// where none does, as at gratings and between equal indices, whose reflections are not followed.
     pub(crate) fn back<T: Real>(&self, is_from_behind: bool, least_terms: [f64; 4]) -> Option<LightPass<T>> {
-        let (indices, of_cosine): ([f64; 2], Box<dyn Fn(f64) -> [f64; 4]>) = match self {
+        let (indices, of_cosine): ([f64; 2], OfCosine<'_>) = match self {
             Self::None | Self::Straight(_) | Self::MirrorFilm(_) | Self::MirrorTable(_) => return None,
             Self::Film(film) => {
                 let film = if is_from_behind { film.reversed() } else { film.clone() };
@@ -189,6 +189,9 @@ impl SurfaceLoss {
         Some(Series::of([0.0, 1.0], false, least_terms, of_cosine).pass(Argument::LowCosine { ratio2 }, T::ZERO))
     }
 }
+
+/// What a surface does to light, by a cosine.
+type OfCosine<'a> = Box<dyn Fn(f64) -> [f64; 4] + 'a>;
 
 /// Chebyshev series of what a surface does to light, between two ends.
 struct Series {
