@@ -294,7 +294,6 @@ class Lens:
         slope_per_nm: float | None = None,
         configuration: int | None = None,
         lens_scale: float | None = None,
-        coating: _Path | None = None,
     ) -> Lens: ...
     @staticmethod
     def parse(text: str, name: str = "lens.ron") -> Lens: ...
