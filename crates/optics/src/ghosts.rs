@@ -9,7 +9,7 @@ use crate::{
     rays::RaySlices,
     reversed::mirrored,
     trace::{GhostTree, LightPass, Real, SideLight, Step},
-    transmission::LEAST_TERMS,
+    transmission::{EXACT_TERMS, GHOST_TERMS},
 };
 
 /// Rays that one task sends through the tree of all pairs.
@@ -134,17 +134,17 @@ impl MonoLens {
             return refuse("to a film at a finite distance alone");
         }
         let reflects = |i: &usize| {
-            self.losses.as_ref().is_some_and(|losses| losses.surfaces()[*i].back::<f64>(false, 1.0).is_some())
+            self.losses.as_ref().is_some_and(|losses| losses.surfaces()[*i].back::<f64>(false, EXACT_TERMS).is_some())
         };
         let reflecting: Vec<usize> = (0..self.n_surfaces()).filter(reflects).collect();
         // Many rays make up for the last digits of each.
         Ok(match request.n_rays > MOST_DOUBLE {
-            true => self.traced::<f32>(&self.ghost_tree(film_distance_mm, LEAST_TERMS[1]), request, &reflecting),
-            false => self.traced::<f64>(&self.ghost_tree(film_distance_mm, LEAST_TERMS[0]), request, &reflecting),
+            true => self.traced::<f32>(&self.ghost_tree(film_distance_mm, GHOST_TERMS), request, &reflecting),
+            false => self.traced::<f64>(&self.ghost_tree(film_distance_mm, EXACT_TERMS), request, &reflecting),
         })
     }
 
-    fn ghost_tree<T: Real>(&self, film_mm: f64, least_term: f64) -> GhostTree<T> {
+    fn ghost_tree<T: Real>(&self, film_mm: f64, least_terms: [f64; 4]) -> GhostTree<T> {
         let steps = self.steps_for(f64::NEG_INFINITY);
         let backward: Vec<Step> = steps.iter().map(mirrored).collect();
         let n = steps.len();
@@ -158,9 +158,9 @@ impl MonoLens {
                     _ => 0.0,
                 };
                 let surface = &losses.surfaces()[i];
-                let back = surface.back::<T>(is_from_behind, least_term);
+                let back = surface.back::<T>(is_from_behind, least_terms);
                 SideLight {
-                    on: surface.pass(per_mm, least_term),
+                    on: surface.pass(per_mm, least_terms),
                     back: back.map(|back| LightPass { per_mm: T::of(per_mm), ..back }),
                 }
             };

@@ -27,11 +27,12 @@ pub(crate) enum SurfaceLoss {
 
 /// Points at which a surface is looked at, and so the most terms of its series.
 const N_NODES: usize = 32;
-/// Terms of a series below this are left out: in double precision, and in single.
-pub(crate) const LEAST_TERMS: [f64; 2] = [1e-10, 1e-7];
-
-/// How many times as large terms of the last two series are left out.
-const TURNING: f64 = 100.0;
+/// Terms below these are left out of the four series: in double precision, in single, and in single for ghosts, whose light is less.
+///
+/// What turns the polarization (the last two) counts for the power by the square of what polarizes, and the very last once more by its own.
+pub(crate) const EXACT_TERMS: [f64; 4] = [1e-10, 1e-10, 1e-8, 1e-8];
+const SINGLE_TERMS: [f64; 4] = [1e-6, 1e-6, 1e-4, 1e-2];
+pub(crate) const GHOST_TERMS: [f64; 4] = [1e-8, 1e-8, 1e-7, 1e-6];
 
 /// What light loses in a lens at one wavelength: the passes through its surfaces, in double and single precision, in the order in which
 /// light meets them forward and backward.
@@ -40,6 +41,9 @@ pub(crate) struct Transmission {
     pub(crate) forward: Vec<LightPass<f64>>,
     pub(crate) backward: Vec<LightPass<f64>>,
     pub(crate) backward_f32: Vec<LightPass<f32>>,
+    /// Backward on to the stop, which does nothing yet.
+    pub(crate) to_stop: Vec<LightPass<f64>>,
+    pub(crate) to_stop_f32: Vec<LightPass<f32>>,
 }
 
 impl SurfaceLoss {
@@ -106,7 +110,7 @@ impl SurfaceLoss {
         }
     }
 
-    /// Returns half the sum and half the difference of the shares of s and p that go on, and t_s t_p* of amplitudes whose squares are these
+    /// Returns half the sum and half the difference of the shares of s and p that go on, and `t_s t_p*` of amplitudes whose squares are these
     /// shares, for rays whose directions before and behind have this product; of a mirror, for this cosine of incidence.
     fn at(&self, product: f64) -> [f64; 4] {
         // Refraction: n d of the denser medium less that of the other is along the normal.
@@ -142,21 +146,21 @@ impl SurfaceLoss {
     }
 
     /// Returns the pass of light through the surface.
-    pub(crate) fn pass<T: Real>(&self, per_mm: f64, least_term: f64) -> LightPass<T> {
+    pub(crate) fn pass<T: Real>(&self, per_mm: f64, least_terms: [f64; 4]) -> LightPass<T> {
         let per_mm = T::of(per_mm);
         if *self == Self::None {
             return LightPass { per_mm, ..LightPass::NOTHING };
         }
         let is_constant = matches!(self, Self::Straight(_));
-        let series = Series::of(self.ends(), is_constant, least_term, |at| self.at(at));
+        let series = Series::of(self.ends(), is_constant, least_terms, |at| self.at(at));
         let is_mirror = matches!(self, Self::MirrorFilm(_) | Self::MirrorTable(_));
         series.pass(if is_mirror { Argument::LowCosine { ratio2: T::ONE } } else { Argument::Product }, per_mm)
     }
 
     /// Returns the pass of light that the surface sends back where it comes from before or, with `is_from_behind`, from behind it; `None`
     /// where none does, as at gratings and between equal indices, whose reflections are not followed.
-    pub(crate) fn back<T: Real>(&self, is_from_behind: bool, least_term: f64) -> Option<LightPass<T>> {
-        let (indices, of_cosine): ([f64; 2], Box<dyn Fn(f64) -> [f64; 4]>) = match self {
+    pub(crate) fn back<T: Real>(&self, is_from_behind: bool, least_terms: [f64; 4]) -> Option<LightPass<T>> {
+        let (indices, of_cosine): ([f64; 2], OfCosine<'_>) = match self {
             Self::None | Self::Straight(_) | Self::MirrorFilm(_) | Self::MirrorTable(_) => return None,
             Self::Film(film) => {
                 let film = if is_from_behind { film.reversed() } else { film.clone() };
@@ -182,9 +186,12 @@ impl SurfaceLoss {
         };
         let [here, there] = indices;
         let ratio2 = T::of((here / here.min(there)).powi(2));
-        Some(Series::of([0.0, 1.0], false, least_term, of_cosine).pass(Argument::LowCosine { ratio2 }, T::ZERO))
+        Some(Series::of([0.0, 1.0], false, least_terms, of_cosine).pass(Argument::LowCosine { ratio2 }, T::ZERO))
     }
 }
+
+/// What a surface does to light, by a cosine.
+type OfCosine<'a> = Box<dyn Fn(f64) -> [f64; 4] + 'a>;
 
 /// Chebyshev series of what a surface does to light, between two ends.
 struct Series {
@@ -194,7 +201,7 @@ struct Series {
 
 impl Series {
     /// Fits the series of a function of one argument, without terms below the least.
-    fn of(ends: [f64; 2], is_constant: bool, least_term: f64, values_at: impl Fn(f64) -> [f64; 4]) -> Self {
+    fn of(ends: [f64; 2], is_constant: bool, least_terms: [f64; 4], values_at: impl Fn(f64) -> [f64; 4]) -> Self {
         let [from, to] = ends;
         let angle = |j: usize| std::f64::consts::PI * (j as f64 + 0.5) / N_NODES as f64;
         let values: Vec<[f64; 4]> =
@@ -205,9 +212,7 @@ impl Series {
                 sum * if i == 0 { 1.0 } else { 2.0 } / N_NODES as f64
             };
             let mut list: Vec<f64> = (0..if is_constant { 1 } else { N_NODES }).map(coefficient).collect();
-            // What turns the polarization counts for the power by the square of what polarizes.
-            let least = if k < 2 { least_term } else { TURNING * least_term };
-            while list.last().is_some_and(|last| last.abs() < least) {
+            while list.last().is_some_and(|last| last.abs() < least_terms[k]) {
                 list.pop();
             }
             list
@@ -228,17 +233,25 @@ fn terms(s: num_complex::Complex64, p: num_complex::Complex64) -> [f64; 4] {
     [0.5 * (of_s + of_p), 0.5 * (of_s - of_p), both.re, both.im]
 }
 
+/// Returns the first so many passes, the last of which leaves light as it is.
+fn to_stop_of<T: Real>(passes: &[LightPass<T>], n: usize) -> Vec<LightPass<T>> {
+    let mut own = passes[..n].to_vec();
+    own[n - 1].series = None;
+    own
+}
+
 impl Transmission {
     /// Returns that of these surfaces; `per_mm` is the absorption behind each. That before the first and behind the last is left out.
-    pub(crate) fn of(losses: &[SurfaceLoss], per_mm: &[f64]) -> Self {
+    pub(crate) fn of(losses: &[SurfaceLoss], per_mm: &[f64], stop: usize) -> Self {
         let n = losses.len();
         let before = |i: usize| if i == 0 { 0.0 } else { per_mm[i - 1] };
         let behind = |i: usize| if i + 1 == n { 0.0 } else { per_mm[i] };
-        let [double, single] = LEAST_TERMS;
-        let forward: Vec<LightPass<f64>> = (0..n).map(|i| losses[i].pass(before(i), double)).collect();
-        let backward = (0..n).rev().map(|i| LightPass { per_mm: behind(i), ..forward[i].clone() }).collect();
-        let backward_f32 = (0..n).rev().map(|i| losses[i].pass(behind(i), single)).collect();
-        Self { forward, backward, backward_f32 }
+        let forward: Vec<LightPass<f64>> = (0..n).map(|i| losses[i].pass(before(i), EXACT_TERMS)).collect();
+        let backward: Vec<LightPass<f64>> =
+            (0..n).rev().map(|i| LightPass { per_mm: behind(i), ..forward[i].clone() }).collect();
+        let backward_f32: Vec<LightPass<f32>> = (0..n).rev().map(|i| losses[i].pass(behind(i), SINGLE_TERMS)).collect();
+        let (to_stop, to_stop_f32) = (to_stop_of(&backward, n - stop), to_stop_of(&backward_f32, n - stop));
+        Self { forward, backward, backward_f32, to_stop, to_stop_f32 }
     }
 }
 

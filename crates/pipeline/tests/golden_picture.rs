@@ -49,16 +49,21 @@ fn demo_is_the_golden_picture() {
     );
 }
 
-/// What coatings take of each band is what the lens does not transmit, all over the film; the exposure is as much longer.
+/// The light about the middle of the film in a band.
+fn in_middle(capture: &Capture, band: usize) -> f64 {
+    let plane = capture.irradiance.band(band).unwrap();
+    (24..40).flat_map(|row| (36..60).map(move |column| (row, column))).map(|at| f64::from(plane[at])).sum()
+}
+
+/// What coatings take of each band is what the lens does not transmit; the exposure is as much longer.
 #[test]
 fn light_is_less_by_the_transmission_of_the_lens() {
     let (lossless, coated) = (small_demo(Some(CoatingSpec::Ideal)), small_demo(None));
     for (band, &nm) in coated.grid().centers_nm().iter().enumerate() {
         let share = coated.lens.lens.at(nm).unwrap().axial_transmission(f64::INFINITY).unwrap();
-        let [before, after] = [&lossless, &coated].map(|capture| capture.irradiance.band(band).unwrap());
-        let ratio = after.sum() / before.sum();
-        // Over field and pupil of a lens at f/4 it changes by a few thousandths.
-        assert!((f64::from(ratio) / share - 1.0).abs() < 5e-3, "{nm} nm: {ratio} {share}");
+        let ratio = in_middle(&coated, band) / in_middle(&lossless, band);
+        // Up to 5 degrees from the axis it changes by a thousandth; in the corners, in the violet, by a hundredth.
+        assert!((ratio / share - 1.0).abs() < 2e-3, "{nm} nm: {ratio} {share}");
     }
     let [before_s, after_s] = [&lossless, &coated].map(|capture| capture.frames.exposure.time_s);
     assert!((1.03..1.07).contains(&(after_s / before_s)), "{before_s} {after_s}");

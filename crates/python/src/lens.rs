@@ -196,11 +196,8 @@ impl Lens {
     ///     has in use.
     /// lens_scale : float, optional
     ///     How many times as large the lens is as the file has it, in all its lengths.
-    /// coating : str, optional
-    ///     What covers all surfaces between air and glass: "bare", "mgf2", "vcoat", "bbar", a file, or "ideal" for no loss of light at all;
-    ///     without it what the file states, else "mgf2".
     #[staticmethod]
-    #[pyo3(signature = (path, *, glasses=None, missing_glass="refuse", glass_range="refuse", slope_per_nm=None, configuration=None, lens_scale=None, coating=None))]
+    #[pyo3(signature = (path, *, glasses=None, missing_glass="refuse", glass_range="refuse", slope_per_nm=None, configuration=None, lens_scale=None))]
     fn read(
         path: PathBuf,
         glasses: Option<Vec<PathBuf>>,
@@ -209,7 +206,6 @@ impl Lens {
         slope_per_nm: Option<f64>,
         configuration: Option<usize>,
         lens_scale: Option<f64>,
-        coating: Option<&str>,
     ) -> PyResult<Self> {
         let missing_glass = match missing_glass {
             "refuse" => MissingGlass::Refuse,
@@ -226,7 +222,6 @@ impl Lens {
             slope_per_nm,
             configuration,
             lens_scale,
-            coating: coating.map(CoatingSpec::named),
             ..LensReadOptions::default()
         };
         guarded(|| Self::of_choice(LensSpec::File(path), reading))

@@ -130,13 +130,14 @@ fn light_takes_the_same_way_back() {
             assert!((back_light.share(i) / share - 1.0).abs() < 1e-10, "{name} {i}: {} {share}", back_light.share(i));
             if single.fate[i].is_in_flight() {
                 n_lit += 1;
+                // In single precision terms of 1e-6 are left out at each of some ten surfaces.
                 assert!(
-                    (single_light.share(i) / share - 1.0).abs() < 3e-6,
+                    (single_light.share(i) / share - 1.0).abs() < 1e-5,
                     "{name} {i}: {} {share}",
                     single_light.share(i)
                 );
                 assert!(
-                    (parts_light.share(i) / share - 1.0).abs() < 3e-6,
+                    (parts_light.share(i) / share - 1.0).abs() < 1e-5,
                     "{name} {i}: {} {share}",
                     parts_light.share(i)
                 );
