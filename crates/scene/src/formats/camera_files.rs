@@ -1,6 +1,9 @@
 //! Files of camera data: ours, or those of `Open3D`, nerfstudio, COLMAP, `OpenCV`, ROS and Kalibr.
 
-use std::path::Path;
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
 
 use serde::{
     Deserialize, Deserializer,
@@ -12,8 +15,12 @@ use super::{
     camera::CameraData,
     distortion::Distortion,
     stated::{Stated, short},
+    unusable::{check_memory, unreadable},
 };
+use crate::SceneError;
 
+/// Endings of a picture's stem that its camera file does not repeat.
+const PARTS: [&str; 4] = [".radiance_depth", ".radiance", ".reflectance", ".depth"];
 /// Keys that change nothing of what a scene is.
 const HARMLESS: [&str; 9] =
     ["source", "name", "comment", "comments", "description", "note", "notes", "license", "camera_angle_y"];
@@ -48,6 +55,65 @@ fn unknown_model(model: &str) -> String {
     format!("its camera model is '{}', expected PINHOLE, OPENCV or OPENCV_FISHEYE", short(model))
 }
 
+impl CameraData {
+    /// Reads the camera file beside a picture, or returns `None` where there is none.
+    ///
+    /// For `a_1.radiance_depth.exr` the names looked for are `a_1.camera.json`, `a_1_camera.json` and `a_camera.json`.
+    pub(super) fn beside(picture: &Path) -> Result<Option<Self>, SceneError> {
+        let candidates = beside(picture, &[".camera.json", "_camera.json"]);
+        let Some(path) = candidates.into_iter().find(|path| path.is_file()) else { return Ok(None) };
+        Self::read(&path).map(Some)
+    }
+
+    /// Reads camera data: JSON of ours (`width`, `height`, `fx_px`, `fy_px`, `cx_px`, `cy_px`), of `Open3D` (`intrinsic_matrix`) or of
+    /// nerfstudio (`fl_x`, …), COLMAP's `cameras.txt`, or YAML of `OpenCV` and ROS (`camera_matrix`) or of Kalibr (`intrinsics`).
+    ///
+    /// # Errors
+    /// When it is none of these, lacks what is needed, says a thing twice, or has a model of a lens that is not known.
+    pub(super) fn read(path: &Path) -> Result<Self, SceneError> {
+        let length = fs::metadata(path).map_err(|error| unreadable(path, error))?.len();
+        check_memory(path, length.saturating_mul(4), length)?;
+        let text = fs::read_to_string(path).map_err(|error| unreadable(path, error))?;
+        let data = match text.trim_start_matches('\u{feff}').trim_start() {
+            text if text.starts_with('{') => of_json(path, text),
+            text if text.contains("camera_matrix") || text.contains("intrinsics:") || text.starts_with("%YAML") => {
+                of_yaml(path, text)
+            }
+            text => of_colmap(path, text),
+        };
+        let data = data.map_err(|reason| unreadable(path, reason))?;
+        let numbers = [data.fx_px, data.fy_px, data.cx_px, data.cy_px];
+        if !(numbers.iter().all(|n| n.is_finite())
+            && data.distortion.is_finite()
+            && data.fx_px > 0.0
+            && data.fy_px > 0.0)
+        {
+            let reason = format!(
+                "focal lengths {} and {} px, center ({}, {}) px: expected finite numbers and focal lengths above 0",
+                data.fx_px, data.fy_px, data.cx_px, data.cy_px
+            );
+            return Err(unreadable(path, reason));
+        }
+        match data.depth_unit_m {
+            Some(unit_m) if !(unit_m.is_finite() && unit_m > 0.0) => {
+                Err(unreadable(path, format!("depth_unit_m is {unit_m}, expected a length above 0")))
+            }
+            _ => Ok(data),
+        }
+    }
+}
+
+/// Returns the names beside a picture that its stem, and the part of it before the last underscore, have with these endings.
+pub(super) fn beside(picture: &Path, endings: &[&str]) -> Vec<PathBuf> {
+    let stem = picture.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
+    let stem = PARTS.iter().find_map(|part| stem.strip_suffix(part)).unwrap_or(&stem);
+    let mut names: Vec<String> = endings.iter().map(|ending| format!("{stem}{ending}")).collect();
+    if let Some((first, _)) = stem.rsplit_once('_') {
+        names.extend(endings.iter().filter(|ending| ending.starts_with('_')).map(|ending| format!("{first}{ending}")));
+    }
+    names.into_iter().map(|name| picture.with_file_name(name)).collect()
+}
+
 /// An object of JSON, each of whose keys stands once.
 struct Object(Vec<(String, Value)>);
 
@@ -77,7 +143,7 @@ impl<'de> Deserialize<'de> for Object {
 }
 
 /// Reads JSON of ours, `Open3D`, nerfstudio or ROS.
-pub(super) fn of_json(path: &Path, text: &str) -> Result<CameraData, String> {
+fn of_json(path: &Path, text: &str) -> Result<CameraData, String> {
     let Object(entries) = serde_json::from_str(text).map_err(|error| error.to_string())?;
     let mut keys = Stated::new("key", entries);
     // Centers of pixels are at whole numbers for OpenCV and Open3D, at halves for nerfstudio.
@@ -226,7 +292,7 @@ fn numbers_of(value: &Value, name: &str) -> Result<Vec<f64>, String> {
 }
 
 /// Reads the first camera of COLMAP's `cameras.txt`: number, model, width, height and parameters, with centers of pixels at halves.
-pub(super) fn of_colmap(path: &Path, text: &str) -> Result<CameraData, String> {
+fn of_colmap(path: &Path, text: &str) -> Result<CameraData, String> {
     let expected = "expected JSON, YAML, or a line of COLMAP's cameras.txt: number, model, width, height, parameters";
     let mut lines = text.lines().map(str::trim).filter(|line| !line.is_empty() && !line.starts_with('#'));
     let line = lines.next().ok_or(expected)?;
@@ -275,7 +341,7 @@ fn check_matrix(name: &str, rest: &[f64]) -> Result<(), String> {
 
 /// Reads YAML of a calibration of `OpenCV` or ROS (`camera_matrix`, `distortion_coefficients`, `image_width`, `image_height`), or of one camera of
 /// Kalibr (`intrinsics`, `distortion_coeffs`, `resolution`).
-pub(super) fn of_yaml(path: &Path, text: &str) -> Result<CameraData, String> {
+fn of_yaml(path: &Path, text: &str) -> Result<CameraData, String> {
     let mut keys = Stated::new("key", yaml_entries(text)?);
     let list = |text: String| -> Result<Vec<f64>, String> {
         let words = text.trim_matches(['[', ']']).split(',').map(str::trim).filter(|word| !word.is_empty());
@@ -397,3 +463,7 @@ fn yaml_entries(text: &str) -> Result<Vec<(String, String)>, String> {
     entries.extend(matrix.map(|name| (name, String::new())));
     Ok(entries)
 }
+
+#[cfg(test)]
+#[path = "camera_tests.rs"]
+mod tests;

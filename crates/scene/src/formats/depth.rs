@@ -6,7 +6,7 @@ use std::{
 };
 
 use super::{
-    camera::beside,
+    camera_files::beside,
     contents::is_of,
     depth_numbers::{DepthNumbers, depth_numbers},
     raw_depth::{DepthWords, RawDepth},

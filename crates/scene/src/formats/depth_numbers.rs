@@ -6,7 +6,7 @@ use dioptric_pictures::DynamicImage;
 use ndarray::Array2;
 
 use super::{
-    exr_depth::{DepthChannel, read_depth_exr},
+    exr_depth_file::{DepthChannel, read_depth_exr},
     mat::{Plane, read_plane},
     npy::{NpyArray, read_npy},
     npz::read_npz_plane,

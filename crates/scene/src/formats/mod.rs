@@ -20,6 +20,7 @@ mod envi_header;
 mod exr_attributes;
 mod exr_colors;
 mod exr_depth;
+mod exr_depth_file;
 mod exr_samples;
 mod exr_stream;
 #[cfg(test)]

@@ -21,16 +21,13 @@ use super::{
     container::{Content, MatArray, MatFile, WHOLE},
     elements::Listed,
     iset_kinds,
-    packing::Packing,
+    packing::{Packing, WAVES},
 };
 use crate::{SceneError, SceneLight};
 
 /// The variables of a scene that are read.
 const WANTED: [&str; 10] =
     ["scene", "mcCOEF", "basis", "imgMean", "photons", "wave", "wavelength", "illuminant", "fov", "depthMap"];
-/// Names of the list of wavelengths beside a cube, nm.
-pub(in super::super) const WAVES: [&str; 9] =
-    ["wave", "wavelength", "wavelengths", "wavelengths_nm", "waves", "lambda", "bands", "wl", "wlens"];
 /// The most that reflectances are, and the least that photons of any lit scene are.
 const MOST_REFLECTANCE: f64 = 10.0;
 const LEAST_PHOTONS: f64 = 1e9;

@@ -20,5 +20,6 @@ pub use iset_film::{IsetIrradiance, holds_iset_irradiance, read_iset_irradiance,
 pub use iset_write::write_iset_scene;
 #[cfg(test)]
 use isetcam::IsetScene;
-pub(super) use isetcam::{MatScene, WAVES, read_mat};
+pub(super) use isetcam::{MatScene, read_mat};
+pub(super) use packing::WAVES;
 pub(super) use plane::{DEPTHS, Plane, read_plane};

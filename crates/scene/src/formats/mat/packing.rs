@@ -1,5 +1,9 @@
 //! What the attributes of an array of HDF5 say of its numbers, by the conventions of netCDF ("Climate and Forecast", 8.1 and 2.5.1).
 
+/// Names of the list of wavelengths beside a cube, nm.
+pub(in super::super) const WAVES: [&str; 9] =
+    ["wave", "wavelength", "wavelengths", "wavelengths_nm", "waves", "lambda", "bands", "wl", "wlens"];
+
 /// An attribute of an array.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Attribute {
@@ -75,7 +79,7 @@ impl<'a> Packing<'a> {
             "scale_factor" | "add_offset" => matches!(&own.value, Value::Numbers(list) if list.len() == 1),
             name if MISSING.contains(&name) => matches!(own.value, Value::Numbers(_)),
             name if UNITS.contains(&name) => is_unit_used,
-            name => are_waves_used && super::isetcam::WAVES.contains(&name),
+            name => are_waves_used && WAVES.contains(&name),
         };
         self.attributes.iter().filter(|own| !is_used(own)).map(|own| own.name.clone()).collect()
     }

@@ -1,0 +1,122 @@
+//! Camera files of each program, and what is made of their numbers.
+
+use super::*;
+use crate::View;
+use approx::assert_abs_diff_eq;
+
+const GOOD: &str = r#"{"width": 741, "height": 500, "fx_px": 994.978, "fy_px": 994.978, "cx_px": 311.0,
+    "cy_px": 254.0, "source": "a stereo pair"}"#;
+
+fn read(text: &str, rows: usize, columns: usize) -> Result<CameraData, SceneError> {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("motor_camera.json"), text).unwrap();
+    let picture = folder.path().join("motor_370.radiance_depth.exr");
+    CameraData::beside(&picture)?.unwrap().of_size(&picture, rows, columns)
+}
+
+#[test]
+fn camera_file_is_found_and_scaled() {
+    let full = read(GOOD, 500, 741).unwrap();
+    let view = View { focal_px: 994.978, center_x_px: 311.0, center_y_px: 254.0 };
+    assert_eq!((full.view(), &full.note), (view, &None));
+    assert_eq!(read(GOOD, 250, 370).unwrap().view(), view.binned(2));
+    assert_eq!(CameraData::beside(Path::new("nowhere/a.exr")), Ok(None));
+    assert_eq!(full.straightened(500, 741), None);
+}
+
+#[test]
+fn unknown_keys_are_named() {
+    let text = GOOD.replace("\"source\"", "\"shutter\": 3, \"Fx_px\": 5, \"units\": \"mm\", \"source\"");
+    let note = read(&text, 500, 741).unwrap().note.unwrap();
+    assert_eq!(note, "motor_camera.json: its keys 'shutter', 'Fx_px', 'units' are not used");
+    let in_samples = GOOD.replace("\"source\"", "\"units\": \"pixels\", \"source\"");
+    assert_eq!(read(&in_samples, 500, 741).unwrap().note, None);
+}
+
+#[test]
+fn other_programs_are_read() {
+    let same = |text: &str, unit: Option<f64>| {
+        let data = read(text, 480, 640).unwrap();
+        assert_eq!(data.note, None, "{text}");
+        let numbers = [data.fx_px, data.fy_px, data.cx_px, data.cy_px];
+        assert_eq!((numbers, data.depth_unit_m), ([525.0, 526.0, 319.5, 239.5], unit), "{text}");
+        data.distortion
+    };
+    let bent = |k: [f64; 8]| Distortion::Polynomial { k, r8: 0.0 };
+    same(
+        r#"{"width":640,"height":480,"intrinsic_matrix":[525.0,0,0,0,526.0,0,319.5,239.5,1],"depth_scale":1000}"#,
+        Some(1e-3),
+    );
+    same(r#"{"K":[[525.0,0,319.5],[0,526.0,239.5],[0,0,1]]}"#, None);
+    let k = same(
+        r#"{"w":640,"h":480,"fl_x":525,"fl_y":526,"cx":320,"cy":240,"k1":0.1,"k2":-0.2,"p1":0.001,"p2":0.002,
+            "camera_model":"OPENCV","frames":[{"file_path":"a.png"}]}"#,
+        None,
+    );
+    assert_eq!(k, bent([0.1, -0.2, 0.001, 0.002, 0.0, 0.0, 0.0, 0.0]));
+    same("# cameras\n1 PINHOLE 640 480 525 526 320 240\n", None);
+    let k = same(
+        "%YAML:1.0\n---\nimage_width: 640\nimage_height: 480\ncamera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   \
+         dt: d\n   data: [ 525., 0., 319.5, 0.,\n       526., 239.5, 0., 0., 1. ]\ndistortion_coefficients: \
+         !!opencv-matrix\n   rows: 5\n   cols: 1\n   dt: d\n   data: [ 0.1, -0.2, 0., 0., 0.3 ]\n",
+        None,
+    );
+    assert_eq!(k, bent([0.1, -0.2, 0.0, 0.0, 0.3, 0.0, 0.0, 0.0]));
+    // The fourth coefficient of nerfstudio goes with r^8, that of OpenCV with r^2 below the line.
+    let nerf = r#"{"w":640,"h":480,"fl_x":525,"fl_y":526,"cx":320,"cy":240,"k1":0.1,"k4":0.2}"#;
+    assert_eq!(same(nerf, None), Distortion::Polynomial { k: [0.1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0], r8: 0.2 });
+    let ros = "image_width: 640\nimage_height: 480\ncamera_matrix:\n  rows: 3\n  cols: 3\n  data: [525, 0, 319.5, 0, \
+               526, 239.5, 0, 0, 1]\ndistortion_model: equidistant\ndistortion_coefficients:\n  rows: 1\n  cols: 4\n  \
+               data: [0.1, 0, 0.2, 0]\nrectification_matrix:\n  rows: 3\n  cols: 3\n  data: [1, 0, 0, 0, 1, 0, 0, 0, 1]\n";
+    let fisheye = Distortion::Fisheye([0.1, 0.0, 0.2, 0.0]);
+    assert_eq!(same(ros, None), fisheye);
+    assert_eq!(same("1 OPENCV_FISHEYE 640 480 525 526 320 240 0.1 0 0.2 0", None), fisheye);
+    let kalibr = "resolution: [640, 480]\nintrinsics: [525, 526, 319.5, 239.5] # fu, fv, cu, cv\ndistortion_model: \
+                  radial-tangential\ndistortion_coefficients: [0.1, -0.2, 0.001, 0.002]\n";
+    assert_eq!(same(kalibr, None), bent([0.1, -0.2, 0.001, 0.002, 0.0, 0.0, 0.0, 0.0]));
+}
+
+#[test]
+fn stretched_and_bent_pictures_are_straightened() {
+    let text = GOOD.replace("\"fy_px\": 994.978", "\"fy_px\": 497.489, \"k1\": -0.3");
+    let data = read(&text, 500, 741).unwrap();
+    let (straight, note) = data.straightened(500, 741).unwrap();
+    assert_eq!((straight.rows, straight.columns), (1000, 741));
+    assert!(note.contains("2.0000 times") && note.contains("bends"), "{note}");
+    // The axis stays where it was, and a direction is found where the lens pictured it.
+    let (row, column) = straight.view.position_of(0.0, 0.0);
+    assert_abs_diff_eq!(column, 311.0, epsilon = 1e-9);
+    assert_abs_diff_eq!(row, (254.0 + 0.5) * 2.0 - 0.5, epsilon = 1e-9);
+    let x = (700.0 - 311.0) / 994.978;
+    let (_, at) = straight.source_of(row.round() as usize, 700);
+    assert_abs_diff_eq!(at, 311.0 + 994.978 * x * (1.0 - 0.3 * x * x), epsilon = 1e-3);
+}
+
+#[test]
+fn camera_file_that_does_not_fit_is_refused_by_name() {
+    for (text, rows, columns, word) in [
+        (GOOD, 100, 100, "741 × 500"),
+        (GOOD, 1, 800, "741 × 500"),
+        (&GOOD.replace("994.978", "-1"), 500, 741, "focal"),
+        (&GOOD.replace("width", "wide"), 500, 741, "width"),
+        (&GOOD.replace("fx_px", "fx_pix"), 500, 741, "fx_px"),
+        (&GOOD.replace("741", "\"wide\""), 500, 741, "width is"),
+        (&GOOD.replace("\"source\"", "\"depth_scale\": 0.1, \"source\""), 500, 741, "depth_scale is 0.1"),
+        (&GOOD.replace("\"source\"", "\"camera_model\": \"FOV\", \"source\""), 500, 741, "'FOV'"),
+        (&GOOD.replace("\"source\"", "\"fx_px\": 80, \"source\""), 500, 741, "'fx_px' stands twice"),
+        (
+            &GOOD.replace("\"source\"", "\"depth_unit_m\": 1, \"depth_scale\": 1000, \"source\""),
+            500,
+            741,
+            "depth_scale",
+        ),
+        (r#"{"width":741,"height":500,"intrinsic_matrix":[525.0,0,0,5,526.0,0,319.5,239.5,1]}"#, 500, 741, "skew"),
+        (r#"{"K":[[525.0,0,319.5],[0,526.0,239.5],[0,0,0]]}"#, 500, 741, "skew"),
+        ("{", 500, 741, "EOF"),
+        ("[3]", 500, 741, "expected JSON"),
+        ("1 FISHEYE 3 4 5", 500, 741, "FISHEYE"),
+    ] {
+        let message = read(text, rows, columns).unwrap_err().to_string();
+        assert!(message.contains("motor_camera.json") && message.contains(word), "{message}");
+    }
+}
