@@ -196,6 +196,7 @@ impl LensFile {
             ("fields", !self.fields.is_empty() && !holds_use),
             ("names of surfaces", !self.surface_comments.is_empty() && !holds_use),
             ("comments", !self.comments.is_empty() && !holds_use),
+            ("blades of the stop (iris)", self.lens.iris().is_some() && extension != "ron"),
             ("the relief of gratings (blaze)", is_blazed && extension != "ron"),
         ];
         let left_out: Vec<&str> =
