@@ -40,7 +40,7 @@ pub enum Outline {
         /// By how much, degrees, from x towards y.
         by_deg: f64,
         /// The shape.
-        outline: Box<Outline>,
+        outline: Box<Self>,
     },
     /// The opening of a stop that is closed by blades: [`Lens::with_iris`](crate::Lens::with_iris) makes it.
     #[serde(skip)]
@@ -268,7 +268,7 @@ impl Outline {
     pub(super) fn wrong(&self) -> Option<(&'static str, f64, &'static str)> {
         match self {
             Self::Polygon { corners_mm } => wrong_with_polygon(corners_mm),
-            Self::Turned { by_deg, .. } if !(by_deg.abs() <= 360.0) => {
+            Self::Turned { by_deg, .. } if !(-360.0..=360.0).contains(by_deg) => {
                 Some(("by_deg of an aperture", *by_deg, "-360 to 360 degrees"))
             }
             Self::Turned { outline, .. } => outline.wrong(),
@@ -334,7 +334,7 @@ fn wrong_with_polygon(corners_mm: &[[f64; 2]]) -> Option<(&'static str, f64, &'s
     if !(3..=MOST_CORNERS).contains(&n) {
         return Some(("the number of corners of an aperture", n as f64, "3 to 1000"));
     }
-    if let Some(wrong) = corners_mm.as_flattened().iter().find(|mm| !(mm.abs() <= 1e9)) {
+    if let Some(wrong) = corners_mm.as_flattened().iter().find(|mm| !(-1e9..=1e9).contains(*mm)) {
         return Some(("a corner of an aperture", *wrong, "numbers below 1e9"));
     }
     let all: Vec<[DVec2; 2]> = sides(corners_mm).collect();

@@ -39,7 +39,7 @@ impl StopEdges {
         let has_iris = self.apertures.iter().any(Aperture::is_iris);
         let of_rim = (self.rim_mm - at_mm.length(), at_mm.normalize_or(DVec2::X));
         let of_apertures = self.apertures.iter().map(|aperture| {
-            let found = aperture.outline.nearest_edge(aperture.from_center_mm(at_mm.x, at_mm.y));
+            let found = aperture.outline.nearest_edge(aperture.off_center_mm(at_mm.x, at_mm.y));
             (found.clearance_mm.abs(), found.direction)
         });
         let first = if has_iris { (f64::INFINITY, DVec2::X) } else { of_rim };
@@ -58,7 +58,7 @@ impl StopEdges {
         let of_apertures = self
             .apertures
             .iter()
-            .map(|aperture| aperture.outline.edge_along_mm(aperture.from_center_mm(at_mm.x, at_mm.y), direction));
+            .map(|aperture| aperture.outline.edge_along_mm(aperture.off_center_mm(at_mm.x, at_mm.y), direction));
         of_apertures.fold(of_rim, f64::min)
     }
 }
