@@ -2,7 +2,6 @@
 
 mod iris;
 mod outline;
-mod stop_edges;
 
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
@@ -12,7 +11,6 @@ use crate::OpticsError;
 pub use self::{
     iris::{Iris, IrisOpening},
     outline::Outline,
-    stop_edges::{EdgeNearby, StopEdges},
 };
 
 /// An opening of a surface beside its round rim, or something that stands before it.
@@ -55,7 +53,7 @@ impl Aperture {
         matches!(self.outline, Outline::Iris(_))
     }
 
-    fn off_center_mm(&self, x_mm: f64, y_mm: f64) -> DVec2 {
+    pub(crate) fn off_center_mm(&self, x_mm: f64, y_mm: f64) -> DVec2 {
         DVec2::new(x_mm, y_mm) - DVec2::from_array(self.center_mm)
     }
 

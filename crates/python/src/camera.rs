@@ -18,7 +18,7 @@ use crate::{
     light_field::LightField,
     options::{count, word},
     paintings::painting_folder,
-    pickle::{quality_of, restorer},
+    restorer::{quality_of, restorer},
     scene::Scene,
     sensor::Sensor,
     serial::{from_python, to_python},

@@ -22,8 +22,8 @@ use crate::{
     input::{is_single, numbers},
     lens_requests::{PsfOptions, analysis_request},
     lens_rows::{lens_of, rows_of, with_surface},
-    pickle::restorer,
     rays::{GivenRays, Rays, Traced, trace},
+    restorer::restorer,
     serial::{from_python, to_python},
     worker::run_apart,
 };

@@ -25,7 +25,7 @@ use crate::{
     errors::{exception, guarded, wrong},
     input::{is_single, number, numbers, owned_f32},
     options::count,
-    pickle::restorer,
+    restorer::restorer,
     scene_options::{fill_of, with_options},
     serial::to_python,
     view::view,

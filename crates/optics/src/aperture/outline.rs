@@ -49,13 +49,13 @@ pub enum Outline {
 
 /// The place of an edge that is nearest to a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct NearestEdge {
+pub(crate) struct NearestEdge {
     /// How far within the outline the point is, mm; negative outside.
-    pub(super) clearance_mm: f64,
+    pub(crate) clearance_mm: f64,
     /// The unit direction from the point to the edge.
-    pub(super) direction: DVec2,
+    pub(crate) direction: DVec2,
     /// Which part of the edge it is, where the edge has corners between its parts.
-    pub(super) part: usize,
+    pub(crate) part: usize,
 }
 
 /// Places of an edge at which a surface is looked at: a multiple of 8, so that the corners of a square are among them.
@@ -115,7 +115,7 @@ impl Outline {
     ///
     /// Of an ellipse the distance is only of the right sign, and of the right size along its axes; of a rectangle and an iris it is that
     /// for places within.
-    pub(super) fn nearest_edge(&self, at_mm: DVec2) -> NearestEdge {
+    pub(crate) fn nearest_edge(&self, at_mm: DVec2) -> NearestEdge {
         match self {
             Self::Circle { .. } | Self::Ellipse { .. } => {
                 let half_mm = self.half_widths_mm();
@@ -149,7 +149,7 @@ impl Outline {
     }
 
     /// Returns how far from a place the edge is along a unit direction, mm; infinite where it never comes. Of an iris only from within.
-    pub(super) fn edge_along_mm(&self, at_mm: DVec2, direction: DVec2) -> f64 {
+    pub(crate) fn edge_along_mm(&self, at_mm: DVec2, direction: DVec2) -> f64 {
         match self {
             Self::Circle { .. } | Self::Ellipse { .. } => {
                 let half_mm = self.half_widths_mm();

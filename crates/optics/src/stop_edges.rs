@@ -2,8 +2,7 @@
 
 use glam::DVec2;
 
-use super::Aperture;
-use crate::MonoLens;
+use crate::{Aperture, MonoLens};
 
 /// The edges of a stop that is not round: of its rim, of its openings and of what stands before it.
 #[derive(Clone, Debug, PartialEq)]
