@@ -55,7 +55,7 @@ def set_threads(n: int) -> None: ...
 def threads() -> int: ...
 def _panic() -> None: ...
 def _measure(kind: str, subject: Any, options: dict[str, Any]) -> Any: ...
-def _restore_lens(text: str, stop_mm: float, glass_range: Any, notes: list[str], choice: Any) -> Lens: ...
+def _restore_lens(text: str, stop_mm: float, glass_range: Any, other_coating: Any, notes: list[str], choice: Any) -> Lens: ...
 def _restore_sensor(text: str, spec: Any) -> Sensor: ...
 def _restore_scene_spec(spec: Any) -> Scene: ...
 def _restore_scene(
@@ -581,6 +581,7 @@ class Scene:
         depth: _Path | None = ...,
         depth_unit: str | None = ...,
         depth_kind: str | None = ...,
+        depth_variable: str | None = ...,
         view: _Path | None = ...,
         panorama: str | None = ...,
         illuminant: str | None = ...,
@@ -641,6 +642,7 @@ class Scene:
         depth: _Path | None = ...,
         depth_unit: str | None = ...,
         depth_kind: str | None = ...,
+        depth_variable: str | None = ...,
         view: _Path | None = ...,
         panorama: str | None = ...,
         illuminant: str | None = ...,
@@ -682,6 +684,7 @@ class Scene:
         depth: _Path | None = ...,
         depth_unit: str | None = ...,
         depth_kind: str | None = ...,
+        depth_variable: str | None = ...,
         view: _Path | None = ...,
         panorama: str | None = ...,
         illuminant: str | None = ...,

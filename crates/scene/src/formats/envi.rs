@@ -406,7 +406,7 @@ impl EnviFile {
             notes.extend(note_of(&reference.header_path, "key", &alone));
         }
         // Without references `tint` changes nothing.
-        let is_alone = |key: &String| !compared.contains(key) && !(references.is_empty() && key == "tint");
+        let is_alone = |key: &String| !(compared.contains(key) || references.is_empty() && key == "tint");
         let alone: Vec<String> = self.header.exposures.iter().map(|(key, _)| key.clone()).filter(is_alone).collect();
         notes.extend(note_of(&self.header_path, "key", &alone));
         notes

@@ -38,17 +38,7 @@ const PANELS: &[(&str, &[&str])] = &[
     ("catalogues", &["LensReadOptions.glasses"]),
     ("index slope", &["LensReadOptions.slope_per_nm"]),
     ("lens scale", &["LensReadOptions.lens_scale"]),
-    (
-        "coating",
-        &[
-            "LensReadOptions.coating",
-            "CoatingSpec.Bare",
-            "CoatingSpec.MgF2",
-            "CoatingSpec.VCoat",
-            "CoatingSpec.Bbar",
-            "CoatingSpec.Ideal",
-        ],
-    ),
+    ("coating", &["LensReadOptions.coating"]),
     ("coating file", &["CoatingSpec.File"]),
     ("seq numbers", &["LensReadOptions.seq_numbers"]),
     ("stop", &["Camera.stop"]),
