@@ -4,8 +4,8 @@ use std::{collections::BTreeSet, sync::LazyLock, time::Duration};
 
 use dioptric_pipeline::{
     BlurSpec, CAMERA_SCHEMA, Camera, Crop, Diffraction, DualPixelSpec, FillDepth, FlatSize, FocusSpec, FramesSpec,
-    LensSpec, LightPaths, Photodiodes, RenderEffort, SceneSource, SceneSpec, StopSpec, SurfaceChange, WavelengthSpec,
-    WorldSpec, with_exposure_s,
+    Iris, LensSpec, LightPaths, Photodiodes, RenderEffort, SceneSource, SceneSpec, StopSpec, SurfaceChange,
+    WavelengthSpec, WorldSpec, with_exposure_s,
 };
 use dioptric_scene::{Pattern, Wave};
 use dioptric_sensor::{Brightness, ColorCorrection, LensShading, ToneCurve};
@@ -270,6 +270,7 @@ fn cameras() -> Vec<Camera> {
             camera.lens = LensSpec::File("none.zmx".into());
             camera.lens_reading.slope_per_nm = Some(-1e-4);
             camera.lens_reading.lens_scale = Some(2.0);
+            camera.iris = Some(Iris { blades: 6, rotation_deg: 10.0, curvature: 0.5 });
             camera.frames = FramesSpec::Interleaved { ratio: 8.0, period_rows: 2, gain_ratio: 1.0 };
         }),
         world(RenderEffort::Samples(8)),
