@@ -478,7 +478,10 @@ semi_aperture_mm=None, medium=None, stop=None, conic=None, coefficients=None, sh
     /// Returns the lens of a dictionary as `to_dict` makes it.
     #[staticmethod]
     fn from_dict(data: &Bound<'_, PyDict>) -> PyResult<Self> {
-        guarded(|| Ok(Self::new(from_python("the lens", data.as_any())?, None)))
+        guarded(|| {
+            let file = from_python("the lens", data.as_any())?;
+            Ok(Self::new(LensReadOptions::default().coated(file).map_err(exception)?, None))
+        })
     }
 
     /// Traces rays through all surfaces.
