@@ -28,8 +28,8 @@ const ALLOWED: &[(&str, &[&str], &str)] = &[
     ("scene", &["light", "scene"], "a scene has a light and is put under another"),
     (
         "cli",
-        &["analyze", "lens", "lens_compare"],
-        "`lens` dispatches to `analyze` and `lens_compare`, which open and ask for lenses as `lens` and `analyze` do",
+        &["analyze", "lens", "lens_compare", "lens_ghosts"],
+        "`lens` dispatches to `analyze`, `lens_compare` and `lens_ghosts`, which open and ask for lenses as `lens` and `analyze` do",
     ),
     ("python", &["camera", "shot"], "a camera takes shots, and a shot has the camera that took it"),
     ("sensor", &["exposure", "sensor"], "an exposure is resolved for a sensor, whose methods take an exposure"),

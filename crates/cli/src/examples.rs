@@ -17,6 +17,7 @@ const EXAMPLES: &[(&str, &[&str])] = &[
     ("lens info", &["dioptric lens info dgauss-50mm --f-number 4 --distance-mm 2000"]),
     ("lens analyze", &["dioptric lens analyze dgauss-50mm --f-number 4 --fields-deg 0,10,20 --out analysis/"]),
     ("lens draw", &["dioptric lens draw lens.zmx --fields-deg 0,10 -o lens.svg"]),
+    ("lens ghosts", &["dioptric lens ghosts dgauss-50mm --fields-deg 0,5,10"]),
     ("lens compare", &["dioptric lens compare cooke-50mm tessar-50mm --f-number 5.6 --out both/"]),
     ("lens convert", &["dioptric lens convert lens.seq lens.zmx"]),
     ("camera init", &["dioptric camera init -o camera.ron"]),

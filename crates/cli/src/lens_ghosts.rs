@@ -57,7 +57,7 @@ pub(crate) fn run(arguments: &LensGhostsArgs, common: &Common) -> anyhow::Result
     if common.json { print_json(&table) } else { print(&in_words(&table)?) }
 }
 
-/// Returns the width and the height of WxH, mm.
+/// Returns the width and the height of words as 36x24, mm.
 fn film_size(text: &str) -> anyhow::Result<[f64; 2]> {
     let sides = text.split_once(['x', 'X', '×']);
     sides

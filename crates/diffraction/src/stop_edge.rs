@@ -88,8 +88,9 @@ mod tests {
             let (round, found) =
                 (Hurb::PAPER.covariance_at(point, &stop(&lens)), Hurb::PAPER.covariance_at(point, &polygon));
             for (a, b) in [(round.xx, found.xx), (round.yy, found.yy)] {
-                // The nearest side faces up to .2 degrees aside, and a chord across that is off by as much.
-                assert!((a / b - 1.0).abs() < 1e-2, "{at}: {a} {b}");
+                // The nearest side faces up to 0.2 degrees aside. The nearer end of a chord across that is 0.7 % nearer at the last point, and the
+                // variance goes as the distance squared.
+                assert!((a / b - 1.0).abs() < 0.02, "{at}: {a} {b}");
             }
         }
     }

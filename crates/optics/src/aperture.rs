@@ -2,7 +2,6 @@
 
 mod iris;
 mod outline;
-mod stop_edges;
 
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
@@ -12,7 +11,6 @@ use crate::OpticsError;
 pub use self::{
     iris::{Iris, IrisOpening},
     outline::Outline,
-    stop_edges::{EdgeNearby, StopEdges},
 };
 
 /// An opening of a surface beside its round rim, or something that stands before it.
@@ -55,13 +53,13 @@ impl Aperture {
         matches!(self.outline, Outline::Iris(_))
     }
 
-    fn from_center_mm(&self, x_mm: f64, y_mm: f64) -> DVec2 {
+    pub(crate) fn off_center_mm(&self, x_mm: f64, y_mm: f64) -> DVec2 {
         DVec2::new(x_mm, y_mm) - DVec2::from_array(self.center_mm)
     }
 
     /// Whether a ray passes that meets the surface here.
     pub fn is_clear_at(&self, x_mm: f64, y_mm: f64) -> bool {
-        self.outline.is_inside(self.from_center_mm(x_mm, y_mm)) != self.is_obscuration
+        self.outline.is_inside(self.off_center_mm(x_mm, y_mm)) != self.is_obscuration
     }
 
     /// How far inside the opening a place is, mm: 0 at the edge, negative outside. Of an ellipse it is only of the right
@@ -75,7 +73,7 @@ impl Aperture {
         if self.is_obscuration {
             return (f64::INFINITY, 0);
         }
-        let nearest = self.outline.nearest_edge(self.from_center_mm(x_mm, y_mm));
+        let nearest = self.outline.nearest_edge(self.off_center_mm(x_mm, y_mm));
         (nearest.clearance_mm, nearest.part)
     }
 
@@ -174,6 +172,11 @@ mod tests {
                     let direction = DVec2::from_angle(f64::from(7 * i + j));
                     let way_mm = aperture.outline.edge_along_mm(own, direction);
                     if way_mm.is_finite() {
+                        // Of a line that grazes the edge rounding decides.
+                        let edge = aperture.outline.nearest_edge(own + direction * way_mm);
+                        if edge.direction.dot(direction).abs() < 1e-3 {
+                            continue;
+                        }
                         let beyond = own + direction * (way_mm + 1e-9);
                         assert!(aperture.outline.nearest_edge(beyond).clearance_mm.abs() < 1e-8);
                         assert_eq!(aperture.outline.is_inside(own + direction * (way_mm - 1e-9)), is_clear);

@@ -54,6 +54,7 @@ pub struct MonoLens {
 pub(crate) struct Losses {
     surfaces: Vec<SurfaceLoss>,
     per_mm: Vec<f64>,
+    stop: usize,
     transmission: OnceLock<Transmission>,
 }
 
@@ -68,7 +69,7 @@ impl Losses {
     }
 
     pub(crate) fn transmission(&self) -> &Transmission {
-        self.transmission.get_or_init(|| Transmission::of(&self.surfaces, &self.per_mm))
+        self.transmission.get_or_init(|| Transmission::of(&self.surfaces, &self.per_mm, self.stop))
     }
 }
 
@@ -158,7 +159,12 @@ impl MonoLens {
             false => {
                 let per_mm = lens.absorption_at(wavelength_nm)?.per_mm().to_vec();
                 let is_clear = losses.iter().all(|loss| *loss == SurfaceLoss::None) && per_mm.iter().all(|a| *a == 0.0);
-                (!is_clear).then(|| Losses { surfaces: losses, per_mm, transmission: OnceLock::new() })
+                (!is_clear).then(|| Losses {
+                    surfaces: losses,
+                    per_mm,
+                    stop: lens.stop(),
+                    transmission: OnceLock::new(),
+                })
             }
         };
         // Blades reach in from the rim, beyond the circle that has as much area.

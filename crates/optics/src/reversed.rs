@@ -3,8 +3,6 @@
 //! The lens is mirrored at the plane z = 0, and its surfaces are met in the opposite order, so that the kernels of the
 //! forward trace do the work: the same digits, surfaces and fates.
 
-use std::borrow::Cow;
-
 use glam::{DMat3, DVec3};
 
 use crate::{
@@ -13,6 +11,7 @@ use crate::{
     rays::RaySlices,
     toric::Toric,
     trace::{self, Goal, Kind, LightPass, Lights, Plan, Real, Step},
+    transmission::Transmission,
 };
 
 /// A lens at one wavelength, traced from the film to the scene.
@@ -114,7 +113,7 @@ impl ReversedLens {
     /// Traces rays as [`trace`](Self::trace) does, and their light: that of a ray of the scene along the same way.
     pub fn trace_light(&self, rays: &mut RayBatch, light: &mut RayLight, rims: Vignetting) {
         let Some(losses) = &self.forward.losses else { return self.trace(rays, rims) };
-        self.trace_part_light(Part::Whole, (rays, &mut light.0), &losses.transmission().backward, rims);
+        self.trace_part_light(Part::Whole, (rays, &mut light.0), losses.transmission(), rims);
     }
 
     /// Traces rays in single precision as [`trace_f32`](Self::trace_f32) does, and their light.
@@ -187,11 +186,11 @@ impl ReversedLens {
         &self,
         part: Part,
         (rays, lights): (&mut RayBatch, &mut Lights<f64>),
-        passes: &[LightPass<f64>],
+        transmission: &Transmission,
         rims: Vignetting,
     ) {
         assert_eq!(rays.len(), lights.n_rays(), "light along each ray");
-        let passes = self.passes_of(part, passes);
+        let passes = self.passes_of(part, [&transmission.backward, &transmission.to_stop]);
         mirror(&mut rays.slices());
         lights.mirror();
         let steps = part_of(&mirrored_steps(&self.forward, rays.object_z_mm), self.forward.stop(), part);
@@ -201,16 +200,16 @@ impl ReversedLens {
                 let plan = |at: usize| {
                     move |own: &[Step], place: usize| Plan::reversed(own, first - at - place, rims, at + place == 0)
                 };
-                trace_light_by_surfaces(&passes, rays, lights, |at, rays| {
+                trace_light_by_surfaces(passes, rays, lights, |at, rays| {
                     trace::trace_placed_by(&steps[at..=at], &placements[at..=at], plan(at), &mut rays.slices());
                 });
             }
             Some(placements) => {
                 let plan = |own: &[Step], place: usize| Plan::reversed(own, first - place, rims, place == 0);
                 let both = (&mut rays.slices(), &mut *lights);
-                trace::trace_placed_light_by((&steps, placements), plan, &passes, both);
+                trace::trace_placed_light_by((&steps, placements), plan, passes, both);
             }
-            None => trace::trace_light(&plan_of(&steps, part, first, rims), &passes, rays.slices(), lights),
+            None => trace::trace_light(&plan_of(&steps, part, first, rims), passes, rays.slices(), lights),
         }
         mirror(&mut rays.slices());
         lights.mirror();
@@ -220,29 +219,25 @@ impl ReversedLens {
         let Some(losses) = &self.forward.losses else { return self.trace_part_f32(part, rays) };
         if self.placements.is_some() {
             let (mut wide, mut lights) = (rays.widened(), light.0.converted());
-            self.trace_part_light(part, (&mut wide, &mut lights), &losses.transmission().backward, Vignetting::On);
+            self.trace_part_light(part, (&mut wide, &mut lights), losses.transmission(), Vignetting::On);
             light.0 = lights.converted();
             return rays.set_rounded(&wide, |point, _| point);
         }
-        let passes = self.passes_of(part, &losses.transmission().backward_f32);
+        let transmission = losses.transmission();
+        let passes = self.passes_of(part, [&transmission.backward_f32, &transmission.to_stop_f32]);
         mirror(&mut rays.slices());
         light.0.mirror();
-        trace::trace_light(&self.plans_f32[part as usize], &passes, rays.slices(), &mut light.0);
+        trace::trace_light(&self.plans_f32[part as usize], passes, rays.slices(), &mut light.0);
         mirror(&mut rays.slices());
         light.0.mirror();
     }
 
-    /// The passes of light through the surfaces of a part; on the way to the stop that does nothing yet.
-    fn passes_of<'a, T: Real>(&self, part: Part, passes: &'a [LightPass<T>]) -> Cow<'a, [LightPass<T>]> {
-        let stop_place = self.forward.n_surfaces() - 1 - self.forward.stop();
+    /// The passes of light through the surfaces of a part, of those through all and those to the stop.
+    fn passes_of<'a, T>(&self, part: Part, [all, to_stop]: [&'a [LightPass<T>]; 2]) -> &'a [LightPass<T>] {
         match part {
-            Part::Whole => passes.into(),
-            Part::FromStop => passes[stop_place..].into(),
-            Part::ToStop => {
-                let mut own = passes[..=stop_place].to_vec();
-                own[stop_place].series = None;
-                own.into()
-            }
+            Part::Whole => all,
+            Part::FromStop => &all[self.forward.n_surfaces() - 1 - self.forward.stop()..],
+            Part::ToStop => to_stop,
         }
     }
 

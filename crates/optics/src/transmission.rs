@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use crate::{
-    Coating, DiffractiveSurface, Film, Lens, MonoLens, ObjectPoint, OpticsError, PupilRegion, RayBatch, Vignetting,
+    Coating, DiffractiveSurface, Film, Lens, OpticsError,
     coating::{complex_index, share_between},
     trace::{Argument, LightPass, Lights, Real},
 };
@@ -41,6 +41,9 @@ pub(crate) struct Transmission {
     pub(crate) forward: Vec<LightPass<f64>>,
     pub(crate) backward: Vec<LightPass<f64>>,
     pub(crate) backward_f32: Vec<LightPass<f32>>,
+    /// Backward on to the stop, which does nothing yet.
+    pub(crate) to_stop: Vec<LightPass<f64>>,
+    pub(crate) to_stop_f32: Vec<LightPass<f32>>,
 }
 
 impl SurfaceLoss {
@@ -107,7 +110,7 @@ impl SurfaceLoss {
         }
     }
 
-    /// Returns half the sum and half the difference of the shares of s and p that go on, and t_s t_p* of amplitudes whose squares are these
+    /// Returns half the sum and half the difference of the shares of s and p that go on, and `t_s t_p*` of amplitudes whose squares are these
     /// shares, for rays whose directions before and behind have this product; of a mirror, for this cosine of incidence.
     fn at(&self, product: f64) -> [f64; 4] {
         // Refraction: n d of the denser medium less that of the other is along the normal.
@@ -157,7 +160,7 @@ impl SurfaceLoss {
     /// Returns the pass of light that the surface sends back where it comes from before or, with `is_from_behind`, from behind it; `None`
     /// where none does, as at gratings and between equal indices, whose reflections are not followed.
     pub(crate) fn back<T: Real>(&self, is_from_behind: bool, least_terms: [f64; 4]) -> Option<LightPass<T>> {
-        let (indices, of_cosine): ([f64; 2], Box<dyn Fn(f64) -> [f64; 4]>) = match self {
+        let (indices, of_cosine): ([f64; 2], OfCosine<'_>) = match self {
             Self::None | Self::Straight(_) | Self::MirrorFilm(_) | Self::MirrorTable(_) => return None,
             Self::Film(film) => {
                 let film = if is_from_behind { film.reversed() } else { film.clone() };
@@ -186,6 +189,9 @@ impl SurfaceLoss {
         Some(Series::of([0.0, 1.0], false, least_terms, of_cosine).pass(Argument::LowCosine { ratio2 }, T::ZERO))
     }
 }
+
+/// What a surface does to light, by a cosine.
+type OfCosine<'a> = Box<dyn Fn(f64) -> [f64; 4] + 'a>;
 
 /// Chebyshev series of what a surface does to light, between two ends.
 struct Series {
@@ -227,16 +233,25 @@ fn terms(s: num_complex::Complex64, p: num_complex::Complex64) -> [f64; 4] {
     [0.5 * (of_s + of_p), 0.5 * (of_s - of_p), both.re, both.im]
 }
 
+/// Returns the first so many passes, the last of which leaves light as it is.
+fn to_stop_of<T: Real>(passes: &[LightPass<T>], n: usize) -> Vec<LightPass<T>> {
+    let mut own = passes[..n].to_vec();
+    own[n - 1].series = None;
+    own
+}
+
 impl Transmission {
     /// Returns that of these surfaces; `per_mm` is the absorption behind each. That before the first and behind the last is left out.
-    pub(crate) fn of(losses: &[SurfaceLoss], per_mm: &[f64]) -> Self {
+    pub(crate) fn of(losses: &[SurfaceLoss], per_mm: &[f64], stop: usize) -> Self {
         let n = losses.len();
         let before = |i: usize| if i == 0 { 0.0 } else { per_mm[i - 1] };
         let behind = |i: usize| if i + 1 == n { 0.0 } else { per_mm[i] };
         let forward: Vec<LightPass<f64>> = (0..n).map(|i| losses[i].pass(before(i), EXACT_TERMS)).collect();
-        let backward = (0..n).rev().map(|i| LightPass { per_mm: behind(i), ..forward[i].clone() }).collect();
-        let backward_f32 = (0..n).rev().map(|i| losses[i].pass(behind(i), SINGLE_TERMS)).collect();
-        Self { forward, backward, backward_f32 }
+        let backward: Vec<LightPass<f64>> =
+            (0..n).rev().map(|i| LightPass { per_mm: behind(i), ..forward[i].clone() }).collect();
+        let backward_f32: Vec<LightPass<f32>> = (0..n).rev().map(|i| losses[i].pass(behind(i), SINGLE_TERMS)).collect();
+        let (to_stop, to_stop_f32) = (to_stop_of(&backward, n - stop), to_stop_of(&backward_f32, n - stop));
+        Self { forward, backward, backward_f32, to_stop, to_stop_f32 }
     }
 }
 
@@ -283,54 +298,5 @@ pub(crate) fn pass_one_by_one(
         if let Some((to, turned)) = after(i) {
             lights.pass_one(i, pass, (to - *from).dot(*direction), direction.to_array(), turned.to_array());
         }
-    }
-}
-
-/// Rings of rays over which the transmission of the beam on the axis is taken, and azimuths.
-const AXIAL_RINGS: usize = 4;
-const AXIAL_AZIMUTHS: usize = 48;
-
-impl MonoLens {
-    /// Whether no light is lost at surfaces or in glass.
-    pub fn is_lossless(&self) -> bool {
-        self.losses.is_none()
-    }
-
-    /// Traces rays through all surfaces, as [`trace`](Self::trace) does, and returns for each the share of unpolarized light that surfaces
-    /// and the glass between the first and the last let through; 0 of rays that end.
-    ///
-    /// The light is that which goes straight on: what is reflected twice comes on top (ghosts). Diffraction orders are not in it
-    /// ([`diffraction_efficiency`](Self::diffraction_efficiency)).
-    pub fn trace_shares(&self, rays: &mut RayBatch, rims: Vignetting) -> Vec<f64> {
-        let mut light = RayLight::unpolarized(rays.len());
-        self.trace_light(rays, &mut light, rims);
-        (0..rays.len()).map(|i| if rays.fate[i].is_in_flight() { light.share(i) } else { 0.0 }).collect()
-    }
-
-    /// Returns the mean share of light that the lens lets through over the beam of a point on the axis that gets through its rims; `None`
-    /// where none does. Far points have a distance of infinity; others are counted in mm from the first vertex.
-    pub fn axial_transmission(&self, object_distance_mm: f64) -> Option<f64> {
-        if self.is_lossless() {
-            return Some(1.0);
-        }
-        let point = match object_distance_mm.is_finite() {
-            true => ObjectPoint::Finite(DVec3::new(0.0, 0.0, -object_distance_mm)),
-            false => ObjectPoint::Infinite(DVec3::Z),
-        };
-        let region = PupilRegion::find(self, &point, AXIAL_AZIMUTHS)?;
-        Some(self.mean_share(&region, &point, AXIAL_RINGS))
-    }
-
-    /// Returns the mean share of a point's light that the lens lets through, over a region of its pupil.
-    pub(crate) fn mean_share(&self, region: &PupilRegion, point: &ObjectPoint, n_rings: usize) -> f64 {
-        if self.is_lossless() {
-            return 1.0;
-        }
-        let (targets, areas): (Vec<_>, Vec<f64>) = region.nodes(n_rings).into_iter().unzip();
-        let mut rays = region.plane().rays(self, point, &targets);
-        let shares = self.trace_shares(&mut rays, Vignetting::Off);
-        let lit = (0..rays.len()).filter(|&i| rays.fate[i].is_in_flight());
-        let (light, area) = lit.fold((0.0, 0.0), |(light, area), i| (light + shares[i] * areas[i], area + areas[i]));
-        if area > 0.0 { light / area } else { 0.0 }
     }
 }

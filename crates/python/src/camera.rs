@@ -18,7 +18,7 @@ use crate::{
     light_field::LightField,
     options::{count, word},
     paintings::painting_folder,
-    pickle::{quality_of, restorer},
+    restorer::{quality_of, restorer},
     scene::Scene,
     sensor::Sensor,
     serial::{from_python, to_python},
@@ -181,12 +181,12 @@ impl Camera {
     ///     How far a lone pixel is off before it is replaced, a share of saturation.
     /// seed : int
     /// name : str
-    #[pyo3(signature = (**changes), text_signature = "($self, *, name=None, lens=None, f_number=None, stop_mm=None, focus_mm=None, film_mm=None, tilt_deg=None, \
+    #[pyo3(signature = (**changes), text_signature = "($self, *, name=None, lens=None, f_number=None, stop_mm=None, coating=None, blades=None, blade_rotation_deg=None, blade_curvature=None, focus_mm=None, film_mm=None, tilt_deg=None, \
 swing_deg=None, rise_mm=None, shift_mm=None, sensor=None, film=None, crop=None, pixels=None, pixel_um=None, \
 dual_pixel=None, filters=None, diffraction=None, gamma=None, blur=None, border=None, bank=None, bank_error=None, \
 scene=None, fov_deg=None, depth_m=None, width_mm=None, distance_mm=None, fill_depth=None, hidden=None, points=None, \
 white_level=None, quantity=None, unit=None, scale=None, scene_wavelengths_nm=None, variable=None, axes=None, \
-no_data=None, depth=None, depth_unit=None, depth_kind=None, view=None, panorama=None, illuminant=None, \
+no_data=None, depth=None, depth_unit=None, depth_kind=None, depth_variable=None, view=None, panorama=None, illuminant=None, \
 illuminance_lux=None, scene_light=None, mean_luminance_cd_m2=None, mean_lux=None, wavelengths_nm=None, \
 exposure_s=None, analog_gain=None, noise=None, burst=None, bracket_stops=None, interleaved_ratio=None, \
 interleaved_gain_ratio=None, seed=None, white=None, demosaic=None, denoise=None, highlights=None, \

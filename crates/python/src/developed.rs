@@ -42,7 +42,7 @@ pub(crate) struct Developed {
 /// A frame with its picture.
 enum Frame {
     /// Of a DNG file, or of an array with what is known of its camera.
-    File(DevelopedFile),
+    File(Box<DevelopedFile>),
     /// Of an array of a sensor's numbers.
     Sensor(Box<SensorFrame>),
 }
@@ -218,7 +218,7 @@ pub(crate) fn develop(
         beside(given(&with).or(given(&of_mosaic)).or(given(&of_sensor)), "it for arrays alone: a file states its own")?;
         let path: PathBuf = source.extract()?;
         let of = run_apart(py, move |_| DevelopedFile::read(&path, processing))?;
-        return Ok(Developed::new(Frame::File(of)));
+        return Ok(Developed::new(Frame::File(Box::new(of))));
     }
     match (cfa, sensor) {
         (Some(_), Some(_)) => Err(wrong("sensor", "given beside cfa", "either of them")),
@@ -234,7 +234,7 @@ pub(crate) fn develop(
             };
             let has_color = options.is_some_and(|options| options.contains("color").unwrap_or(false));
             let of = run_apart(py, move |_| of_mosaic_frame(mosaic, processing, has_color))?;
-            Ok(Developed::new(Frame::File(of)))
+            Ok(Developed::new(Frame::File(Box::new(of))))
         }
         (None, Some(sensor)) => {
             beside(given(&of_mosaic), "cfa with it: the sensor has its own")?;

@@ -22,8 +22,8 @@ use crate::{
     input::{is_single, numbers},
     lens_requests::{PsfOptions, analysis_request},
     lens_rows::{lens_of, rows_of, with_surface},
-    pickle::restorer,
     rays::{GivenRays, Rays, Traced, trace},
+    restorer::restorer,
     serial::{from_python, to_python},
     worker::run_apart,
 };
@@ -196,11 +196,8 @@ impl Lens {
     ///     has in use.
     /// lens_scale : float, optional
     ///     How many times as large the lens is as the file has it, in all its lengths.
-    /// coating : str, optional
-    ///     What covers all surfaces between air and glass: "bare", "mgf2", "vcoat", "bbar", a file, or "ideal" for no loss of light at all;
-    ///     without it what the file states, else "mgf2".
     #[staticmethod]
-    #[pyo3(signature = (path, *, glasses=None, missing_glass="refuse", glass_range="refuse", slope_per_nm=None, configuration=None, lens_scale=None, coating=None))]
+    #[pyo3(signature = (path, *, glasses=None, missing_glass="refuse", glass_range="refuse", slope_per_nm=None, configuration=None, lens_scale=None))]
     fn read(
         path: PathBuf,
         glasses: Option<Vec<PathBuf>>,
@@ -209,7 +206,6 @@ impl Lens {
         slope_per_nm: Option<f64>,
         configuration: Option<usize>,
         lens_scale: Option<f64>,
-        coating: Option<&str>,
     ) -> PyResult<Self> {
         let missing_glass = match missing_glass {
             "refuse" => MissingGlass::Refuse,
@@ -226,7 +222,6 @@ impl Lens {
             slope_per_nm,
             configuration,
             lens_scale,
-            coating: coating.map(CoatingSpec::named),
             ..LensReadOptions::default()
         };
         guarded(|| Self::of_choice(LensSpec::File(path), reading))
@@ -483,7 +478,10 @@ semi_aperture_mm=None, medium=None, stop=None, conic=None, coefficients=None, sh
     /// Returns the lens of a dictionary as `to_dict` makes it.
     #[staticmethod]
     fn from_dict(data: &Bound<'_, PyDict>) -> PyResult<Self> {
-        guarded(|| Ok(Self::new(from_python("the lens", data.as_any())?, None)))
+        guarded(|| {
+            let file = from_python("the lens", data.as_any())?;
+            Ok(Self::new(LensReadOptions::default().coated(file).map_err(exception)?, None))
+        })
     }
 
     /// Traces rays through all surfaces.

@@ -23,6 +23,7 @@ mod options;
 mod paintings;
 mod pickle;
 mod rays;
+mod restorer;
 mod samples;
 mod save;
 mod scene;

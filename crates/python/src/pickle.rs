@@ -20,16 +20,12 @@ use crate::{
     input::owned_f32,
     lens::Lens,
     paintings::painting_folder,
+    restorer::quality_of,
     scene::Scene,
     sensor::Sensor,
     serial::from_python,
     shot::Shot,
 };
-
-/// Returns the function of this module of a name, which a pickle calls.
-pub(crate) fn restorer<'py>(py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
-    py.import("dioptric._native")?.getattr(name)
-}
 
 /// Makes a lens again of the text of its file fully open, how far its stop is open, what becomes of glasses beyond their range, and what covers the
 /// surfaces of which its file says nothing; pickles call it.
@@ -144,15 +140,4 @@ pub(crate) fn _restore_shot(
     let kept = camera.get().kept().with_quality(quality);
     guarded(|| kept.keep_imaged(imaged, pictures).map_err(exception))?;
     Shot::take(py, kept, &crate::worker::Follower::nobody())
-}
-
-/// Returns the quality of a word.
-pub(crate) fn quality_of(word: &str) -> Option<Quality> {
-    Some(match word {
-        "full" => Quality::Full,
-        "draft" => Quality::Draft,
-        "preview" => Quality::Preview,
-        "sketch" => Quality::Sketch,
-        _ => return None,
-    })
 }

@@ -25,7 +25,7 @@ use crate::{
     errors::{exception, guarded, wrong},
     input::{is_single, number, numbers, owned_f32},
     options::count,
-    pickle::restorer,
+    restorer::restorer,
     scene_options::{fill_of, with_options},
     serial::to_python,
     view::view,
@@ -232,7 +232,7 @@ impl Scene {
     #[staticmethod]
     #[pyo3(signature = (path, **options), text_signature = "(path, *, fov_deg=None, depth_m=None, width_mm=None, distance_mm=None, fill_depth=None, hidden=None, \
 points=None, white_level=None, quantity=None, unit=None, scale=None, scene_wavelengths_nm=None, variable=None, \
-axes=None, no_data=None, depth=None, depth_unit=None, depth_kind=None, view=None, panorama=None, \
+axes=None, no_data=None, depth=None, depth_unit=None, depth_kind=None, depth_variable=None, view=None, panorama=None, \
 illuminant=None, illuminance_lux=None, light=None, mean_luminance_cd_m2=None)")]
     fn read(path: PathBuf, options: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
         if !path.exists() {
@@ -279,7 +279,7 @@ illuminant=None, illuminance_lux=None, light=None, mean_luminance_cd_m2=None)")]
 samples=None, noise=None, bounces=None, size=None, seed=None, fov_deg=None, depth_m=None, width_mm=None, \
 distance_mm=None, fill_depth=None, hidden=None, points=None, white_level=None, quantity=None, unit=None, \
 scale=None, scene_wavelengths_nm=None, variable=None, axes=None, no_data=None, depth=None, depth_unit=None, \
-depth_kind=None, view=None, panorama=None, illuminant=None, illuminance_lux=None, light=None, \
+depth_kind=None, depth_variable=None, view=None, panorama=None, illuminant=None, illuminance_lux=None, light=None, \
 mean_luminance_cd_m2=None)")]
     #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
     fn world(
@@ -356,7 +356,7 @@ mean_luminance_cd_m2=None)")]
     #[staticmethod]
     #[pyo3(signature = (columns=1080, rows=720, **options), text_signature = "(columns=1080, rows=720, *, fov_deg=None, depth_m=None, width_mm=None, distance_mm=None, fill_depth=None, \
 hidden=None, points=None, white_level=None, quantity=None, unit=None, scale=None, scene_wavelengths_nm=None, \
-variable=None, axes=None, no_data=None, depth=None, depth_unit=None, depth_kind=None, view=None, \
+variable=None, axes=None, no_data=None, depth=None, depth_unit=None, depth_kind=None, depth_variable=None, view=None, \
 panorama=None, illuminant=None, illuminance_lux=None, light=None, mean_luminance_cd_m2=None)")]
     fn still_life(columns: usize, rows: usize, options: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
         let source = SceneSource::StillLife { columns, rows };
@@ -385,7 +385,7 @@ panorama=None, illuminant=None, illuminance_lux=None, light=None, mean_luminance
     #[pyo3(signature = (pattern, columns, rows, *, size=None, **options), text_signature = "(pattern, columns, rows, *, size=None, fov_deg=None, depth_m=None, width_mm=None, distance_mm=None, \
 fill_depth=None, hidden=None, points=None, white_level=None, quantity=None, unit=None, scale=None, \
 scene_wavelengths_nm=None, variable=None, axes=None, no_data=None, depth=None, depth_unit=None, \
-depth_kind=None, view=None, panorama=None, illuminant=None, illuminance_lux=None, light=None, \
+depth_kind=None, depth_variable=None, view=None, panorama=None, illuminant=None, illuminance_lux=None, light=None, \
 mean_luminance_cd_m2=None)")]
     fn target(
         pattern: &str,

@@ -14,7 +14,7 @@ use pyo3::{
 use crate::{
     errors::{exception, guarded},
     input::numbers,
-    pickle::restorer,
+    restorer::restorer,
     serial::{from_python, to_python},
     view::view,
 };

@@ -24,7 +24,7 @@ use crate::{
     camera::Camera,
     changes::{changed, of_exposure, of_picture},
     errors::exception,
-    pickle::restorer,
+    restorer::restorer,
     save::{is_picture, write_picture},
     serial::to_python,
     view::{plane_or_planes, raw_planes, rgb8, view},

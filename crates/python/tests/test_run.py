@@ -74,5 +74,5 @@ def test_picture_alone_is_saved(shot: dp.Shot, tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["a.png"]
     with pytest.raises(ValueError, match="ends in .png"):
         shot.save(tmp_path / "a.jpg")
-    with pytest.raises(OSError, match="cannot write"):
+    with pytest.raises(OSError, match="nowhere"):
         shot.save("/proc/nowhere/a.png")

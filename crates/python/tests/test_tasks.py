@@ -81,7 +81,7 @@ def test_psf_stack_with_energies_to_tensors() -> None:
     bright = psf * psf.energy[..., None, None]
     stack = np.moveaxis(np.asarray(bright), 1, -1).copy()              # torch.from_numpy(stack) takes it
     assert stack.shape == (3, 65, 65, 3) and stack.dtype == np.float64 or stack.dtype == np.float32
-    assert psf.energy[0, 1] == pytest.approx(1, abs=0.01) and psf.energy[2, 1] < 0.8
+    assert 0.95 < psf.energy[0, 1] < 0.98 and psf.energy[2, 1] < 0.8  # surfaces and rims take the rest
 
 
 def test_psf_map_over_the_film() -> None:

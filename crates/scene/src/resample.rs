@@ -9,7 +9,7 @@ use crate::SceneError;
 /// Returns an image on other bands, as [`Scene::resampled`](crate::Scene::resampled) does.
 ///
 /// # Errors
-/// When the new bands reach more than a band's width beyond the old ones.
+/// When the center of a new band lies more than half an old band's width beyond the old centers.
 pub fn resampled(image: &SpectralImage, grid: &WavelengthGrid) -> Result<SpectralImage, SceneError> {
     if image.grid() == grid {
         return Ok(image.clone());
@@ -37,13 +37,17 @@ pub(crate) fn resampling_weights(
     to: &WavelengthGrid,
 ) -> Result<Vec<Vec<(usize, f64)>>, SceneError> {
     let ((first, last), n) = (from.range_nm(), from.len());
-    let (margin_first, margin_last) = (from.widths_nm()[0], from.widths_nm()[n - 1]);
+    let half = |band: usize| 0.5 * from.widths_nm()[band];
+    let (least, most) = (first - half(0), last + half(n - 1));
     let (new_first, new_last) = to.range_nm();
-    if new_first < first - margin_first || new_last > last + margin_last {
+    // Edges that are sums of decimals.
+    if new_first < least - 1e-6 || new_last > most + 1e-6 {
         return Err(SceneError::Setting {
             what: "the range of the bands",
             value: format!("{new_first}–{new_last} nm"),
-            expected: format!("a part of {first}–{last} nm, the bands of the scene"),
+            expected: format!(
+                "centers of {least}–{most} nm: half a band's width at most beyond {first}–{last} nm, the bands of the scene"
+            ),
         });
     }
     Ok(to
@@ -150,7 +154,11 @@ mod tests {
         let image = ramp(&WavelengthGrid::uniform(400.0, 700.0, 10.0).unwrap());
         let wider = WavelengthGrid::uniform(380.0, 780.0, 10.0).unwrap();
         let message = resampled(&image, &wider).unwrap_err().to_string();
-        assert!(message.contains("380–780 nm") && message.contains("400–700 nm"), "{message}");
+        assert!(message.contains("380–780 nm") && message.contains("395–705 nm: half"), "{message}");
+        let just = WavelengthGrid::uniform(395.0, 705.0, 10.0).unwrap();
+        assert_eq!(resampled(&image, &just).unwrap().spectrum_at(0, 0)[0], 400.0);
+        let beyond = WavelengthGrid::uniform(394.0, 704.0, 10.0).unwrap();
+        assert!(resampled(&image, &beyond).is_err());
     }
 
     #[test]

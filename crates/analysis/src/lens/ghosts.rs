@@ -149,10 +149,10 @@ impl GhostTableRequest {
             let (origin, expected) = ("the ghosts".to_owned(), expected.to_owned());
             Err(PipelineError::Value { origin, key, found, expected })
         };
-        if let Some(field_deg) = self.fields_deg.iter().find(|deg| !(deg.abs() < 90.0)) {
+        if let Some(field_deg) = self.fields_deg.iter().find(|deg| deg.is_nan() || deg.abs() >= 90.0) {
             return wrong("fields_deg", field_deg.to_string(), "angles between -90 and 90 degrees");
         }
-        if !(self.distance_mm > 0.0) {
+        if self.distance_mm.is_nan() || self.distance_mm <= 0.0 {
             return wrong("distance_mm", self.distance_mm.to_string(), "a number above 0, or inf");
         }
         if !self.film_mm.iter().all(|mm| *mm > 0.0 && mm.is_finite()) {

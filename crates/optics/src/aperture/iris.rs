@@ -68,7 +68,7 @@ impl Iris {
         if !BLADES.contains(&self.blades) {
             return wrong("blades", f64::from(self.blades), "3 to 64 blades");
         }
-        if !(self.rotation_deg.abs() <= 360.0) {
+        if !(-360.0..=360.0).contains(&self.rotation_deg) {
             return wrong("rotation_deg", self.rotation_deg, "-360 to 360 degrees");
         }
         if !(0.0..=1.0).contains(&self.curvature) {

@@ -40,7 +40,7 @@ pub enum Outline {
         /// By how much, degrees, from x towards y.
         by_deg: f64,
         /// The shape.
-        outline: Box<Outline>,
+        outline: Box<Self>,
     },
     /// The opening of a stop that is closed by blades: [`Lens::with_iris`](crate::Lens::with_iris) makes it.
     #[serde(skip)]
@@ -49,13 +49,13 @@ pub enum Outline {
 
 /// The place of an edge that is nearest to a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct NearestEdge {
+pub(crate) struct NearestEdge {
     /// How far within the outline the point is, mm; negative outside.
-    pub(super) clearance_mm: f64,
+    pub(crate) clearance_mm: f64,
     /// The unit direction from the point to the edge.
-    pub(super) direction: DVec2,
+    pub(crate) direction: DVec2,
     /// Which part of the edge it is, where the edge has corners between its parts.
-    pub(super) part: usize,
+    pub(crate) part: usize,
 }
 
 /// Places of an edge at which a surface is looked at: a multiple of 8, so that the corners of a square are among them.
@@ -115,7 +115,7 @@ impl Outline {
     ///
     /// Of an ellipse the distance is only of the right sign, and of the right size along its axes; of a rectangle and an iris it is that
     /// for places within.
-    pub(super) fn nearest_edge(&self, at_mm: DVec2) -> NearestEdge {
+    pub(crate) fn nearest_edge(&self, at_mm: DVec2) -> NearestEdge {
         match self {
             Self::Circle { .. } | Self::Ellipse { .. } => {
                 let half_mm = self.half_widths_mm();
@@ -149,7 +149,7 @@ impl Outline {
     }
 
     /// Returns how far from a place the edge is along a unit direction, mm; infinite where it never comes. Of an iris only from within.
-    pub(super) fn edge_along_mm(&self, at_mm: DVec2, direction: DVec2) -> f64 {
+    pub(crate) fn edge_along_mm(&self, at_mm: DVec2, direction: DVec2) -> f64 {
         match self {
             Self::Circle { .. } | Self::Ellipse { .. } => {
                 let half_mm = self.half_widths_mm();
@@ -268,7 +268,7 @@ impl Outline {
     pub(super) fn wrong(&self) -> Option<(&'static str, f64, &'static str)> {
         match self {
             Self::Polygon { corners_mm } => wrong_with_polygon(corners_mm),
-            Self::Turned { by_deg, .. } if !(by_deg.abs() <= 360.0) => {
+            Self::Turned { by_deg, .. } if !(-360.0..=360.0).contains(by_deg) => {
                 Some(("by_deg of an aperture", *by_deg, "-360 to 360 degrees"))
             }
             Self::Turned { outline, .. } => outline.wrong(),
@@ -334,7 +334,7 @@ fn wrong_with_polygon(corners_mm: &[[f64; 2]]) -> Option<(&'static str, f64, &'s
     if !(3..=MOST_CORNERS).contains(&n) {
         return Some(("the number of corners of an aperture", n as f64, "3 to 1000"));
     }
-    if let Some(wrong) = corners_mm.as_flattened().iter().find(|mm| !(mm.abs() <= 1e9)) {
+    if let Some(wrong) = corners_mm.as_flattened().iter().find(|mm| !(-1e9..=1e9).contains(*mm)) {
         return Some(("a corner of an aperture", *wrong, "numbers below 1e9"));
     }
     let all: Vec<[DVec2; 2]> = sides(corners_mm).collect();

@@ -32,7 +32,7 @@ impl ReflectanceTable {
                 return wrong(format!("{what} of a table of reflectance is {list:?}, expected ascending numbers"));
             }
         }
-        if !(self.wavelengths_nm[0] > 0.0) {
+        if self.wavelengths_nm[0] <= 0.0 {
             return wrong(format!("a table of reflectance begins at {} nm", self.wavelengths_nm[0]));
         }
         let (first_deg, last_deg) = (self.angles_deg[0], self.angles_deg[self.angles_deg.len() - 1]);

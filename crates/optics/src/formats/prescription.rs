@@ -37,6 +37,9 @@ pub(super) struct Prescription {
     /// Blades that close the stop.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) iris: Option<Iris>,
+    /// Half the diameter that blades close the stop to; left out where it is fully open.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) closed_to_mm: Option<f64>,
     /// Gratings and diffractive surfaces.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(super) diffractive: Vec<DiffractiveSurface>,
@@ -185,6 +188,10 @@ fn file_of(prescription: Prescription) -> Result<LensFile, TextError> {
         Lens::new_with_apertures(prescription.name, prescription.source, interfaces, stop, prescription.apertures)?;
     let lens = lens.with_object_medium(prescription.object_medium)?.with_mirrors(mirrors)?;
     let lens = lens.with_iris(prescription.iris)?;
+    let lens = match prescription.closed_to_mm {
+        Some(mm) => lens.with_stop_diameter_mm(2.0 * mm)?,
+        None => lens,
+    };
     let lens = lens.with_diffractive(prescription.diffractive)?.with_coatings(coatings)?;
     let lens = lens.with_moves(prescription.moves)?.with_image_surface(image_surface)?;
     let positive = |key: &str, found: Option<f64>| match found.filter(|mm| !(mm.is_finite() && *mm > 0.0)) {
@@ -255,6 +262,9 @@ impl Lens {
     /// Returns the lens as it stands in our own file.
     fn prescription(&self) -> Prescription {
         let radius_mm = |curvature_per_mm: f64| (curvature_per_mm != 0.0).then(|| reciprocal(curvature_per_mm));
+        // Where blades close it, the file states how wide the stop opens, and what it is closed to.
+        let closed_to_mm = self.iris_opening().map(|_| self.stop_semi_aperture_mm());
+        let full_mm = closed_to_mm.map(|_| self.full_stop_semi_aperture_mm());
         let row = |(i, interface): (usize, &Interface)| Row {
             comment: String::new(),
             radius_mm: radius_mm(interface.surface.curvature_per_mm),
@@ -262,7 +272,7 @@ impl Lens {
             stop: i == self.stop(),
             mirror: self.is_mirror(i),
             coating: self.coatings().iter().find(|(surface, _)| *surface == i).map(|(_, coating)| coating.clone()),
-            semi_aperture_mm: interface.surface.semi_aperture_mm,
+            semi_aperture_mm: full_mm.filter(|_| i == self.stop()).unwrap_or(interface.surface.semi_aperture_mm),
             medium: interface.medium_after.clone(),
             thickness_mm: interface.thickness_after_mm,
         };
@@ -274,6 +284,7 @@ impl Lens {
             moves: self.moves().to_vec(),
             apertures: self.apertures().to_vec(),
             iris: self.iris().copied(),
+            closed_to_mm,
             diffractive: self.diffractive().to_vec(),
             image_radius_mm: radius_mm(self.image_surface().curvature_per_mm),
             image_conic: self.image_surface().conic,

@@ -197,6 +197,7 @@ impl LensFile {
             ("names of surfaces", !self.surface_comments.is_empty() && !holds_use),
             ("comments", !self.comments.is_empty() && !holds_use),
             ("coatings", !self.lens.coatings().is_empty() && extension != "ron"),
+            ("blades of the stop (iris)", self.lens.iris().is_some() && extension != "ron"),
             ("the relief of gratings (blaze)", is_blazed && extension != "ron"),
         ];
         let left_out: Vec<&str> =

@@ -25,7 +25,7 @@ pub(crate) struct LightPass<T> {
     pub(crate) scale: T,
     pub(crate) offset: T,
     /// Chebyshev series of half the sum and half the difference of the shares of s and p, and of the real and the imaginary part of
-    /// t_s t_p*; none where the surface leaves light as it is.
+    /// `t_s t_p*`; none where the surface leaves light as it is.
     pub(crate) series: Option<[Vec<T>; 4]>,
     /// Absorption of the medium before, 1/mm.
     pub(crate) per_mm: T,
@@ -204,8 +204,8 @@ impl<T: Real, const N: usize> Lane<T, N> {
     #[inline(always)]
     pub(super) fn pass(&mut self, pass: &LightPass<T>, way: &[T; N], before: &[[T; N]; 3], after: &[[T; N]; 3]) {
         if pass.per_mm != T::ZERO {
-            for i in 0..N {
-                self.depth[i] += pass.per_mm * way[i];
+            for (depth, way) in self.depth.iter_mut().zip(way) {
+                *depth += pass.per_mm * *way;
             }
         }
         let Some([sum, difference, real, imaginary]) = &pass.series else { return };
@@ -238,9 +238,9 @@ impl<T: Real, const N: usize> Lane<T, N> {
             self.q[i] = b[i] * power + a[i] * q;
         }
         if imaginary.is_empty() {
-            for i in 0..N {
-                self.u[i] = c[i] * self.u[i];
-                self.v[i] = c[i] * self.v[i];
+            for ((u, v), c) in self.u.iter_mut().zip(&mut self.v).zip(c) {
+                *u = c * *u;
+                *v = c * *v;
             }
         } else {
             let s = series_at(imaginary, &x);
@@ -358,9 +358,9 @@ fn pass_block<T: Real>(lane: &mut Lane<T, LANES>, pass: &LightPass<T>, shift: T,
     let before = [from.l, from.m, from.n];
     let mut way = [T::ZERO; LANES];
     if pass.per_mm != T::ZERO {
-        for i in 0..LANES {
+        for (i, way) in way.iter_mut().enumerate() {
             let [x, y, z] = [to.x[i] - from.x[i], to.y[i] - from.y[i], to.z[i] - (from.z[i] - shift)];
-            way[i] = x * from.l[i] + y * from.m[i] + z * from.n[i];
+            *way = x * from.l[i] + y * from.m[i] + z * from.n[i];
         }
     }
     lane.pass(pass, &way, &before, &[to.l, to.m, to.n]);

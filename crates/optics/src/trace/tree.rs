@@ -110,9 +110,8 @@ impl<T: Real> GhostTree<T> {
                 side.pass_on(&before[i], &mut behind[0], side.on.shift);
             }
             self.note_on_film(None, start, &mut there[n].clone(), note);
-            for j in 1..n {
+            for (j, first) in self.forward.iter().enumerate().skip(1) {
                 // Back from a surface …
-                let first = &self.forward[j];
                 if !first.send_back(&there[j], &mut back, first.back.shift) {
                     continue;
                 }
@@ -155,10 +154,8 @@ impl<T: Real> GhostTree<T> {
         kernel::to_plane(self.film_mm, self.index_after, &mut lit.rays);
         for (k, (block, lane)) in lit.rays.iter().zip(&lit.light).enumerate() {
             let mut shares = [0.0; LANES];
-            for i in 0..LANES {
-                if block.alive[i] != T::NO {
-                    shares[i] = lane.share(i);
-                }
+            for (i, share) in shares.iter_mut().enumerate().filter(|(i, _)| block.alive[*i] != T::NO) {
+                *share = lane.share(i);
             }
             note(pair, start + k * LANES, [&block.x, &block.y], &shares);
         }

@@ -1,4 +1,4 @@
-//! Thin films against tmm (S. Byrnes, PyPI), which solves them by scattering matrices.
+//! Thin films against tmm (S. Byrnes, on `PyPI`), which solves them by scattering matrices.
 
 use dioptric_optics::Film;
 use num_complex::Complex64;

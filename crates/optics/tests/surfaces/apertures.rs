@@ -4,7 +4,7 @@
 use std::{f64::consts::PI, path::Path};
 
 use dioptric_optics::{
-    Aperture, CoordinateBreak, Glass, Interface, Layout, Lens, LensFile, ObjectPoint, OpticsError, Outline,
+    Aperture, CoordinateBreak, Glass, Interface, Iris, Layout, Lens, LensFile, ObjectPoint, OpticsError, Outline,
     PupilBoundary, RayBatch, RayBatchF32, RayFate, ReadOptions, Shape, Surface, Vignetting,
     glam::{DVec2, DVec3},
 };
@@ -379,6 +379,19 @@ fn polygons_and_turned_shapes_bound_light_and_come_back_from_a_file() {
         let found_mm2 = dioptric_optics::PupilRegion::find(&plate, &point, 192).unwrap().area_mm2();
         // Lines between some hundred places of an edge with corners.
         assert!((found_mm2 / area_mm2 - 1.0).abs() < 2e-3, "{found_mm2} {area_mm2}");
+    }
+}
+
+#[test]
+fn a_lens_with_blades_comes_back_from_its_own_file_open_and_closed() {
+    let iris = Iris { blades: 7, rotation_deg: 12.0, curvature: 0.25 };
+    let open = with(&[]).with_iris(Some(iris)).unwrap();
+    for lens in [open.clone(), open.with_stop_diameter_mm(3.0).unwrap()] {
+        let read = LensFile::from_bytes(Path::new("a.ron"), lens.to_ron().as_bytes(), &ReadOptions::default()).unwrap();
+        assert_eq!(read.lens, lens);
+        assert_eq!(read.lens.iris_opening(), lens.iris_opening());
+        let left_out = |extension| LensFile::from(lens.clone()).left_out(extension).join("; ");
+        assert!(left_out("zmx").contains("blades of the stop (iris)") && !left_out("ron").contains("blades"));
     }
 }
 

@@ -434,11 +434,23 @@ impl SceneSpec {
 
     /// Puts a scene under the light that is asked for, and checks that it is whole.
     fn light_up(&self, scene: &mut Scene) -> Result<(), PipelineError> {
-        if let (None, Some(illuminant)) = (&scene.light, &self.light) {
-            scene.light = Some(SceneLight { illuminant: illuminant.clone(), illuminance_lux: None });
+        match (&scene.light, &self.light) {
+            (None, Some(illuminant)) => {
+                scene.light = Some(SceneLight { illuminant: illuminant.clone(), illuminance_lux: None });
+            }
+            (Some(_), Some(_)) => {
+                scene.notes.push("its light is known: the light that is stated for it is not used".to_owned());
+            }
+            _ => {}
         }
         if self.illuminant.is_some() || self.illuminance_lux.is_some() {
+            let before_cd_m2 = scene.mean_luminance_cd_m2();
             scene.relight(self.illuminant.as_ref(), self.illuminance_lux)?;
+            let mean_cd_m2 = scene.mean_luminance_cd_m2();
+            // What was read under that light already has its luminance in the line of what was understood.
+            if (mean_cd_m2 / before_cd_m2 - 1.0).abs() > 1e-3 {
+                scene.notes.push(format!("under the light that was asked for it has {mean_cd_m2:.4} cd/m² on average"));
+            }
         }
         if let Some(wanted_cd_m2) = self.mean_luminance_cd_m2 {
             let factor = wanted_cd_m2 / scene.mean_luminance_cd_m2();

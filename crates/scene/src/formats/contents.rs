@@ -241,6 +241,9 @@ impl Cube {
         };
         let words =
             reading.unit.as_deref().or(own_unit.as_ref().map(|(_, words)| words.as_str())).unwrap_or(usual_unit);
+        if !is_reflectance && options.white_level.is_some() {
+            return units("it holds light, of which no number is a perfect white: expected it without --white-level");
+        }
         let (level, what) = match (is_reflectance, options.white_level, top) {
             (false, ..) => (1.0, format!("radiance in {}", short(words))),
             (true, Some(level), _) => (level, format!("reflectance, {level} being a perfect white")),

@@ -241,6 +241,41 @@ mod tests {
     }
 
     #[test]
+    fn codes_are_the_numbers_whatever_they_are_counted_from() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        let z_m =
+            |name: &str, told: DepthWords<'_>| read_depth(&at(name), told).unwrap().axial_m(None).unwrap().unwrap();
+        // A largest code below that of the bits is no reason to stretch.
+        let codes: Vec<u8> = [2000_u16, 5000, 1, 0].iter().flat_map(|code| code.to_be_bytes()).collect();
+        fs::write(at("a.pgm"), [&b"P5\n# a word\n2 2\n5000\n"[..], &codes].concat()).unwrap();
+        assert_eq!(z_m("a.pgm", DepthWords::default()), ndarray::arr2(&[[2.0, 5.0], [0.001, 0.0]]));
+        fs::write(at("b.pgm"), "P2 2 2 100\n50 99 1 0\n").unwrap();
+        assert_eq!(z_m("b.pgm", words(Some("cm"), None)), ndarray::arr2(&[[0.5, 0.99], [0.01, 0.0]]));
+        // Where 0 is white, and a number that stands for none.
+        let tiff = |name: &str, white_zero: bool, none: Option<&str>| {
+            let mut file = fs::File::create(at(name)).unwrap();
+            let mut encoder = tiff::encoder::TiffEncoder::new(&mut file).unwrap();
+            let mut image = encoder.new_image::<tiff::encoder::colortype::Gray16>(2, 2).unwrap();
+            if white_zero {
+                image.encoder().write_tag(tiff::tags::Tag::PhotometricInterpretation, 0_u16).unwrap();
+            }
+            if let Some(none) = none {
+                image.encoder().write_tag(tiff::tags::Tag::GdalNodata, none).unwrap();
+            }
+            image.encoder().write_tag(tiff::tags::Tag::ImageDescription, "depth_scale=5000").unwrap();
+            image.write_data(&[2000, 9999, 500, 700]).unwrap();
+        };
+        for (name, white_zero) in [("a.tif", false), ("b.tif", true)] {
+            tiff(name, white_zero, Some("9999"));
+            let depth = z_m(name, DepthWords::default());
+            assert!(depth[(0, 1)].is_nan() && depth[(0, 0)] == 2.0 && depth.row(1).to_vec() == [0.5, 0.7], "{depth}");
+            let notes = read_depth(&at(name), DepthWords::default()).unwrap().notes;
+            assert_eq!(notes, [format!("{name}: its description 'depth_scale=5000' is not used")]);
+        }
+    }
+
+    #[test]
     fn other_resolutions_keep_outlines() {
         let values = ndarray::arr2(&[[1.0, 4.0], [1.0, 4.0]]);
         let depth = RawDepth::in_file(Path::new("a.exr"), "Z".to_owned(), values, DepthKind::Axial);

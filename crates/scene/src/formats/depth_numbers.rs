@@ -11,9 +11,10 @@ use super::{
     npy::{NpyArray, read_npy},
     npz::read_npz_plane,
     pfm::read_pfm,
-    picture::decode,
+    picture::{decode, pnm_top},
+    picture_parts::unknown_parts,
     reading::{DepthKind, Frame},
-    stated::name_of,
+    stated::{name_of, note_of},
     tiff_file::{TiffFile, read_tiff},
     unusable::unreadable,
 };
@@ -84,22 +85,28 @@ pub(super) fn depth_numbers(path: &Path, told: Option<&str>) -> Result<DepthNumb
             }
         }
         "tif" | "tiff" => match read_tiff(path)? {
-            TiffFile::Linear([plane, ..], notes) => of(plane, None, notes),
+            TiffFile::Linear([mut plane, ..], page) => {
+                page.undo(&mut plane, 1.0);
+                of(plane, None, page.notes_of_depth(path))
+            }
             TiffFile::Stack(mut stack) if stack.planes.len() == 1 => {
-                of(stack.planes.swap_remove(0), stack.top.map(|_| 0), stack.notes)
+                let mut plane = stack.planes.swap_remove(0);
+                stack.page.undo(&mut plane, stack.top.unwrap_or(1.0) as f32);
+                of(plane, stack.top.map(|_| 0), stack.page.notes_of_depth(path))
             }
             TiffFile::Stack(stack) => {
                 let reason = format!("it has {} planes, expected one of depth", stack.planes.len());
                 return Err(unreadable(path, reason));
             }
-            TiffFile::Picture { notes } => {
-                let (values, top) = codes_of(path)?;
-                of(values, Some(top), notes)
+            TiffFile::Picture(page) => {
+                let (mut values, top) = codes_of(path)?;
+                page.undo(&mut values, top.into());
+                of(values, Some(top), page.notes_of_depth(path))
             }
         },
         _ => {
             let (values, top) = codes_of(path)?;
-            of(values, Some(top), vec![])
+            of(values, Some(top), note_of(path, "part", &unknown_parts(path)?).into_iter().collect())
         }
     })
 }
@@ -134,7 +141,7 @@ fn codes_of(path: &Path) -> Result<(Array2<f32>, u16), SceneError> {
     let of = |columns: u32, rows: u32, codes: Vec<f32>| {
         Array2::from_shape_vec((rows as usize, columns as usize), codes).expect("a code a pixel")
     };
-    Ok(match decode(path, 4)? {
+    let (mut values, top) = match decode(path, 4)? {
         DynamicImage::ImageLuma16(p) => {
             let (columns, rows) = p.dimensions();
             (of(columns, rows, p.into_raw().into_iter().map(f32::from).collect()), u16::MAX)
@@ -147,5 +154,14 @@ fn codes_of(path: &Path) -> Result<(Array2<f32>, u16), SceneError> {
             let reason = format!("its samples are {:?}, expected gray ones of 8 or 16 bits", other.color());
             return Err(unreadable(path, reason));
         }
-    })
+    };
+    // Codes whose largest is another were stretched to all of their bits: these are the numbers again.
+    match pnm_top(path).filter(|own| *own != u32::from(top)) {
+        Some(own) => {
+            let factor = own as f32 / f32::from(top);
+            values.mapv_inplace(|code| (code * factor).round());
+            Ok((values, if own < 255 { u16::from(u8::MAX) } else { 0 }))
+        }
+        None => Ok((values, top)),
+    }
 }

@@ -45,6 +45,12 @@ pub(super) fn contents_of_envi(path: &Path, options: &ReadOptions) -> Result<Con
     let (meaning, what) = file.meaning(options)?;
     let mut notes: Vec<String> = file.notes.clone();
     notes.extend(file.unused_unit(path));
+    let references = match &meaning {
+        Meaning::Between(pair, _) => &pair[..],
+        _ => &[],
+    };
+    notes.extend(references.iter().flat_map(|reference| reference.notes.clone()));
+    notes.extend(file.notes_of_exposures(references));
     if let (Meaning::Light(..), Some(own)) = (&meaning, file.header.reflectance_scale) {
         let name = name_of(path);
         notes.push(format!("{name}: its reflectance scale factor of {own} is not used: it has a unit of radiance"));
@@ -326,7 +332,8 @@ impl EnviFile {
                 format!("reflectance between {} and {}", name_of(&white.header_path), name_of(&dark.header_path));
             self.check_reference(&white)?;
             self.check_reference(&dark)?;
-            return Ok((Meaning::Between(Box::new([white, dark])), what));
+            let times = self.times_as_long_as(&white)?;
+            return Ok((Meaning::Between(Box::new([white, dark]), times), what));
         }
         let is_float = matches!(header.data_type, DataType::F32 | DataType::F64);
         if wants_light == Some(false) && (is_float || reading.scale.is_some()) {
@@ -356,6 +363,53 @@ impl EnviFile {
             self.header_path.display()
         );
         Err(unreadable(&reference.header_path, reason))
+    }
+
+    /// Returns how many times as long as in a reference the light was gathered; 1 where the two do not tell.
+    fn times_as_long_as(&self, reference: &Self) -> Result<f64, SceneError> {
+        let of = |own: &Self, key: &str| own.header.exposures.iter().find(|(own, _)| own == key).map(|(_, v)| *v);
+        let keys = self.header.exposures.iter().filter_map(|(key, v)| Some((key, v / of(reference, key)?)));
+        let ratios: Vec<(&String, f64)> = keys.collect();
+        let Some(&(_, first)) = ratios.first() else { return Ok(1.0) };
+        if let Some((key, other)) = ratios.iter().find(|(_, ratio)| (ratio - first).abs() > 1e-6 * first) {
+            let reason = format!(
+                "its '{}' and '{key}' differ from those of {} by {first} and {other} times: expected the same ratio",
+                ratios[0].0,
+                name_of(&reference.header_path)
+            );
+            return Err(unreadable(&self.header_path, reason));
+        }
+        Ok(first)
+    }
+
+    /// Returns what is said of the times that light was gathered for in this cube and in its references.
+    fn notes_of_exposures(&self, references: &[Self]) -> Vec<String> {
+        let mut notes = vec![];
+        let mut compared = vec![];
+        for (index, reference) in references.iter().enumerate() {
+            let mut alone = vec![];
+            for (key, theirs) in &reference.header.exposures {
+                let Some((_, own)) = self.header.exposures.iter().find(|(own, _)| own == key) else {
+                    alone.push(key.clone());
+                    continue;
+                };
+                compared.push(key.clone());
+                if own != theirs {
+                    let becomes = match index {
+                        0 => format!("its light is multiplied by {}", own / theirs),
+                        _ => "its numbers are taken as they are".to_owned(),
+                    };
+                    let (name, of) = (name_of(&reference.header_path), name_of(&self.header_path));
+                    notes.push(format!("{name}: its {key} is {theirs}, that of {of} {own}: {becomes}"));
+                }
+            }
+            notes.extend(note_of(&reference.header_path, "key", &alone));
+        }
+        // Without references `tint` changes nothing.
+        let is_alone = |key: &String| !(compared.contains(key) || references.is_empty() && key == "tint");
+        let alone: Vec<String> = self.header.exposures.iter().map(|(key, _)| key.clone()).filter(is_alone).collect();
+        notes.extend(note_of(&self.header_path, "key", &alone));
+        notes
     }
 
     /// Opens the cube beside this one whose name starts so, if there is one.

@@ -44,8 +44,8 @@ pub(super) enum Meaning {
     Light(Vec<f64>),
     /// A reflectance: a factor.
     Reflectance(f64),
-    /// A reflectance between cubes of a perfect white and of no light.
-    Between(Box<[EnviFile; 2]>),
+    /// A reflectance between cubes of a perfect white and of no light, and how many times as long as the white's this light was gathered.
+    Between(Box<[EnviFile; 2]>, f64),
 }
 
 /// A header, and where its numbers are.
@@ -74,7 +74,7 @@ impl EnviFile {
         needed.sort_unstable();
         needed.dedup();
         let references = match meaning {
-            Meaning::Between(pair) => {
+            Meaning::Between(pair, _) => {
                 Some([pair[0].lines(&needed, self.header.rows)?, pair[1].lines(&needed, self.header.rows)?])
             }
             _ => None,
@@ -88,14 +88,15 @@ impl EnviFile {
             raw.par_iter_mut().zip(&needed).enumerate().for_each(|(index, (samples, &band))| match meaning {
                 Meaning::Light(factors) => self.convert(samples, band, factors[band]),
                 Meaning::Reflectance(factor) => self.convert(samples, band, *factor),
-                Meaning::Between(_) => {
+                Meaning::Between(_, times) => {
                     self.convert(samples, band, 1.0);
                     let Some([white, dark]) = &references else { return };
                     for (at, sample) in samples.iter_mut().enumerate() {
                         let (row, column) = (lines.start + at / self.header.columns, at % self.header.columns);
                         let of = |lines: &[Array2<f32>]| lines[index][(row % lines[index].nrows(), column)];
                         let (white, dark) = (of(white), of(dark));
-                        *sample = if white > dark { (*sample - dark) / (white - dark) } else { f32::NAN };
+                        *sample =
+                            if white > dark { (*sample - dark) / (white - dark) / *times as f32 } else { f32::NAN };
                     }
                 }
             });

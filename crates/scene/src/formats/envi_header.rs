@@ -68,6 +68,8 @@ pub(crate) struct EnviHeader {
     pub(crate) reflectance_scale: Option<f64>,
     /// What radiances are to be divided by.
     pub(crate) radiance_scale: Option<f64>,
+    /// How long the light was gathered, or how much of it: keys with their numbers, which count between a cube and its references.
+    pub(crate) exposures: Vec<(String, f64)>,
     /// `data units`, as written.
     pub(crate) data_units: Option<String>,
     /// What of the header is not used.
@@ -83,7 +85,7 @@ struct Entry {
 }
 
 /// Keys that change nothing of what the numbers are: names, places on the globe, how they were once displayed.
-const HARMLESS: [&str; 38] = [
+const HARMLESS: [&str; 37] = [
     "description",
     "band names",
     "default bands",
@@ -114,7 +116,6 @@ const HARMLESS: [&str; 38] = [
     "z plot titles",
     "errors",
     "fps",
-    "tint",
     "binning",
     "himg",
     "vimg",
@@ -123,6 +124,9 @@ const HARMLESS: [&str; 38] = [
     "camera id",
     "serial number",
 ];
+
+/// Keys of how long the light was gathered, or how much of it.
+const EXPOSURES: [&str; 4] = ["tint", "integration time", "exposure", "exposure time"];
 
 /// Keys that are used. A writer may leave out the spaces in them, or put underscores in their place.
 const USED: [&str; 23] = [
@@ -187,6 +191,7 @@ pub(crate) fn parse(path: &Path, text: &str) -> Result<EnviHeader, SceneError> {
         ignored: entries.number("data ignore value")?,
         reflectance_scale: entries.positive("reflectance scale factor")?,
         radiance_scale: entries.positive("radiance scale factor")?,
+        exposures: entries.exposures(),
         data_units: entries.get("data units").map(|entry| entry.value.trim_matches(['{', '}']).trim().to_owned()),
         note: None,
     };
@@ -251,6 +256,18 @@ impl Entries<'_> {
     fn wrong(&self, key: &str, reason: String) -> SceneError {
         let line = self.list.iter().find(|entry| entry.key == key).map_or(0, |entry| entry.line);
         SceneError::Header { file: self.path.to_owned(), line, key: key.to_owned(), reason }
+    }
+
+    /// Returns how long the light was gathered; what is no number above 0 is left to be named.
+    fn exposures(&mut self) -> Vec<(String, f64)> {
+        let number = |key: &str| {
+            let entry = self.list.iter().find(|entry| entry.key == key)?;
+            let number: f64 = entry.value.trim_matches(['{', '}']).trim().parse().ok()?;
+            (number.is_finite() && number > 0.0).then(|| (key.to_owned(), number))
+        };
+        let found: Vec<(String, f64)> = EXPOSURES.iter().filter_map(|key| number(key)).collect();
+        self.used.extend(found.iter().map(|(key, _)| key.clone()));
+        found
     }
 
     fn number<T: std::str::FromStr>(&mut self, key: &str) -> Result<Option<T>, SceneError> {

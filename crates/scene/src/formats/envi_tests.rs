@@ -112,6 +112,22 @@ fn white_is_reported_by_the_caller_the_header_or_references() {
     let lines = text.replace("lines = 4", "lines = 2").replace("header offset = 5", "header offset = 0");
     write(folder.path(), "white_reference_1", &lines, &[200, 200, 200, 202, 202, 202, 200, 200, 200, 202, 202, 202]);
     assert_eq!(open(&path).unwrap(), referred);
+    // A white of half the time is half as bright; what one of them alone states is named.
+    write(folder.path(), "white_reference_1", &format!("{text}tint = 5\nexposure = 3\n"), &[101; 29]);
+    write(folder.path(), "dark_reference_1", &format!("{text}tint = 10\nzorpal = 1\n"), &[1; 29]);
+    let path = write(folder.path(), "a", &format!("{text}tint = 10\n"), &bytes);
+    let (image, notes) = read_with(&path, &ReadOptions::default()).unwrap();
+    assert_eq!(image, referred);
+    let expected = [
+        "dark_reference_1.hdr: its key 'zorpal' is not used",
+        "white_reference_1.hdr: its tint is 5, that of a.hdr 10: its light is multiplied by 2",
+        "white_reference_1.hdr: its key 'exposure' is not used",
+    ];
+    assert_eq!(notes[..3], expected, "{notes:?}");
+    write(folder.path(), "white_reference_1", &text, &[201; 29]);
+    write(folder.path(), "dark_reference_1", &text, &[1; 29]);
+    let (image, notes) = read_with(&path, &ReadOptions::default()).unwrap();
+    assert_eq!((image, notes[0].as_str()), (referred, "a.hdr: its key 'tint' is not used"));
     let units = write(folder.path(), "c", &format!("{text}data units = W/m^2/sr/nm\n"), &bytes);
     assert_eq!(open(&units).unwrap().quantity(), Quantity::Radiance);
 }

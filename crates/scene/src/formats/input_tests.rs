@@ -216,6 +216,10 @@ fn arrays_of_numpy_are_cubes() {
     let white = Illuminant::D65.white_radiance(scene.radiance.grid(), 1000.0);
     // Row 1, column 2, band 3 is the last of 24 numbers.
     assert_relative_eq!(scene.radiance.spectrum_at(1, 2)[3], 0.23 * white[3], max_relative = 1e-6);
+    // Of light no number is a perfect white.
+    let light = FileReading { quantity: Some(FileQuantity::Radiance), ..reading.clone() };
+    let asked = ReadOptions { reading: light, white_level: Some(2.0), ..usual() };
+    assert!(read_scene(&path, &asked).unwrap_err().to_string().contains("--white-level"));
     let unsaid = FileReading { quantity: None, ..reading };
     let message = read_scene(&path, &ReadOptions { reading: unsaid, ..usual() }).unwrap_err().to_string();
     assert!(message.contains("--quantity"), "{message}");
@@ -264,6 +268,22 @@ fn pages_named_after_wavelengths_are_bands() {
     {
         assert_relative_eq!(*found, code / 65535.0 * white, max_relative = 1e-6);
     }
+}
+
+#[test]
+fn fourth_samples_and_numbers_for_no_data_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("rgbn.tif");
+    let mut file = std::fs::File::create(&path).unwrap();
+    let mut encoder = tiff::encoder::TiffEncoder::new(&mut file).unwrap();
+    let mut page = encoder.new_image::<tiff::encoder::colortype::RGBA8>(3, 2).unwrap();
+    page.encoder().write_tag(tiff::tags::Tag::ExtraSamples, &[0_u16][..]).unwrap();
+    page.encoder().write_tag(tiff::tags::Tag::GdalNodata, "255").unwrap();
+    page.write_data(&[51, 102, 153, 204].repeat(6)).unwrap();
+    drop(file);
+    let notes = read(&path, &usual()).notes;
+    let count = |word: &str| notes.iter().filter(|note| note.contains(word)).count();
+    assert_eq!([count("'sample 4 (ExtraSamples 0)'"), count("opacity"), count("(GDAL) '255'")], [1, 0, 1], "{notes:?}");
 }
 
 #[test]

@@ -313,6 +313,16 @@ pub(crate) fn decode(path: &Path, beside_bytes: u64) -> Result<DynamicImage, Sce
     dioptric_pictures::read_within(path, beside_bytes).map_err(|error| undecodable(path, &error))
 }
 
+/// Returns the largest code that the header of a PNM picture (`.pgm`, `.ppm`) states; `None` of other files.
+pub(super) fn pnm_top(path: &Path) -> Option<u32> {
+    if dioptric_pictures::format_of(path).ok()? != Some(dioptric_pictures::ImageFormat::Pnm) {
+        return None;
+    }
+    let file = std::io::BufReader::new(std::fs::File::open(path).ok()?);
+    let (_, header) = image::codecs::pnm::PnmDecoder::new(file).ok()?.into_inner();
+    Some(header.maximal_sample())
+}
+
 fn undecodable(path: &Path, error: &ImageError) -> SceneError {
     unreadable(path, error.to_string().replace('\n', " "))
 }

@@ -173,20 +173,24 @@ fn of_pfm(path: &Path) -> Result<Contents, SceneError> {
 
 fn of_tiff(path: &Path, options: &ReadOptions) -> Result<Contents, SceneError> {
     match read_tiff(path)? {
-        TiffFile::Picture { notes } => of_picture(path, options, notes),
-        TiffFile::Linear(planes, notes) => Ok(linear(planes, None, notes)),
+        TiffFile::Picture(mut page) => {
+            let no_data = page.no_data.map(|none| none.to_string());
+            page.notes.extend(note_of(path, "number for no data (GDAL)", no_data.as_slice()));
+            of_picture(path, options, page.notes)
+        }
+        TiffFile::Linear(mut planes, page) => {
+            planes.iter_mut().for_each(|plane| page.ignore(plane));
+            Ok(linear(planes, None, page.notes))
+        }
         TiffFile::Stack(mut stack) => {
-            if let Some(none) = stack.no_data.map(|v| v as f32) {
-                let ignore = |v: &mut f32| *v = if *v == none { f32::NAN } else { *v };
-                stack.planes.iter_mut().for_each(|plane| plane.iter_mut().for_each(ignore));
-            }
+            stack.planes.iter_mut().for_each(|plane| stack.page.ignore(plane));
             let cube = Cube {
                 planes: stack.planes,
                 top: stack.top,
                 wavelengths_nm: stack.wavelengths_nm,
                 quantity: None,
                 unit: None,
-                notes: stack.notes,
+                notes: stack.page.notes,
             };
             cube.into_contents(path, options)
         }

@@ -28,14 +28,51 @@ const HARMLESS: [u16; 45] = [
 /// What a TIFF file holds.
 pub(super) enum TiffFile {
     /// One page of gray or of colors in whole numbers, which is a picture.
-    Picture {
-        /// What of it is not used.
-        notes: Vec<String>,
-    },
+    Picture(PageWords),
     /// Linear red, green and blue: a page of floats.
-    Linear([Array2<f32>; 3], Vec<String>),
+    Linear([Array2<f32>; 3], PageWords),
     /// Planes of numbers.
     Stack(TiffStack),
+}
+
+/// What the first page says besides its numbers.
+#[derive(Clone, Debug, Default)]
+pub(super) struct PageWords {
+    /// The number that stands for none.
+    pub(super) no_data: Option<f64>,
+    /// Whether 0 is white, so that decoded samples are counted from there.
+    is_white_zero: bool,
+    /// Its description, where nothing took it.
+    description: Option<String>,
+    /// What of the file is not used.
+    pub(super) notes: Vec<String>,
+}
+
+impl PageWords {
+    /// Makes what stands for no number no number.
+    pub(super) fn ignore(&self, plane: &mut Array2<f32>) {
+        if let Some(none) = self.no_data.map(|v| v as f32) {
+            plane.mapv_inplace(|v| if v == none { f32::NAN } else { v });
+        }
+    }
+
+    /// Returns decoded samples, whose largest is `top`, to the numbers of the file: what stands for none becomes no number.
+    pub(super) fn undo(&self, plane: &mut Array2<f32>, top: f32) {
+        if self.is_white_zero {
+            plane.mapv_inplace(|v| top - v);
+        }
+        self.ignore(plane);
+    }
+
+    /// Returns what of a file of depth is not used, its description among it.
+    pub(super) fn notes_of_depth(&self, path: &Path) -> Vec<String> {
+        let mut notes = self.notes.clone();
+        // Writers put the shape of the array there.
+        let says = |text: &&String| !(text.starts_with("{\"shape\":") || text.starts_with("ImageJ="));
+        let described = self.description.as_ref().filter(says);
+        notes.extend(described.map(|text| format!("{}: its description '{}' is not used", name_of(path), short(text))));
+        notes
+    }
 }
 
 /// The planes of a stack.
@@ -45,9 +82,7 @@ pub(super) struct TiffStack {
     pub(super) wavelengths_nm: Option<Vec<f64>>,
     /// The largest code of whole numbers.
     pub(super) top: Option<f64>,
-    /// The number that stands for none.
-    pub(super) no_data: Option<f64>,
-    pub(super) notes: Vec<String>,
+    pub(super) page: PageWords,
 }
 
 /// Reads a TIFF file; a picture is left to the reader of pictures.
@@ -103,8 +138,10 @@ pub(super) fn read_tiff(path: &Path) -> Result<TiffFile, SceneError> {
         unused.extend((2..=pages.len()).map(|index| index.to_string()));
         notes.extend(note_of(path, "page", &unused));
         let is_float = matches!(first.depth, SampleDepth::Float);
+        let unknown = first.has_unknown_sample.then(|| format!("sample {} (ExtraSamples 0)", first.n_samples));
+        notes.extend(note_of(path, "channel", unknown.as_slice()));
         if !is_float {
-            return Ok(TiffFile::Picture { notes });
+            return Ok(TiffFile::Picture(first.words(notes)));
         }
     } else {
         notes.extend(note_of(path, "page", &unused));
@@ -133,12 +170,15 @@ pub(super) fn read_tiff(path: &Path) -> Result<TiffFile, SceneError> {
     if is_linear {
         if planes.len() == 2 || planes.len() == 4 {
             planes.pop();
-            notes.extend(note_of(path, "channel", &["opacity".to_owned()]));
+            if !first.has_unknown_sample {
+                notes.extend(note_of(path, "channel", &["opacity".to_owned()]));
+            }
         }
+        let words = first.words(notes);
         let mut planes = planes.into_iter();
         return match (planes.next(), planes.next(), planes.next()) {
-            (Some(r), Some(g), Some(b)) => Ok(TiffFile::Linear([r, g, b], notes)),
-            (Some(gray), None, None) => Ok(TiffFile::Linear([gray.clone(), gray.clone(), gray], notes)),
+            (Some(r), Some(g), Some(b)) => Ok(TiffFile::Linear([r, g, b], words)),
+            (Some(gray), None, None) => Ok(TiffFile::Linear([gray.clone(), gray.clone(), gray], words)),
             _ => Err(wrong("its samples are neither gray nor red, green and blue".to_owned())),
         };
     }
@@ -146,8 +186,9 @@ pub(super) fn read_tiff(path: &Path) -> Result<TiffFile, SceneError> {
     if let (None, Some(text)) = (&wavelengths_nm, pages.iter().find_map(|page| page.description.as_ref())) {
         notes.push(format!("{}: its description '{}' is not used", name_of(path), short(text)));
     }
-    let (top, no_data) = (first.top(), first.no_data);
-    Ok(TiffFile::Stack(TiffStack { planes, wavelengths_nm, top, no_data, notes }))
+    // Its description was used or named.
+    let page = PageWords { description: None, ..first.words(notes) };
+    Ok(TiffFile::Stack(TiffStack { planes, wavelengths_nm, top: first.top(), page }))
 }
 
 /// How large the numbers of a page can be.
@@ -173,6 +214,9 @@ struct Page {
     name: Option<String>,
     description: Option<String>,
     no_data: Option<f64>,
+    is_white_zero: bool,
+    /// Whether its last sample is neither a color nor an opacity: it may be a near infrared.
+    has_unknown_sample: bool,
     unknown: Vec<u16>,
 }
 
@@ -185,6 +229,8 @@ impl Page {
         let format = decoder.find_tag_unsigned_vec::<u16>(Tag::SampleFormat)?.and_then(|list| list.first().copied());
         let photometric = decoder.find_tag_unsigned::<u16>(Tag::PhotometricInterpretation)?.unwrap_or(1);
         let kind = decoder.find_tag_unsigned::<u32>(Tag::NewSubfileType)?.unwrap_or(0);
+        let extra = decoder.find_tag_unsigned_vec::<u16>(Tag::ExtraSamples)?.unwrap_or_default();
+        let is_colored = matches!(photometric, 2 | 3 | 6);
         let is_planar = decoder.find_tag_unsigned::<u16>(Tag::PlanarConfiguration)? == Some(2);
         let has_tiles_of_planes =
             is_planar && n_samples > 1 && decoder.find_tag_unsigned::<u32>(Tag::TileWidth)?.is_some();
@@ -203,15 +249,23 @@ impl Page {
                 _ => SampleDepth::Unsigned(bits),
             },
             bits,
-            is_colored: matches!(photometric, 2 | 3 | 6),
+            is_colored,
             has_inks: photometric == 5,
             is_reduced: kind & 1 != 0,
             has_tiles_of_planes,
             name,
             description,
             no_data,
+            // Of several samples none is counted from white.
+            is_white_zero: photometric == 0 && n_samples == 1,
+            has_unknown_sample: n_samples == if is_colored { 4 } else { 2 } && extra == [0],
             unknown,
         })
+    }
+
+    fn words(&self, notes: Vec<String>) -> PageWords {
+        let (no_data, is_white_zero, description) = (self.no_data, self.is_white_zero, self.description.clone());
+        PageWords { no_data, is_white_zero, description, notes }
     }
 
     fn bytes(&self) -> u64 {

@@ -238,7 +238,7 @@ impl Session {
     pub fn save(&mut self, path: &Path) -> Result<(), PipelineError> {
         let text = as_ron(self.camera());
         dioptric_files::write(path, text.as_bytes())?;
-        let before = std::mem::replace(&mut self.document.path, Some(path.to_owned()));
+        let before = self.document.path.replace(path.to_owned());
         self.history.rename(|document| {
             let is_own = document.path == before;
             if is_own {

@@ -4,8 +4,8 @@ use std::{collections::BTreeSet, sync::LazyLock, time::Duration};
 
 use dioptric_pipeline::{
     BlurSpec, CAMERA_SCHEMA, Camera, Crop, Diffraction, DualPixelSpec, FillDepth, FlatSize, FocusSpec, FramesSpec,
-    LensSpec, LightPaths, Photodiodes, RenderEffort, SceneSource, SceneSpec, StopSpec, SurfaceChange, WavelengthSpec,
-    WorldSpec, with_exposure_s,
+    Iris, LensSpec, LightPaths, Photodiodes, RenderEffort, SceneSource, SceneSpec, StopSpec, SurfaceChange,
+    WavelengthSpec, WorldSpec, with_exposure_s,
 };
 use dioptric_scene::{Pattern, Wave};
 use dioptric_sensor::{Brightness, ColorCorrection, LensShading, ToneCurve};
@@ -30,7 +30,7 @@ const PANELS: &[(&str, &[&str])] = &[
     ("focal length", &["LensSpec.Thin", "LensSpec.Thin.focal_length_mm"]),
     ("diameter", &["LensSpec.Thin.diameter_mm", "LensSpec.Pinhole", "LensSpec.Pinhole.diameter_mm"]),
     ("surface", &["LensSpec.Changed", "LensSpec.Changed.surfaces", "SurfaceChange.surface"]),
-    ("curvature", &["SurfaceChange.curvature_per_mm"]),
+    ("curvature", &["SurfaceChange.curvature_per_mm", "Iris.curvature"]),
     ("spacing", &["SurfaceChange.thickness_mm"]),
     ("unknown glass", &["Camera.lens_reading", "LensReadOptions.missing_glass"]),
     ("beyond its table", &["LensReadOptions.glass_range"]),
@@ -38,22 +38,15 @@ const PANELS: &[(&str, &[&str])] = &[
     ("catalogues", &["LensReadOptions.glasses"]),
     ("index slope", &["LensReadOptions.slope_per_nm"]),
     ("lens scale", &["LensReadOptions.lens_scale"]),
-    (
-        "coating",
-        &[
-            "LensReadOptions.coating",
-            "CoatingSpec.Bare",
-            "CoatingSpec.MgF2",
-            "CoatingSpec.VCoat",
-            "CoatingSpec.Bbar",
-            "CoatingSpec.Ideal",
-        ],
-    ),
+    ("coating", &["LensReadOptions.coating"]),
     ("coating file", &["CoatingSpec.File"]),
     ("seq numbers", &["LensReadOptions.seq_numbers"]),
     ("stop", &["Camera.stop"]),
     ("f-number", &["StopSpec.FNumber"]),
     ("diameter of stop", &["StopSpec.DiameterMm"]),
+    ("iris", &["Camera.iris"]),
+    ("blades", &["Iris.blades"]),
+    ("rotation", &["Iris.rotation_deg"]),
     ("tilt", &["Camera.movements", "Movements.tilt_deg"]),
     ("swing", &["Movements.swing_deg"]),
     ("rise", &["Movements.rise_mm"]),
@@ -277,6 +270,7 @@ fn cameras() -> Vec<Camera> {
             camera.lens = LensSpec::File("none.zmx".into());
             camera.lens_reading.slope_per_nm = Some(-1e-4);
             camera.lens_reading.lens_scale = Some(2.0);
+            camera.iris = Some(Iris { blades: 6, rotation_deg: 10.0, curvature: 0.5 });
             camera.frames = FramesSpec::Interleaved { ratio: 8.0, period_rows: 2, gain_ratio: 1.0 };
         }),
         world(RenderEffort::Samples(8)),

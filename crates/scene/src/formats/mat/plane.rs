@@ -6,7 +6,7 @@ use ndarray::Array2;
 
 use super::{
     super::{stated::note_of, unusable::unreadable},
-    container::MatFile,
+    container::{MatFile, WHOLE},
     elements::Listed,
     packing::{Packing, length_m},
 };
@@ -70,7 +70,9 @@ pub(in super::super) fn read_plane(path: &Path, told: Option<&str>) -> Result<Pl
     let packing = Packing::of(file.attributes_of(&chosen.name));
     let unit_m = packing.unit.as_deref().and_then(length_m);
     let mut notes: Vec<String> = note_of(path, "array", &others).into_iter().collect();
-    notes.extend(note_of(path, "attribute", &packing.left(unit_m.is_some(), false)));
+    let of_file = file.attributes_of(WHOLE).iter().map(|own| own.name.clone());
+    let left = packing.left(unit_m.is_some(), false);
+    notes.extend(note_of(path, "attribute", &of_file.chain(left).collect::<Vec<_>>()));
     Ok(Plane {
         name: chosen.name.clone(),
         values: Array2::from_shape_fn((rows, columns), |place| packing.unpacked(numbers.at(at(place))) as f32),

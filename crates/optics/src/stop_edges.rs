@@ -2,8 +2,7 @@
 
 use glam::DVec2;
 
-use super::Aperture;
-use crate::MonoLens;
+use crate::{Aperture, MonoLens};
 
 /// The edges of a stop that is not round: of its rim, of its openings and of what stands before it.
 #[derive(Clone, Debug, PartialEq)]
@@ -39,7 +38,7 @@ impl StopEdges {
         let has_iris = self.apertures.iter().any(Aperture::is_iris);
         let of_rim = (self.rim_mm - at_mm.length(), at_mm.normalize_or(DVec2::X));
         let of_apertures = self.apertures.iter().map(|aperture| {
-            let found = aperture.outline.nearest_edge(aperture.from_center_mm(at_mm.x, at_mm.y));
+            let found = aperture.outline.nearest_edge(aperture.off_center_mm(at_mm.x, at_mm.y));
             (found.clearance_mm.abs(), found.direction)
         });
         let first = if has_iris { (f64::INFINITY, DVec2::X) } else { of_rim };
@@ -58,7 +57,7 @@ impl StopEdges {
         let of_apertures = self
             .apertures
             .iter()
-            .map(|aperture| aperture.outline.edge_along_mm(aperture.from_center_mm(at_mm.x, at_mm.y), direction));
+            .map(|aperture| aperture.outline.edge_along_mm(aperture.off_center_mm(at_mm.x, at_mm.y), direction));
         of_apertures.fold(of_rim, f64::min)
     }
 }
