@@ -8,9 +8,10 @@ use dioptric_backward::{
 };
 use dioptric_spectrum::{Cancel, SpectralImage, WavelengthGrid};
 use dioptric_world::{
-    CameraKind, Emission, Light, Material, Relief, Shape, SpectralCurve, Texture, TextureId, TriangleMesh, World,
-    WorldBuilder,
+    CameraKind, Emission, Light, Material, ReadOptions, Relief, Shape, SpectralCurve, Texture, TextureId, TriangleMesh,
+    World, WorldBuilder,
     glam::{DAffine3, DVec2, DVec3, Vec3},
+    read_world,
 };
 
 fn pinhole(columns: usize, rows: usize, half_tan: f64) -> Pinhole {
@@ -223,4 +224,41 @@ fn empty_and_dark_worlds_are_black() {
     assert!(
         gathered_view(&dark, &pinhole(0, 3, 0.5), &grid(1), (ViewDetail::Fine, 1), &|_| {}, &Cancel::new()).is_err()
     );
+}
+
+/// Prints how far gathered views are from paths, and from those of another seed, in parts of full scale (4 × mean).
+#[test]
+#[ignore = "takes minutes: makes the table of docs/backward.md"]
+fn errors_of_gathered_views() {
+    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/worlds/room.pbrt");
+    let room = read_world(file.as_ref(), &ReadOptions::default(), &Cancel::new()).unwrap();
+    let still_life = World::still_life();
+    for (name, world, view, n_bands, n_passes) in [
+        ("room.pbrt", &room, pinhole(180, 120, 1.0), 5, 6),
+        ("still life", &still_life, pinhole(360, 240, 0.3057), 8, 2),
+    ] {
+        let placement = Placement { world_from_camera: world.cameras()[0].world_from_camera };
+        let (view, bands) = (Pinhole { placement, ..view }, grid(n_bands));
+        let expected = paths(world, view, &bands, n_passes);
+        for detail in [ViewDetail::Fine, ViewDetail::Quick] {
+            let [found, other] = [1, 2].map(|seed| {
+                gathered_view(world, &view, &bands, (detail, seed), &|_| {}, &Cancel::new()).expect("a view").radiance
+            });
+            let (mean, block) = differences(&found, &expected, 6);
+            let [from_paths, of_seeds] = [&expected, &other].map(|other| rms_of_full_scale(&found, other));
+            println!("{name} {detail:?}: mean {mean:.4}, blocks {block:.4}, rms {from_paths:.4}, seeds {of_seeds:.4}");
+        }
+    }
+}
+
+fn rms_of_full_scale(found: &SpectralImage, expected: &SpectralImage) -> f64 {
+    let (mut sum, mut n) = (0.0, 0.0);
+    for (found, expected) in found.planes().iter().zip(expected.planes()) {
+        let full = 4.0 * expected.mean().expect("pixels");
+        for (a, b) in found.iter().zip(expected) {
+            sum += f64::from((a / full).min(1.0) - (b / full).min(1.0)).powi(2);
+            n += 1.0;
+        }
+    }
+    f64::sqrt(sum / n)
 }

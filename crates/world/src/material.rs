@@ -283,6 +283,15 @@ pub(crate) struct Surfaces<'a> {
 }
 
 impl Surfaces<'_> {
+    /// Whether a material may mirror light or let it through without any spread, wherever it is met.
+    pub(crate) fn may_mirror(self, material: MaterialId) -> bool {
+        match &self.surfaces[material.0 as usize].material {
+            Material::Matte { .. } | Material::RoughMatte { .. } | Material::Translucent { .. } => false,
+            Material::Sum { of } | Material::Blend { of, .. } => of.iter().any(|&part| self.may_mirror(part)),
+            _ => true,
+        }
+    }
+
     /// Returns the scattering function at a hit.
     pub(crate) fn bsdf<const N: usize>(
         self,

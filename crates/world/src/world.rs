@@ -166,6 +166,11 @@ impl World {
         self.asked().bsdf(hit, &self.point_of(hit), outgoing, wavelengths_nm)
     }
 
+    /// Whether the surface at a hit may have [mirrors](Bsdf::mirrors): quicker than its scattering function.
+    pub fn may_mirror(&self, hit: &Hit) -> bool {
+        self.asked().may_mirror(hit.material)
+    }
+
     /// Returns the share of light that is left after the way along a ray to this hit, where the shape that it lies on is
     /// filled with an absorbing medium and was met from within; `None` for all of it.
     pub fn transmittance<const N: usize>(&self, hit: &Hit, ray: &Ray, wavelengths_nm: &[f32; N]) -> Option<[f32; N]> {

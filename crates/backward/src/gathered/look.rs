@@ -19,10 +19,8 @@ pub(super) struct Look<const N: usize> {
     pub(super) guide: Guide,
     /// What is scattered evenly of light on the surface, by way of the mirrors before it.
     pub(super) reflectance: [f32; N],
-    /// What is left of light on its way over the mirrors before the surface.
-    pub(super) through: [f32; N],
-    /// What glows, seen directly or by mirrors.
-    pub(super) own: [f32; N],
+    /// What glows, seen directly or by mirrors: of few looks anything.
+    pub(super) own: Option<Box<[f32; N]>>,
     /// Where light is to be gathered; taken from corners once it has been.
     pub(super) surface: Option<Box<LitSurface<N>>>,
     /// Whether there is a surface that light falls on, and whether it has gloss or mirrors.
@@ -64,9 +62,11 @@ impl<const N: usize> Gatherer<'_, N> {
     pub(super) fn look(&self, ray: Ray, pitch: f32) -> Look<N> {
         let mut look = Look::nothing();
         let (mut ray, mut gone_m, mut key, mut mirrored) = (ray, 0.0, 0, Vec::new());
+        // What is left of light on its way over the mirrors before the surface.
+        let mut through = [1.0; N];
         for _ in 0..MOST_MIRRORS {
             let Some(mut hit) = self.world.intersect(&ray, f32::INFINITY) else {
-                look.add(&self.world.sky(ray.direction, self.wavelengths_nm));
+                look.add(&through, &self.world.sky(ray.direction, self.wavelengths_nm));
                 return look;
             };
             gone_m += hit.distance_m;
@@ -75,7 +75,7 @@ impl<const N: usize> Gatherer<'_, N> {
             if look.first.is_none() {
                 look.first = Some(First { key, point: hit.point, normal: hit.geometric_normal });
             }
-            look.add(&self.world.emission(&hit, -ray.direction, self.wavelengths_nm));
+            look.add(&through, &self.world.emission(&hit, -ray.direction, self.wavelengths_nm));
             let bsdf = self.world.bsdf(&hit, -ray.direction, self.wavelengths_nm);
             let mut mirrors = bsdf.mirrors();
             let reflectance = bsdf.diffuse_reflectance();
@@ -86,11 +86,10 @@ impl<const N: usize> Gatherer<'_, N> {
             let brightest = (0..mirrors.len()).max_by(|&a, &b| mean(&mirrors[a].1).total_cmp(&mean(&mirrors[b].1)));
             let next = brightest.filter(|_| goes_on).map(|index| mirrors.swap_remove(index));
             for (direction, value) in mirrors {
-                let value: [f32; N] = lanes(|lane| value[lane] * look.through[lane]);
+                let value: [f32; N] = lanes(|lane| value[lane] * through[lane]);
                 if mean(&value) > LEAST_MIRRORED {
                     let ray = hit.ray_towards(direction);
-                    let seen = self.glow(ray, DEEP);
-                    (0..N).for_each(|lane| look.own[lane] += value[lane] * seen[lane]);
+                    look.add(&value, &self.glow(ray, DEEP));
                     mirrored.push((ray, value));
                 }
             }
@@ -99,16 +98,15 @@ impl<const N: usize> Gatherer<'_, N> {
             let Some((direction, value)) = next else {
                 look.guide = Guide { key, point: hit.point, normal, width_m };
                 if !goes_on || !mirrored.is_empty() {
-                    (0..N).for_each(|lane| look.reflectance[lane] = reflectance[lane] * look.through[lane]);
-                    let through = look.through;
+                    (0..N).for_each(|lane| look.reflectance[lane] = reflectance[lane] * through[lane]);
                     let surface = LitSurface { hit, bsdf, normal, gloss, is_diffuse, mirrored, through };
                     (look.is_lit, look.has_gloss) = (true, surface.has_gloss());
                     look.surface = Some(Box::new(surface));
                 }
                 return look;
             };
-            (0..N).for_each(|lane| look.through[lane] *= value[lane]);
-            if mean(&look.through) < LEAST_MIRRORED {
+            (0..N).for_each(|lane| through[lane] *= value[lane]);
+            if mean(&through) < LEAST_MIRRORED {
                 look.guide = Guide { key, point: hit.point, normal, width_m };
                 return look;
             }
@@ -172,6 +170,9 @@ impl<const N: usize> Gatherer<'_, N> {
     /// Returns the mirrors of a surface that is seen in another: of glass and coats seen so, those that send on much alone.
     fn mirrors_of(&self, hit: &Hit, outgoing: Vec3) -> Vec<(Vec3, [f32; N])> {
         const LEAST: f32 = 0.1;
+        if !self.world.may_mirror(hit) {
+            return Vec::new();
+        }
         let mut mirrors = self.world.bsdf(hit, outgoing, self.wavelengths_nm).mirrors();
         mirrors.retain(|(_, value)| mean(value) > LEAST);
         mirrors
@@ -185,8 +186,7 @@ impl<const N: usize> Look<N> {
             first: None,
             guide: Guide::NOTHING,
             reflectance: [0.0; N],
-            through: [1.0; N],
-            own: [0.0; N],
+            own: None,
             surface: None,
             is_lit: false,
             has_gloss: false,
@@ -194,18 +194,29 @@ impl<const N: usize> Look<N> {
         }
     }
 
-    fn add(&mut self, radiance: &[f32; N]) {
-        (0..N).for_each(|lane| self.own[lane] += self.through[lane] * radiance[lane]);
+    /// Adds what glows, of which a mirror sends so much on.
+    fn add(&mut self, share: &[f32; N], radiance: &[f32; N]) {
+        if radiance.iter().any(|&value| value != 0.0) {
+            let own = self.own.get_or_insert_with(|| Box::new([0.0; N]));
+            (0..N).for_each(|lane| own[lane] += share[lane] * radiance[lane]);
+        }
     }
 
     /// Tells whether two looks differ by less than a step: in reflectance, and in what glows as a fraction of `bright`.
     pub(super) fn is_like(&self, other: &Self, step: f32, bright: f32) -> bool {
         const LEAST_COSINE: f32 = 0.97;
         let steps = |a: &[f32; N], b: &[f32; N], most: f32| a.iter().zip(b).all(|(a, b)| (a - b).abs() < most);
+        let glows = || match (&self.own, &other.own) {
+            (None, None) => true,
+            (own, of_other) => {
+                let [own, of_other] = [own, of_other].map(|own| own.as_deref().copied().unwrap_or([0.0; N]));
+                steps(&own, &of_other, step * bright)
+            }
+        };
         self.guide.key == other.guide.key
             && self.guide.normal.dot(other.guide.normal) > LEAST_COSINE
             && steps(&self.reflectance, &other.reflectance, step)
-            && steps(&self.own, &other.own, step * bright)
+            && glows()
     }
 }
 

@@ -48,8 +48,8 @@ impl ViewDetail {
             Self::Fine => Effort {
                 lattices: [
                     (1, Passes { steps: &[1, 2, 4, 8], keeps_edges_from: 4 }),
-                    (1, Passes::by_surface(&[1, 2, 4])),
-                    (2, Passes::by_surface(&[1, 2, 4, 8])),
+                    (1, Passes { steps: &[1, 2, 4, 8], keeps_edges_from: 8 }),
+                    (2, Passes { steps: &[1, 2, 4, 8, 16], keeps_edges_from: 8 }),
                 ],
                 within: [(0, 0.0), (2, 0.3), (12, 0.0734), (12, 0.0734)],
             },
@@ -115,6 +115,8 @@ pub(super) struct Painter<'a, const N: usize> {
 /// Steps of reflectance between corners of a pixel: finer textures than its own would show as waves where they were left out.
 const SAME: f32 = 0.004;
 const MUCH_THE_SAME: f32 = 0.12;
+/// Looks within a pixel stand closer than its corners: patterns are blurred by this part of what is blurred there.
+const WITHIN: f64 = 0.5;
 /// Places each way that the mean radiance is measured at.
 const METER: u32 = 16;
 /// How much brighter than the mean what one path finds may be.
@@ -179,14 +181,14 @@ impl<'a, const N: usize> Painter<'a, N> {
         }
     }
 
-    /// Looks at a place of the picture, counted in pixels from the middle of the first.
-    fn look(&self, row: f64, column: f64) -> Look<N> {
+    /// Looks at a place of the picture, counted in pixels from the middle of the first; patterns are blurred by a part of a pixel.
+    fn look(&self, (row, column): (f64, f64), blur: f64) -> Look<N> {
         let [x, y, ..] = self.view.pixels.crop;
         let share = [
             (x as f64 + column + 0.5) / self.view.pixels.columns as f64,
             (y as f64 + row + 0.5) / self.view.pixels.rows as f64,
         ];
-        let seen = self.behind(self.view.ray_at(share)).map(|ray| self.gatherer.look(ray, self.pitch as f32));
+        let seen = self.behind(self.view.ray_at(share)).map(|ray| self.gatherer.look(ray, (blur * self.pitch) as f32));
         Look { seen_at: (row, column), ..seen.unwrap_or_else(Look::nothing) }
     }
 
@@ -203,7 +205,7 @@ impl<'a, const N: usize> Painter<'a, N> {
             depths: z_m.as_slice_mut().expect("a new plane is in standard order").chunks_exact_mut(columns).collect(),
         };
         // Enough for no thread to wait for long.
-        let n_at_once = 48.max(8 * rayon::current_num_threads());
+        let n_at_once = 16.max(8 * rayon::current_num_threads());
         let after = |row: usize| row..(row + n_at_once).min(rows + 1);
         let mut next = after(0);
         let mut drawn = self.corners(next.clone())?;
@@ -237,7 +239,7 @@ impl<'a, const N: usize> Painter<'a, N> {
         let mut surfaces = Vec::with_capacity(n);
         for column in 0..n {
             self.cancel.check()?;
-            let mut look = self.look(row as f64 - 0.5, column as f64 - 0.5);
+            let mut look = self.look((row as f64 - 0.5, column as f64 - 0.5), 1.0);
             surfaces.push(look.surface.take());
             corners.looks.push(look);
         }
@@ -308,7 +310,7 @@ impl<'a, const N: usize> Painter<'a, N> {
             let (n_within, share) = self.effort.within[differs];
             let within: Vec<Look<N>> = POINTS[..n_within]
                 .iter()
-                .map(|(down, right)| self.look(row as f64 + down, column as f64 + right))
+                .map(|(down, right)| self.look((row as f64 + down, column as f64 + right), WITHIN))
                 .collect();
             let of_corner = 0.25 * (1.0 - n_within as f32 * share);
             let all = looks.into_iter().map(|look| (look, of_corner)).chain(within.iter().map(|look| (look, share)));
@@ -329,7 +331,9 @@ impl<'a, const N: usize> Painter<'a, N> {
         let mut spectrum = [0.0; N];
         let mut parts: Vec<Part<'b, N>> = Vec::with_capacity(4);
         for (look, share) in looks {
-            (0..N).for_each(|lane| spectrum[lane] += share * look.own[lane]);
+            if let Some(own) = &look.own {
+                (0..N).for_each(|lane| spectrum[lane] += share * own[lane]);
+            }
             if !look.is_lit {
                 continue;
             }
@@ -351,7 +355,7 @@ impl<'a, const N: usize> Painter<'a, N> {
                 [between(DIRECT), if share > 0.0 { between(GLOSS) } else { Some([0.0; N]) }, between(BOUNCED)];
             if found.iter().any(Option::is_none) {
                 // Too small to have been met by enough samples: its light is gathered for this pixel alone.
-                let again = self.look(look.seen_at.0, look.seen_at.1);
+                let again = self.look(look.seen_at, WITHIN);
                 if let Some(surface) = again.surface.as_deref() {
                     let (at, rays) = ((row, column), RAYS.where_alike(0.0));
                     let direct = self.gatherer.direct(surface, at, rays);
