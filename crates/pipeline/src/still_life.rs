@@ -203,8 +203,10 @@ mod tests {
             let (mut squares, mut n) = (0.0, 0.0);
             for (few, all) in quick.radiance.planes().iter().zip(whole.radiance.planes()) {
                 let mean = |plane: &ndarray::Array2<f32>| f64::from(plane.mean().unwrap());
-                // A highlight is seen or missed.
-                assert!((mean(few) / mean(all) - 1.0).abs() < 0.04 || rows == 1, "{fov_deg}°");
+                // What is brighter than a picture shows is left out: a highlight is seen or missed.
+                let full = 4.0 * mean(all);
+                let shown = |plane: &ndarray::Array2<f32>| plane.iter().map(|v| f64::from(*v).min(full)).sum::<f64>();
+                assert!((shown(few) / shown(all) - 1.0).abs() < 0.02 || rows == 1, "{fov_deg}°");
                 for (few, all) in few.iter().zip(all) {
                     let [few, all] = [few, all]
                         .map(|v| (f64::from(*v) / (4.0 * mean(whole.radiance.planes().first().unwrap()))).min(1.0));

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use glam::{DAffine3, DVec3, Vec3};
 
-use crate::{InstanceId, PatternPoint, ShapeId, Texture, mesh::normal_matrix};
+use crate::{InstanceId, PatternPoint, ShapeId, mesh::normal_matrix};
 
 /// Where the groups of a world stand.
 pub(crate) trait Frames {
@@ -48,8 +48,7 @@ pub(crate) struct OwnFrame<'a> {
 }
 
 impl Patterned {
-    pub(crate) fn of(textures: &[Texture], places: impl Iterator<Item = DAffine3>, things: &[Vec<ShapeId>]) -> Self {
-        let has_patterns = textures.iter().any(|texture| matches!(texture, Texture::Pattern { .. }));
+    pub(crate) fn of(has_patterns: bool, places: impl Iterator<Item = DAffine3>, things: &[Vec<ShapeId>]) -> Self {
         let places = places.filter(|_| has_patterns).map(ShapePlace::new).collect();
         let parts =
             |(thing, shapes): (usize, &Vec<ShapeId>)| shapes.iter().map(|&shape| (shape, thing)).collect::<Vec<_>>();

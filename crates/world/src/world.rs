@@ -721,7 +721,8 @@ impl WorldBuilder {
     pub fn build(mut self) -> Result<World, WorldError> {
         self.check()?;
         let (up, is_left_handed) = self.convention();
-        let patterned = Patterned::of(&self.textures, self.shapes.iter().map(|s| s.place), &self.things);
+        let has_patterns = self.textures.iter().any(|texture| matches!(texture, Texture::Pattern { .. }));
+        let patterned = Patterned::of(has_patterns, self.shapes.iter().map(|s| s.place), &self.things);
         let Self { shapes, n_groups, instances, surfaces, textures, lights, cameras, .. } = self;
         let (notes, sources) = (self.notes.sentences(), self.sources);
         let mut placed: Vec<PlacedShape> = shapes.into_iter().map(NewShape::placed).collect();
