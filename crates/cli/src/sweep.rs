@@ -61,6 +61,18 @@ enum SweepCommand {
         #[arg(long, value_name = "DIR")]
         store: Option<PathBuf>,
     },
+    /// Removes the items that no plan given asks for: of plans as they were before
+    Prune {
+        /// The plan files that share the store
+        #[arg(required = true)]
+        plans: Vec<PathBuf>,
+        /// Folder that keeps the results [default: that of the first plan's name, ending in .store]
+        #[arg(long, value_name = "DIR")]
+        store: Option<PathBuf>,
+        /// Counts the items, and removes none
+        #[arg(long)]
+        dry_run: bool,
+    },
     /// Packs the finished items into archives
     Pack {
         /// The plan file
@@ -83,6 +95,7 @@ pub(crate) fn run(arguments: &SweepArgs, common: &Common) -> anyhow::Result<()> 
     }
     match &arguments.command {
         Some(SweepCommand::Index { plan, store }) => index(plan, store.as_deref(), common),
+        Some(SweepCommand::Prune { plans, store, dry_run }) => prune(plans, store.as_deref(), *dry_run, common),
         Some(SweepCommand::Pack { plan, store, webdataset, items_per_tar }) => {
             let (sweep, store) = open(plan, store.as_deref())?;
             let archives = sweep.pack(&store, webdataset, items_per_tar.map(|n| n as usize))?;
@@ -124,13 +137,22 @@ fn make(plan: &Path, arguments: &SweepArgs, common: &Common) -> anyhow::Result<(
     if has_index {
         Index::of(&sweep, &store).write()?;
     }
+    let others = if shard.is_part() { Vec::new() } else { store.others([&sweep])? };
     if common.json {
         print_json(&json!({
             "there": made.n_there, "done": made.n_done, "refused": made.n_refused, "failed": made.n_failed,
-            "left": made.n_left, "store": store.folder(),
+            "left": made.n_left, "others": others.len(), "store": store.folder(),
         }))?;
     } else if !common.quiet {
         tell_made(&made, plan, &store, has_index)?;
+        if !others.is_empty() {
+            print(&format!(
+                "{} more in the store are of no item of this plan as it is now; of no other plan either? \
+                 dioptric sweep prune {}\n",
+                others.len(),
+                plan.display()
+            ))?;
+        }
     }
     match made.first_failure {
         Some(reason) => bail!(
@@ -163,6 +185,27 @@ fn count(sweep: &Sweep, store: &Store, shard: Shard, common: &Common) -> anyhow:
     print(&format!(
         "{n_items} items of {n_irradiances} irradiances: {done} are done, {refused} refused, {missing} missing\n"
     ))
+}
+
+fn prune(plans: &[PathBuf], store: Option<&Path>, dry_run: bool, common: &Common) -> anyhow::Result<()> {
+    let folder = store.map_or_else(|| plans[0].with_extension("store"), Path::to_owned);
+    if !folder.is_dir() {
+        bail!("{} is no folder, expected the store of {}", folder.display(), plans[0].display());
+    }
+    let store = Store::new(&folder);
+    let sweeps = plans.iter().map(|plan| Sweep::read(plan)).collect::<Result<Vec<_>, _>>()?;
+    let others = store.others(&sweeps)?;
+    if dry_run {
+        return match common.json {
+            true => print_json(&json!({ "others": others.len(), "removed": 0 })),
+            false => print(&format!("{} items are of none of the plans\n", others.len())),
+        };
+    }
+    let pruned = store.prune(&others)?;
+    if common.json {
+        return print_json(&json!({ "others": others.len(), "removed": pruned.n_items, "bytes": pruned.bytes }));
+    }
+    print(&format!("removed {} items, {:.1} MB\n", pruned.n_items, pruned.bytes as f64 / 1e6))
 }
 
 fn index(plan: &Path, store: Option<&Path>, common: &Common) -> anyhow::Result<()> {

@@ -54,6 +54,74 @@ fn a_sweep_fills_its_store() {
     assert!(folder.path().join("out.tar").is_file());
 }
 
+/// A plan that was changed leaves the items it had before, says so, and has them removed.
+#[test]
+fn a_changed_plan_is_told_and_pruned() {
+    let folder = tempfile::tempdir().unwrap();
+    let put = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
+    put("camera.ron", CAMERA);
+    put("plan.ron", PLAN);
+    let made = |plan: &str| json(folder.path(), &["sweep", plan, "--store", "s", "--json"]);
+    assert_eq!((&made("plan.ron")["done"], &made("plan.ron")["others"]), (&json!(2), &json!(0)));
+    put("other.ron", &PLAN.replace("0.01, 0.02", "0.02, 0.04, 0.08"));
+    let changed = made("other.ron");
+    assert_eq!((&changed["there"], &changed["done"], &changed["others"]), (&json!(1), &json!(2), &json!(1)));
+    let told = output(folder.path(), &["sweep", "other.ron", "--store", "s"]);
+    assert!(told.contains("1 more in the store") && told.contains("sweep prune other.ron"), "{told}");
+
+    let prune = |arguments: &[&str]| json(folder.path(), &[&["sweep", "prune"], arguments, &["--json"]].concat());
+    assert_eq!(prune(&["plan.ron", "other.ron", "--store", "s"]), json!({"others": 0, "removed": 0, "bytes": 0}));
+    assert_eq!(prune(&["other.ron", "--store", "s", "--dry-run"]), json!({"others": 1, "removed": 0}));
+    let pruned = prune(&["other.ron", "--store", "s"]);
+    assert!(pruned["removed"] == json!(1) && pruned["bytes"].as_u64().unwrap() > 1000, "{pruned}");
+    assert_eq!((&made("other.ron")["there"], &made("plan.ron")["done"]), (&json!(3), &json!(1)));
+    check_error(folder.path(), &["sweep", "prune", "plan.ron"], &["plan.store", "no folder"]);
+    assert!(
+        fs::read_dir(folder.path().join("s")).unwrap().all(|e| !e
+            .unwrap()
+            .file_name()
+            .to_string_lossy()
+            .starts_with(".tmp"))
+    );
+}
+
+/// A tiny item with its picture alone takes 2 kB; the index has the metrics all the same.
+#[test]
+fn what_is_kept_of_an_item_is_chosen() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("camera.ron"), CAMERA).unwrap();
+    let lines = |keep: &str, store: &str| {
+        let plan = PLAN.replacen("(base", &format!("({keep}base"), 1);
+        fs::write(folder.path().join("plan.ron"), plan).unwrap();
+        output(folder.path(), &["sweep", "plan.ron", "--store", store, "--quiet"]);
+        let text = fs::read_to_string(folder.path().join(store).join("index.jsonl")).unwrap();
+        text.lines().map(|line| serde_json::from_str(line).unwrap()).collect::<Vec<Value>>()
+    };
+    let all = lines("", "all");
+    for (keep, files_of, page) in [
+        ("keep: [Picture], ", &["metrics.json", "picture.png"][..], "\"small\":\"picture.png\""),
+        ("keep: [Report, Thumbnail], ", &["report.json", "thumbnail.png"], "\"large\":\"thumbnail.png\""),
+        ("keep: [], ", &["metrics.json"], "\"small\":null"),
+    ] {
+        let store = keep.replace([' ', ':', '[', ']', ','], "");
+        let some = lines(keep, &store);
+        for (all, some) in all.iter().zip(&some) {
+            assert!(all["metrics"] == some["metrics"] && all["id"] != some["id"], "{keep}");
+            let id = some["id"].as_str().unwrap();
+            let kept = files(&folder.path().join(&store).join("items").join(&id[..2]).join(id));
+            assert_eq!(kept.keys().collect::<Vec<_>>(), files_of.iter().map(Path::new).collect::<Vec<_>>());
+            if !files_of.contains(&"report.json") {
+                assert!(
+                    kept["metrics.json".as_ref() as &Path].len() < 1050,
+                    "{}",
+                    kept["metrics.json".as_ref() as &Path].len()
+                );
+            }
+        }
+        assert!(fs::read_to_string(folder.path().join(&store).join("index.html")).unwrap().contains(page), "{keep}");
+    }
+}
+
 #[test]
 fn plans_to_begin_with_are_plans() {
     let folder = tempfile::tempdir().unwrap();

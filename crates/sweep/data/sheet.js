@@ -205,14 +205,19 @@ const figure = (item) => {
   const own = document.createElement("figure");
   own.id = "item-" + item.n;
   const link = document.createElement("a");
-  if (item.status === "done") {
-    link.href = item.place + "/picture.png";
+  if (item.status === "done" && sheet.small) {
+    link.href = item.place + "/" + sheet.large;
     const picture = document.createElement("img");
-    [picture.loading, picture.alt, picture.src] = ["lazy", "item " + item.n, item.place + "/" + sheet.thumbnail];
+    [picture.loading, picture.alt, picture.src] = ["lazy", "item " + item.n, item.place + "/" + sheet.small];
     link.append(picture);
+    link.addEventListener("click", (event) => {
+      if (event.ctrlKey || event.metaKey || event.shiftKey) return;
+      event.preventDefault();
+      enlarge(item);
+    });
   } else {
     const text = document.createElement("p");
-    text.textContent = item.status === "refused" ? "refused: " + item.reason : "missing";
+    text.textContent = item.status === "refused" ? "refused: " + item.reason : item.status === "done" ? "no picture kept" : "missing";
     link.append(text);
   }
   const below = document.createElement("figcaption");
@@ -223,6 +228,29 @@ const figure = (item) => {
   own.append(link, below);
   return own;
 };
+// A picture by itself: a click shows it as large as the window or pixel by pixel, the arrow keys go to the next.
+const large = element("large");
+let enlarged;
+const enlarge = (item) => {
+  enlarged = item;
+  const picture = large.querySelector("img");
+  [picture.src, picture.alt] = [item.place + "/" + sheet.large, "item " + item.n];
+  large.querySelector("p").textContent = [item.n, ...caption(item)].join(" · ");
+  if (!large.open) large.showModal();
+};
+const step = (by) => {
+  const pictures = listed.filter((item) => item.status === "done");
+  const next = pictures[pictures.indexOf(enlarged) + by];
+  if (next) enlarge(next);
+};
+large.addEventListener("keydown", (event) => {
+  const by = { ArrowLeft: -1, ArrowUp: -1, ArrowRight: 1, ArrowDown: 1 }[event.key];
+  if (by) { event.preventDefault(); step(by); }
+});
+large.addEventListener("click", (event) => {
+  if (event.target === large) large.close();
+  if (event.target.tagName === "IMG") large.classList.toggle("pixels");
+});
 const more = () => {
   const next = listed.slice(n_shown, n_shown + PAGE);
   element("pictures").append(...next.map(figure));

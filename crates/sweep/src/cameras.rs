@@ -67,7 +67,7 @@ impl Cameras {
 
     /// Returns the names of an item and of what it shares with others.
     pub(crate) fn key(&self, camera: &Camera) -> Result<ItemKey, SweepError> {
-        ItemKey::of(camera, &self.still, &self.inputs)
+        Ok(ItemKey::of(camera, &self.still, &self.inputs)?.keeping(&self.plan.keep))
     }
 
     /// Returns the base with some of the keys set.

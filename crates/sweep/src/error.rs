@@ -59,6 +59,14 @@ pub enum SweepError {
         /// What was found.
         found: String,
     },
+    /// A store in which items are being made, or that an older system left without locks.
+    #[error("a sweep is making items in {}: {} is in use; prune the store when it has ended", store.display(), by.display())]
+    Busy {
+        /// The store.
+        store: PathBuf,
+        /// What is in use.
+        by: PathBuf,
+    },
     /// An item that has another name here than where the plan was drawn up.
     #[error(
         "item {item} is called {found} here and {expected} where the plan was drawn up: its files, or the versions of dioptric, differ"

@@ -1,14 +1,14 @@
 //! What came of all items of a plan.
 
-use std::{fs, path::Path};
+use std::fs;
 
 use dioptric_pipeline::PipelineError;
 use rayon::prelude::*;
 
 use crate::{
     ItemId, Status, Store, Sweep, SweepError, Value,
-    item::{REFUSED, Refusal},
-    metrics::{Metrics, metrics},
+    item::{REFUSED, Refusal, read_metrics},
+    metrics::Metrics,
 };
 
 /// So many items are read at a time, by all threads.
@@ -71,22 +71,15 @@ impl IndexRow {
         let id = sweep.id(item);
         let status = store.status(id);
         let folder = store.item(id);
-        let read = |name: &str| {
-            let path = folder.join(name);
-            fs::read(&path).map(|bytes| (bytes, path.clone())).map_err(SweepError::reading(&path))
-        };
-        let wrong = |path: &Path, error: serde_json::Error| {
-            SweepError::Pipeline(PipelineError::Read { path: path.to_owned(), reason: error.to_string() })
-        };
         let (mut reason, mut numbers) = (None, Metrics::new());
         match status {
-            Status::Done => {
-                let (bytes, path) = read("report.json")?;
-                numbers = metrics(&bytes).map_err(|error| wrong(&path, error))?;
-            }
+            Status::Done => numbers = read_metrics(&folder, &sweep.plan().keep)?,
             Status::Refused => {
-                let (bytes, path) = read(REFUSED)?;
-                reason = Some(serde_json::from_slice::<Refusal>(&bytes).map_err(|error| wrong(&path, error))?.reason);
+                let path = folder.join(REFUSED);
+                let bytes = fs::read(&path).map_err(SweepError::reading(&path))?;
+                let refusal: Refusal = serde_json::from_slice(&bytes)
+                    .map_err(|error| PipelineError::Read { path, reason: error.to_string() })?;
+                reason = Some(refusal.reason);
             }
             Status::Missing => {}
         }

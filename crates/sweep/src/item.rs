@@ -12,7 +12,10 @@ use dioptric_psf::LensImageModel;
 use dioptric_spectrum::Cancel;
 use serde::{Deserialize, Serialize};
 
-use crate::SweepError;
+use crate::{
+    Keep, SweepError,
+    metrics::{Metrics, metrics, part_of_report},
+};
 
 /// The name of the camera file.
 const CAMERA: &str = "camera.ron";
@@ -20,6 +23,12 @@ const CAMERA: &str = "camera.ron";
 pub(crate) const REFUSED: &str = "refused.json";
 /// The name of the small picture.
 pub(crate) const THUMBNAIL: &str = "thumbnail.png";
+/// The name of the picture.
+pub(crate) const PICTURE: &str = "picture.png";
+/// The name of the report.
+const REPORT: &str = "report.json";
+/// The name of the file of what metrics are read from, of items without a report.
+const METRICS: &str = "metrics.json";
 /// Widest small picture, pixels.
 const THUMBNAIL_PX: usize = 192;
 
@@ -45,6 +54,7 @@ pub(crate) struct Bench {
     camera: Option<KeptCamera>,
     optics: Option<(Shared, RunOptics)>,
     paintings: Option<PaintingFolder>,
+    keep: Vec<Keep>,
 }
 
 impl fmt::Debug for Bench {
@@ -73,9 +83,9 @@ impl Shared {
 }
 
 impl Bench {
-    /// Returns a bench on which nothing is kept yet; paintings of the still life come from a folder and go there.
-    pub(crate) fn new(paintings: Option<PaintingFolder>) -> Self {
-        Self { camera: None, optics: None, paintings }
+    /// Returns a bench on which nothing is kept yet; gathered views come from a folder and go there, and these files are kept of each item.
+    pub(crate) fn new(paintings: Option<PaintingFolder>, keep: &[Keep]) -> Self {
+        Self { camera: None, optics: None, paintings, keep: keep.to_vec() }
     }
 
     /// Takes the picture of a camera and writes all files of the item into a folder; returns what came of it.
@@ -88,7 +98,9 @@ impl Bench {
         progress: &dyn Progress,
         cancel: &Cancel,
     ) -> Result<Taken, SweepError> {
-        write_file(&folder.join(CAMERA), (camera.to_ron() + "\n").as_bytes())?;
+        if self.keep.contains(&Keep::Camera) {
+            write_file(&folder.join(CAMERA), (camera.to_ron() + "\n").as_bytes())?;
+        }
         match self.take(camera, folder, progress, cancel) {
             Ok(()) => Ok(Taken::Picture),
             Err(error) if error.is_unreadable() => Ok(Taken::Unreadable(error.to_string())),
@@ -108,6 +120,7 @@ impl Bench {
         progress: &dyn Progress,
         cancel: &Cancel,
     ) -> Result<(), PipelineError> {
+        let keep = self.keep.clone();
         let kept = match self.camera.take() {
             Some(kept) => kept.with_camera(camera.clone(), GivenParts::default()),
             None => KeptCamera::new(camera.clone()).with_paintings(self.paintings.clone()),
@@ -119,9 +132,27 @@ impl Bench {
         progress.at(Stage::Report, 0.0);
         let run = Run { capture: &capture, model: &model, depth: depth.as_deref() };
         let optics = self.optics_of(&run, model.clone())?;
-        let (files, _) = write_capture(&capture, depth.as_deref(), folder)?;
-        write_json(&folder.join("report.json"), &RunReport::with_optics(&run, optics, files)?)?;
-        write_file(&folder.join(THUMBNAIL), &thumbnail(&capture)?)
+        let (mut files, _) = write_capture(&capture, depth.as_deref(), folder)?;
+        let keeps = |file: Keep| keep.contains(&file);
+        if !keeps(Keep::Picture) {
+            let picture = folder.join(PICTURE);
+            fs::remove_file(&picture).map_err(|e| PipelineError::Write { path: picture, reason: e.to_string() })?;
+            files.retain(|file| file != PICTURE);
+        }
+        let report = RunReport::with_optics(&run, optics, files)?;
+        match keeps(Keep::Report) {
+            true => write_json(&folder.join(REPORT), &report)?,
+            false => {
+                let path = folder.join(METRICS);
+                let json = serde_json::to_vec(&report).and_then(|report| part_of_report(&report));
+                let json = json.map_err(|e| PipelineError::Write { path: path.clone(), reason: e.to_string() })?;
+                write_file(&path, &json)?;
+            }
+        }
+        if keeps(Keep::Thumbnail) {
+            write_file(&folder.join(THUMBNAIL), &thumbnail(&capture)?)?;
+        }
+        Ok(())
     }
 
     /// Returns the report on the lens, from the item before where that shares it.
@@ -135,6 +166,13 @@ impl Bench {
         self.optics = Some((own, optics.clone()));
         Ok(optics)
     }
+}
+
+/// Returns the metrics of an item that has a picture.
+pub(crate) fn read_metrics(folder: &Path, keep: &[Keep]) -> Result<Metrics, SweepError> {
+    let path = folder.join(if keep.contains(&Keep::Report) { REPORT } else { METRICS });
+    let bytes = fs::read(&path).map_err(SweepError::reading(&path))?;
+    metrics(&bytes).map_err(|error| SweepError::Pipeline(PipelineError::Read { path, reason: error.to_string() }))
 }
 
 /// Removes what was written of a picture before its camera was refused: by a sensor whose frames no DNG can hold.

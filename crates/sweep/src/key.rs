@@ -5,7 +5,7 @@ use std::{fmt, str::FromStr};
 use dioptric_pipeline::{Camera, FilmSpec};
 use serde::{Serialize, Serializer};
 
-use crate::{SweepError, inputs::Inputs};
+use crate::{SweepError, inputs::Inputs, plan::Keep};
 
 /// Counts the changes of results that no camera file shows: raised whenever an equal camera and equal files make another
 /// picture, report or file, so that items made before are not taken for those made now.
@@ -16,7 +16,7 @@ pub const RESULTS_EPOCH: u32 = 32;
 ///
 /// The camera is hashed as the text of its camera file with every default filled in (JSON has no infinity, which automatic
 /// exposures hold), each path replaced by the hash of its content and the file's name; so folders do not count, and neither does the order or
-/// the spelling of a plan.
+/// the spelling of a plan. Where less is kept of an item than usual, that is hashed too.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct ItemId([u8; 32]);
 
@@ -91,6 +91,13 @@ impl ItemKey {
             ..camera.clone()
         };
         Ok(Self { id: ItemId(hash(&camera.to_ron())), imaging: short(&hash(&imaging.to_ron())), stages })
+    }
+
+    /// Returns the key of an item of which these files are kept: of fewer than all another one, since its folder is another.
+    pub(crate) fn keeping(self, keep: &[Keep]) -> Self {
+        let kept: Vec<Keep> = Keep::all().into_iter().filter(|file| keep.contains(file)).collect();
+        let id = if kept == Keep::all() { self.id } else { ItemId(hash(&format!("{} keeps {kept:?}", self.id))) };
+        Self { id, ..self }
     }
 }
 

@@ -22,6 +22,7 @@ mod lines;
 mod metrics;
 mod pack;
 mod plan;
+mod prune;
 mod run;
 mod schema;
 mod sheet;
@@ -36,7 +37,8 @@ pub use index::{Index, IndexRow};
 pub use key::{ItemId, RESULTS_EPOCH};
 pub use lines::IndexLines;
 pub use metrics::Metrics;
-pub use plan::{Base, Plan, PlanOutputs};
+pub use plan::{Base, Keep, Plan, PlanOutputs};
+pub use prune::Pruned;
 pub use run::{Made, Maker, Outcome, SweepProgress};
 #[cfg(feature = "schema")]
 pub use schema::generated_schema;

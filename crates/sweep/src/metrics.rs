@@ -1,12 +1,12 @@
 //! The numbers of a report that items are compared by.
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 /// Names and numbers, in the order of a report.
 pub type Metrics = Vec<(String, f64)>;
 
 /// The part of `report.json` that is read.
-#[derive(Deserialize)]
+#[derive(Deserialize, Serialize)]
 struct Report {
     lens: Lens,
     film_mm: f64,
@@ -17,7 +17,7 @@ struct Report {
     color_matrix_mean_delta_e: Option<f64>,
 }
 
-#[derive(Deserialize)]
+#[derive(Deserialize, Serialize)]
 struct Lens {
     efl_mm: Option<f64>,
     f_number: Option<f64>,
@@ -26,19 +26,19 @@ struct Lens {
     magnification: Option<f64>,
 }
 
-#[derive(Deserialize)]
+#[derive(Deserialize, Serialize)]
 struct Scene {
     near_m: Option<f64>,
     far_m: Option<f64>,
     mean_luminance_cd_m2: Option<f64>,
 }
 
-#[derive(Deserialize)]
+#[derive(Deserialize, Serialize)]
 struct Irradiance {
     mean_lux: Option<f64>,
 }
 
-#[derive(Deserialize)]
+#[derive(Deserialize, Serialize)]
 struct Sensor {
     exposure_time_s: Option<f64>,
     analog_gain: Option<f64>,
@@ -47,7 +47,7 @@ struct Sensor {
     channels: Vec<Channel>,
 }
 
-#[derive(Deserialize)]
+#[derive(Deserialize, Serialize)]
 struct Channel {
     filter: String,
     mean_e: Option<f64>,
@@ -56,10 +56,17 @@ struct Channel {
     mean_raw: Option<f64>,
 }
 
-#[derive(Deserialize)]
+#[derive(Deserialize, Serialize)]
 struct Loss {
     reaches_film: Option<f64>,
     vignetting: Option<f64>,
+}
+
+/// Returns the part of a `report.json` that metrics are read from, as JSON that [`metrics`] reads as well.
+pub(crate) fn part_of_report(json: &[u8]) -> Result<Vec<u8>, serde_json::Error> {
+    let mut report: Report = serde_json::from_slice(json)?;
+    report.losses.drain(..report.losses.len().saturating_sub(1));
+    serde_json::to_vec(&report)
 }
 
 /// Returns the metrics of a `report.json`; numbers that are not finite are left out.

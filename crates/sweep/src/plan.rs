@@ -23,9 +23,33 @@ pub struct Plan {
     pub base: Base,
     /// What is varied: the items are all combinations of a point of each; the last changes fastest.
     pub vary: Vec<Sampling>,
-    /// What is written of each item beside its picture and its report.
+    /// What is written of each item beside what is kept of it anyway.
     #[serde(default)]
     pub outputs: PlanOutputs,
+    /// What is kept of each item: all of these, or some. Its metrics always are.
+    #[serde(default = "Keep::all")]
+    pub keep: Vec<Keep>,
+}
+
+/// A file that is kept of each item.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub enum Keep {
+    /// `picture.png`.
+    Picture,
+    /// `report.json`; without it `metrics.json` has the numbers of the index alone.
+    Report,
+    /// `camera.ron`, which takes the same picture again.
+    Camera,
+    /// `thumbnail.png`; without it the contact sheet shows the picture.
+    Thumbnail,
+}
+
+impl Keep {
+    /// All of them.
+    pub(crate) fn all() -> Vec<Self> {
+        vec![Self::Picture, Self::Report, Self::Camera, Self::Thumbnail]
+    }
 }
 
 /// The camera that every item starts from.
@@ -131,6 +155,9 @@ impl Plan {
         let whole = |reason: String| SweepError::Plan { path: path.to_owned(), reason };
         let of_key =
             |key: &str, reason: String| SweepError::Axis { path: path.to_owned(), key: key.to_owned(), reason };
+        if let Some(twice) = self.keep.iter().enumerate().find(|(n, own)| self.keep[..*n].contains(own)) {
+            return Err(whole(format!("keep names {:?} twice", twice.1)));
+        }
         if self.vary.is_empty() {
             return Err(whole("vary is empty, expected one or more ways of varying".to_owned()));
         }
@@ -210,6 +237,9 @@ mod tests {
             let message = error(vary);
             assert!(message.contains(words) && !message.contains('\n'), "{message}");
         }
+        let text = "(base: Demo, vary: [Grid({\"seed\": List([1])})], keep: [Picture, Picture])";
+        let message = Plan::parse(text, Path::new("p.ron")).unwrap_err().to_string();
+        assert_eq!(message, "p.ron: keep names Picture twice");
         assert!(Plan::parse("never", Path::new("p.ron")).unwrap_err().to_string().starts_with("p.ron:1:1: "));
     }
 }

@@ -105,7 +105,7 @@ impl Sweep {
     ) -> Result<Made, SweepError> {
         let n_there = n_all - missing.len();
         let mut made = Made { n_there, ..Made::default() };
-        let mut bench = Bench::new(self.paintings().cloned());
+        let mut bench = Bench::new(self.paintings().cloned(), &self.plan().keep);
         for (n, &item) in missing.iter().enumerate() {
             cancel.check()?;
             if limit.is_some_and(|limit| made.n_tried() >= limit) {
@@ -154,7 +154,8 @@ impl Maker {
     /// # Errors
     /// When the base of the plan cannot be read.
     pub fn of(plan: Plan, path: &Path, paintings: Option<PaintingFolder>) -> Result<Self, SweepError> {
-        Ok(Self { cameras: Cameras::of(plan, path)?, bench: Bench::new(paintings) })
+        let bench = Bench::new(paintings, &plan.keep);
+        Ok(Self { cameras: Cameras::of(plan, path)?, bench })
     }
 
     /// Makes those of some items that are not there, one after the other; returns what came of each.

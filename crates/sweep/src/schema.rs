@@ -41,7 +41,7 @@ mod tests {
     fn schema_names_every_word() {
         let schema: serde_json::Value = serde_json::from_str(PLAN_SCHEMA).unwrap();
         let keys: Vec<&String> = schema["properties"].as_object().unwrap().keys().collect();
-        assert_eq!(keys, ["base", "outputs", "vary"]);
+        assert_eq!(keys, ["base", "keep", "outputs", "vary"]);
         for word in ["LatinHypercube", "LogUniform", "Sobol"] {
             assert!(PLAN_SCHEMA.contains(word) && PLAN_TEMPLATE.contains(word), "{word}");
         }

@@ -4,7 +4,10 @@ use std::io::{self, Write};
 
 use serde::Serialize;
 
-use crate::{IndexRow, Status, Store, Value, item::THUMBNAIL};
+use crate::{
+    IndexRow, Keep, Status, Store, Value,
+    item::{PICTURE, THUMBNAIL},
+};
 
 const STYLE: &str = include_str!("../data/sheet.css");
 const SCRIPT: &str = include_str!("../data/sheet.js");
@@ -26,6 +29,8 @@ pub(crate) struct Sheet<'a> {
     pub(crate) counts: [usize; 3],
     /// Those that are shown.
     pub(crate) rows: &'a [IndexRow],
+    /// The files that are kept of each item.
+    pub(crate) keep: &'a [Keep],
 }
 
 /// What the script of the page reads.
@@ -33,7 +38,9 @@ pub(crate) struct Sheet<'a> {
 struct Content<'a> {
     keys: &'a [&'a str],
     metrics: &'a [String],
-    thumbnail: &'static str,
+    /// The pictures that are shown small and large; none where none is kept.
+    small: Option<&'static str>,
+    large: Option<&'static str>,
     items: Vec<Item<'a>>,
 }
 
@@ -44,9 +51,11 @@ struct Item<'a>(usize, Status, String, &'a [Value], Vec<Option<f64>>, Option<&'a
 impl<'a> Sheet<'a> {
     /// Writes the page, which needs no other file but the pictures beside it.
     pub(crate) fn write(&self, out: &mut dyn Write) -> io::Result<()> {
-        let Self { name, keys, metrics, counts: [done, refused, missing], rows } = *self;
-        let content =
-            Content { keys, metrics, thumbnail: THUMBNAIL, items: rows.iter().map(|row| self.item(row)).collect() };
+        let Self { name, keys, metrics, counts: [done, refused, missing], rows, keep } = *self;
+        let thumbnail = keep.contains(&Keep::Thumbnail).then_some(THUMBNAIL);
+        let picture = keep.contains(&Keep::Picture).then_some(PICTURE);
+        let (small, large) = (thumbnail.or(picture), picture.or(thumbnail));
+        let content = Content { keys, metrics, small, large, items: rows.iter().map(|row| self.item(row)).collect() };
         // Within a script nothing may end the script.
         let json = serde_json::to_string(&content)?.replace('<', "\\u003c");
         let (name, n_items) = (escaped(name), done + refused + missing);
@@ -66,6 +75,7 @@ impl<'a> Sheet<'a> {
              <section>\n<div class=\"choices\">\n<label>order by <select id=\"order\"></select></label>\n\
              <label>show <select id=\"status\"></select></label>\n<span id=\"shown\"></span>\n</div>\n\
              <div id=\"pictures\"></div>\n<button id=\"more\">more</button>\n</section>\n</main>\n\
+             <dialog id=\"large\"><img alt=\"\"><p></p></dialog>\n\
              <script type=\"application/json\" id=\"sheet\">{json}</script>\n<script>\n{SCRIPT}</script>\n</body>\n</html>\n",
         )
     }

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use crate::{ItemId, SweepError};
 
 /// What folders of items that are being made are called, beside those of finished ones.
-const UNFINISHED: &str = ".tmp-";
+pub(crate) const UNFINISHED: &str = ".tmp-";
 
 /// A folder of finished items: `items/` then the first two digits of the item's name, then its name.
 #[derive(Clone, Debug)]

@@ -41,7 +41,14 @@ impl Index<'_> {
         write_to(&table, &path, |out| self.write_csv(out, &path, lines.path(), &seen.metrics))?;
         let (path, page) = (folder.join("index.html"), Staged::file(&folder.join("index.html"))?);
         let Seen { metrics, counts, rows, .. } = &seen;
-        let sheet = Sheet { name: &self.name(), keys: &self.keys(), metrics, counts: *counts, rows };
+        let sheet = Sheet {
+            name: &self.name(),
+            keys: &self.keys(),
+            metrics,
+            counts: *counts,
+            rows,
+            keep: &self.sweep.plan().keep,
+        };
         write_to(&page, &path, |out| sheet.write(out).map_err(SweepError::writing(&path)))?;
         [lines, table, page].into_iter().try_for_each(|file| Ok(file.commit()?))
     }

@@ -94,7 +94,10 @@ class Item:
 
     def report(self) -> dict[str, Any]:
         """Returns what was measured, the keys of ``report.json``."""
-        report: dict[str, Any] = json.loads(self.path("report.json").read_text(encoding="utf-8"))
+        path = self.path("report.json")
+        if not path.exists():
+            raise FileNotFoundError(f"{path}: there is no report; `keep` of the plan says what is kept of an item")
+        report: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
         return report
 
     def camera(self) -> Camera:
