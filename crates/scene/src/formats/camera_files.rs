@@ -154,12 +154,68 @@ fn of_json(path: &Path, text: &str) -> Result<CameraData, String> {
             return Err("its frames have focal lengths of their own: expected one for all".to_owned());
         }
     }
-    let mut is_fisheye_model = false;
+    let is_fisheye = is_of_fisheye(&mut keys)?;
+    if keys.get("units").and_then(Value::as_str).is_some_and(|unit| ["px", "pixel", "pixels"].contains(&unit)) {
+        keys.take("units");
+    }
+    let size @ (width, height) = (side(&mut keys, &["width", "w"])?, side(&mut keys, &["height", "h"])?);
+    let angle_rad = number(&mut keys, &["camera_angle_x"])?;
+    let [fx, fy, cx, cy] = pinhole_of(&mut keys)?;
+    let of_angle = || Some(0.5 * width? as f64 / (0.5 * angle_rad?).tan());
+    let depth_unit_m = depth_unit_of(&mut keys)?;
+    let distortion = distortion_of(&mut keys, is_fisheye, is_nerf)?;
+    let missing = |name: &str| format!("missing {name}: expected width, height, fx_px, fy_px, cx_px and cy_px");
+    let fx = fx.or_else(of_angle).ok_or_else(|| missing("fx_px"))?;
+    let half = if is_nerf { 0.5 } else { 0.0 };
+    let middle = |side: Option<usize>| side.map(|n| 0.5 * n as f64 - 0.5 + half);
+    let cx = cx.or_else(|| middle(width)).ok_or_else(|| missing("cx_px"))?;
+    let cy = cy.or_else(|| middle(height)).ok_or_else(|| missing("cy_px"))?;
+    Ok(CameraData {
+        file: path.to_owned(),
+        size: match size {
+            (Some(width), Some(height)) => Some((width, height)),
+            (None, None) => None,
+            (None, _) => return Err(missing("width")),
+            (_, None) => return Err(missing("height")),
+        },
+        fx_px: fx,
+        fy_px: fy.unwrap_or(fx),
+        cx_px: cx - half,
+        cy_px: cy - half,
+        distortion,
+        depth_unit_m,
+        note: keys.note(path, |name| HARMLESS.contains(&name)),
+    })
+}
+
+/// The keys of a camera file.
+type Keys = Stated<Value>;
+
+/// Takes the number of the first of these keys that is there; `null` is none.
+fn number(keys: &mut Keys, names: &[&str]) -> Result<Option<f64>, String> {
+    match keys.take_any(names) {
+        None | Some(Value::Null) => Ok(None),
+        Some(value) => value.as_f64().map(Some).ok_or_else(|| format!("{} is {value}, expected a number", names[0])),
+    }
+}
+
+/// Takes a number of samples along a side.
+fn side(keys: &mut Keys, names: &[&str]) -> Result<Option<usize>, String> {
+    match number(keys, names)? {
+        None => Ok(None),
+        Some(n) if n >= 1.0 && n.fract() == 0.0 && n < 1e6 => Ok(Some(n as usize)),
+        Some(n) => Err(format!("{} is {n}, expected a number of samples", names[0])),
+    }
+}
+
+/// Whether the file names a model of fisheyes.
+fn is_of_fisheye(keys: &mut Keys) -> Result<bool, String> {
+    let mut is_any = false;
     for name in ["camera_model", "distortion_model", "model"] {
         let Some(model) = keys.get(name).and_then(Value::as_str).map(str::to_owned) else { continue };
         match is_fisheye(&model) {
             Some(is_fisheye) => {
-                is_fisheye_model |= is_fisheye;
+                is_any |= is_fisheye;
                 keys.take(name);
             }
             // Who made the camera may stand there as well, which is named.
@@ -168,86 +224,66 @@ fn of_json(path: &Path, text: &str) -> Result<CameraData, String> {
         }
     }
     if let Some(is_fisheye) = keys.get("is_fisheye").and_then(Value::as_bool) {
-        is_fisheye_model |= is_fisheye;
+        is_any |= is_fisheye;
         keys.take("is_fisheye");
     }
-    if keys.get("units").and_then(Value::as_str).is_some_and(|unit| ["px", "pixel", "pixels"].contains(&unit)) {
-        keys.take("units");
+    Ok(is_any)
+}
+
+/// Takes focal lengths and center, by names or as a matrix: `fx`, `fy`, `cx`, `cy`.
+fn pinhole_of(keys: &mut Keys) -> Result<[Option<f64>; 4], String> {
+    let named = [
+        number(keys, &["fx_px", "fl_x", "fx"])?,
+        number(keys, &["fy_px", "fl_y", "fy"])?,
+        number(keys, &["cx_px", "cx", "ppx"])?,
+        number(keys, &["cy_px", "cy", "ppy"])?,
+    ];
+    let Some(matrix) = keys.take_any(&["intrinsic_matrix", "K"]) else { return Ok(named) };
+    let m = numbers_of(&matrix, "intrinsic_matrix")?;
+    if m.len() != 9 {
+        return Err(format!("its intrinsic_matrix has {} numbers, expected 9", m.len()));
     }
-    let mut number = |names: &[&str]| -> Result<Option<f64>, String> {
-        let Some(value) = keys.take_any(names) else { return Ok(None) };
-        match value {
-            Value::Null => Ok(None),
-            value => value.as_f64().map(Some).ok_or_else(|| format!("{} is {value}, expected a number", names[0])),
-        }
-    };
-    let [mut fx, mut fy] = [number(&["fx_px", "fl_x", "fx"])?, number(&["fy_px", "fl_y", "fy"])?];
-    let [mut cx, mut cy] = [number(&["cx_px", "cx", "ppx"])?, number(&["cy_px", "cy", "ppy"])?];
-    let side = |value: Option<f64>, name: &str| match value {
-        None => Ok(None),
-        Some(n) if n >= 1.0 && n.fract() == 0.0 && n < 1e6 => Ok(Some(n as usize)),
-        Some(n) => Err(format!("{name} is {n}, expected a number of samples")),
-    };
-    let width = side(number(&["width", "w"])?, "width")?;
-    let height = side(number(&["height", "h"])?, "height")?;
-    let angle_rad = number(&["camera_angle_x"])?;
-    if let (None, Some(angle), Some(width)) = (fx, angle_rad, width) {
-        fx = Some(0.5 * width as f64 / (0.5 * angle).tan());
+    // Open3D's nine numbers run down the columns, rows of rows are a table.
+    let is_table = matrix.as_array().is_some_and(|rows| rows.iter().any(Value::is_array));
+    let [a, b] = if is_table || m[6] == 0.0 { [2, 5] } else { [6, 7] };
+    let rest = [m[1], m[3], m[if a == 2 { 6 } else { 2 }], m[if a == 2 { 7 } else { 5 }], m[8] - 1.0];
+    check_matrix("intrinsic_matrix", &rest)?;
+    let own = [m[0], m[4], m[a], m[b]];
+    if named.iter().zip(own).any(|(given, own)| given.is_some_and(|given| (given - own).abs() > 1e-9)) {
+        return Err("its intrinsic_matrix says something else than its focal lengths and center".to_owned());
     }
-    let depth_unit_m = number(&["depth_unit_m", "depth_unit_scale_factor"])?;
-    let depth_scale = number(&["depth_scale"])?;
+    Ok(own.map(Some))
+}
+
+/// Takes the coefficients of a distortion, by names or as a list.
+fn distortion_of(keys: &mut Keys, is_fisheye: bool, is_nerf: bool) -> Result<Distortion, String> {
     let mut k = [0.0; 8];
     for (place, name) in ["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"].iter().enumerate() {
-        k[place] = number(&[name])?.unwrap_or(0.0);
+        k[place] = number(keys, &[name])?.unwrap_or(0.0);
     }
-    let [k1, k2, p1, p2, k3, k4, k5, k6] = k;
-    let mut distortion = if is_fisheye_model {
-        if [p1, p2, k5, k6].iter().any(|v| *v != 0.0) {
-            return Err("its fisheye has other coefficients than k1 to k4".to_owned());
-        }
-        Distortion::Fisheye([k1, k2, k3, k4])
-    } else if is_nerf {
-        Distortion::Polynomial { k: [k1, k2, p1, p2, k3, 0.0, k5, k6], r8: k4 }
-    } else {
-        Distortion::Polynomial { k, r8: 0.0 }
-    };
     if let Some(list) = keys.take_any(&["distortion", "dist_coeffs", "distortion_coefficients", "D"]) {
         if k.iter().any(|v| *v != 0.0) {
             return Err("it states its distortion twice, as a list and by names: expected one".to_owned());
         }
-        distortion = Distortion::of_list(&numbers_of(&list, "distortion")?, is_fisheye_model)?;
+        return Distortion::of_list(&numbers_of(&list, "distortion")?, is_fisheye);
     }
-    if let Some(matrix) = keys.take_any(&["intrinsic_matrix", "K"]) {
-        let m = numbers_of(&matrix, "intrinsic_matrix")?;
-        // Open3D's nine numbers run down the columns, rows of rows are a table.
-        let is_table = matrix.as_array().is_some_and(|rows| rows.iter().any(Value::is_array));
-        let [a, b] = if is_table || m.get(6) == Some(&0.0) { [2, 5] } else { [6, 7] };
-        let &[first, ..] = &m[..] else { return Err("its intrinsic_matrix is empty".to_owned()) };
-        if m.len() != 9 {
-            return Err(format!("its intrinsic_matrix has {} numbers, expected 9", m.len()));
+    let [k1, k2, p1, p2, k3, k4, k5, k6] = k;
+    if is_fisheye {
+        if [p1, p2, k5, k6].iter().any(|v| *v != 0.0) {
+            return Err("its fisheye has other coefficients than k1 to k4".to_owned());
         }
-        let rest = [m[1], m[3], m[if a == 2 { 6 } else { 2 }], m[if a == 2 { 7 } else { 5 }], m[8] - 1.0];
-        check_matrix("intrinsic_matrix", &rest)?;
-        let own = [first, m[4], m[a], m[b]];
-        if [fx, fy, cx, cy].iter().zip(own).any(|(given, own)| given.is_some_and(|given| (given - own).abs() > 1e-9)) {
-            return Err("its intrinsic_matrix says something else than its focal lengths and center".to_owned());
-        }
-        [fx, fy, cx, cy] = own.map(Some);
+        return Ok(Distortion::Fisheye([k1, k2, k3, k4]));
     }
-    let missing = |name: &str| format!("missing {name}: expected width, height, fx_px, fy_px, cx_px and cy_px");
-    let fx = fx.ok_or_else(|| missing("fx_px"))?;
-    let fy = fy.unwrap_or(fx);
-    let size = match (width, height) {
-        (Some(width), Some(height)) => Some((width, height)),
-        (None, None) => None,
-        (None, _) => return Err(missing("width")),
-        (_, None) => return Err(missing("height")),
-    };
-    let half = if is_nerf { 0.5 } else { 0.0 };
-    let middle = |side: Option<usize>| side.map(|n| 0.5 * n as f64 - 0.5 + half);
-    let cx = cx.or_else(|| middle(width)).ok_or_else(|| missing("cx_px"))?;
-    let cy = cy.or_else(|| middle(height)).ok_or_else(|| missing("cy_px"))?;
-    let of_scale = match depth_scale {
+    Ok(match is_nerf {
+        true => Distortion::Polynomial { k: [k1, k2, p1, p2, k3, 0.0, k5, k6], r8: k4 },
+        false => Distortion::Polynomial { k, r8: 0.0 },
+    })
+}
+
+/// Takes what one code of the depth beside the picture stands for, m.
+fn depth_unit_of(keys: &mut Keys) -> Result<Option<f64>, String> {
+    let unit_m = number(keys, &["depth_unit_m", "depth_unit_scale_factor"])?;
+    let of_scale = match number(keys, &["depth_scale"])? {
         None => None,
         // So many codes a metre, as TUM and Open3D have it; small factors are metres to some and millimetres to others.
         Some(scale) if scale >= 10.0 => Some(1.0 / scale),
@@ -258,22 +294,12 @@ fn of_json(path: &Path, text: &str) -> Result<CameraData, String> {
             ));
         }
     };
-    if let (Some(unit), Some(other)) = (depth_unit_m, of_scale)
-        && (unit / other - 1.0).abs() > 1e-6
-    {
-        return Err(format!("depth_unit_m is {unit}, and depth_scale says {other}: expected one of them"));
+    match (unit_m, of_scale) {
+        (Some(unit_m), Some(other)) if (unit_m / other - 1.0).abs() > 1e-6 => {
+            Err(format!("depth_unit_m is {unit_m}, and depth_scale says {other}: expected one of them"))
+        }
+        _ => Ok(unit_m.or(of_scale)),
     }
-    Ok(CameraData {
-        file: path.to_owned(),
-        size,
-        fx_px: fx,
-        fy_px: fy,
-        cx_px: cx - half,
-        cy_px: cy - half,
-        distortion,
-        depth_unit_m: depth_unit_m.or(of_scale),
-        note: keys.note(path, |name| HARMLESS.contains(&name)),
-    })
 }
 
 /// Returns all numbers of a list, or of a table row by row.
