@@ -22,7 +22,7 @@ pub(crate) struct SceneFileArgs {
     /// `disparity:BASELINE_M\[,OFFSET_PX\]` [default: axial]
     #[arg(long, value_name = "KIND")]
     pub(crate) depth_kind: Option<DepthKind>,
-    /// Channel of an EXR file, or array of a MATLAB, HDF5 or .npz file, that holds the depth
+    /// Channel of an EXR file, or array of a MATLAB, HDF5 or .npz file, that holds the depth; number of one of several planes of a TIFF
     #[arg(long, value_name = "NAME")]
     pub(crate) depth_variable: Option<String>,
     /// Camera data of the scene: our JSON, `Open3D`'s, nerfstudio's, COLMAP's cameras.txt or `OpenCV`'s YAML
@@ -47,14 +47,14 @@ pub(crate) struct SceneFileArgs {
     /// Center of each band of a file that does not state them, nm: a list or first:last:step
     #[arg(long, value_name = "LIST")]
     pub(crate) scene_wavelengths_nm: Option<String>,
-    /// Variable of a MATLAB, HDF5 or .npz file that holds the cube
+    /// Variable of a MATLAB, HDF5 or .npz file that holds the cube; layer of an EXR file that holds the colors
     #[arg(long, value_name = "NAME")]
     pub(crate) variable: Option<String>,
     /// Order of the axes of an array: rows y, columns x and bands b, as yxb
     #[arg(long, value_name = "ORDER")]
     pub(crate) axes: Option<String>,
-    /// What becomes of samples that are no light (no numbers, infinite, negative, to be ignored): black, fill (the nearest of the row) or
-    /// refuse [default: black]
+    /// What becomes of samples that are no light (no numbers, infinite, to be ignored): black, fill (the nearest of the row) or refuse;
+    /// negative ones become 0, but for refuse [default: black]
     #[arg(long, value_name = "CHOICE")]
     pub(crate) no_data: Option<NoData>,
     /// Depth where none was measured: beside (the farther of those beside it), far (the farthest of the scene), or metres

@@ -219,7 +219,7 @@ impl Scene {
     /// depth_unit, depth_kind : str, optional
     ///     What the depth's numbers are, as ``"5000/m"``, ``"radial"``, ``"inverse:0.5,20"``, ``"disparity:0.193"``.
     /// depth_variable : str, optional
-    ///     The channel of an EXR file, or the array of another, that holds the depth.
+    ///     The channel of an EXR file, or the array of another, that holds the depth; the number of one of several planes of a TIFF.
     /// panorama : str, optional
     ///     A picture of all directions, ``"equirectangular"`` or ``"cube"``, and where a camera in it looks: ``"cube:90,0"``.
     /// illuminant : str, optional

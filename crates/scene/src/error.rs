@@ -71,7 +71,7 @@ pub enum SceneError {
         expected: &'static str,
     },
     /// Bands or units that do not belong in one picture.
-    #[error("{}: mixed or unknown units: {reason}", file.display())]
+    #[error("{}: {reason}", file.display())]
     Units {
         /// The file.
         file: PathBuf,

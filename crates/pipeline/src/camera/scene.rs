@@ -6,8 +6,7 @@ use std::{
 };
 
 use dioptric_scene::{
-    FileReading, FillDepth, Part, Pattern, ReadOptions, Scene, SceneLight, Target, TargetLight, View,
-    read_hidden_layer, read_scene,
+    FileReading, FillDepth, Part, Pattern, ReadOptions, Scene, SceneLight, Target, TargetLight, View, read_scene,
 };
 use dioptric_spectrum::{Cancel, DepthMap, Illuminant, WavelengthGrid};
 use serde::{Deserialize, Serialize};
@@ -385,6 +384,7 @@ impl SceneSpec {
             white_level: self.white_level,
             part: None,
             summary: false,
+            hidden: self.hidden.clone(),
             reading: self.reading.clone(),
         }
     }
@@ -394,11 +394,7 @@ impl SceneSpec {
             let reason = "expected the file of a scene".to_owned();
             return Err(PipelineError::Unsuitable { what: "scene", reason });
         };
-        let mut scene = read_scene(path, options)?;
-        if let Some(hidden) = &self.hidden {
-            scene.hidden = Some(read_hidden_layer(hidden, options, &scene)?);
-        }
-        Ok(scene)
+        Ok(read_scene(path, options)?)
     }
 
     /// Returns a scene that is in no file, with what it leaves open taken from here, on the bands wanted.

@@ -5,14 +5,13 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use dioptric_pictures::DynamicImage;
 use ndarray::Array2;
 use rayon::prelude::*;
 
 use super::{
     contents::Cube,
-    picture::decode,
-    stated::{name_of, note_of},
+    gray_picture::{GrayPicture, read_gray},
+    stated::{merged, name_of, note_of},
     unusable::unreadable,
 };
 use crate::SceneError;
@@ -20,7 +19,10 @@ use crate::SceneError;
 /// Names of a text file with the wavelengths of numbered pictures, nm.
 const LISTS: [&str; 2] = ["wavelengths.txt", "wavelengths.csv"];
 
-/// Reads a folder of gray PNG or TIFF pictures, one a band, whose codes are linear; the largest of them is 1.
+/// Endings of pictures that are no bands.
+const OTHERS: [&str; 10] = ["bmp", "jpg", "jpeg", "webp", "ppm", "pgm", "pnm", "exr", "hdr", "pfm"];
+
+/// Reads a folder of gray PNG or TIFF pictures, one a band, whose codes are linear, or floats.
 ///
 /// Names end in the wavelength in nm (`toys_400.png`, `toys-400.5nm.png`) or in a number (`toys_ms_01.png`). Numbered
 /// pictures take their wavelengths, in the order of their numbers, from those told, from a file `wavelengths.txt` in
@@ -36,26 +38,67 @@ pub(super) fn band_folder(folder: &Path, told_nm: Option<&[f64]>) -> Result<Cube
             expected: "PNG or TIFF pictures whose names end in a wavelength in nm or in a number",
         });
     }
-    let wavelengths_nm = match told_nm {
-        Some(told) => told.to_vec(),
-        None => wavelengths_of(folder, &pictures)?,
+    let mut notes: Vec<String> = note_of(folder, "picture", &unused).into_iter().collect();
+    let wavelengths_nm = match (told_nm, wavelengths_of(folder, &pictures)) {
+        (None, own) => own?,
+        (Some(told), own) => {
+            let is_other = own.is_ok_and(|own| own != told);
+            notes.extend(is_other.then(|| {
+                format!(
+                    "{}: other wavelengths were told than its names or its list have, which are not used",
+                    name_of(folder)
+                )
+            }));
+            told.to_vec()
+        }
     };
     if wavelengths_nm.len() != pictures.len() {
         let reason = format!("{} pictures of bands, but {} wavelengths", pictures.len(), wavelengths_nm.len());
         return Err(unreadable(folder, reason));
     }
-    let planes: Result<Vec<_>, _> = pictures.par_iter().map(|(_, path)| gray(path)).collect();
-    let planes = planes?;
-    if let Some(index) = planes.iter().position(|plane| plane.dim() != planes[0].dim()) {
-        let reason = format!(
-            "the rows of a band and its columns are {:?}, those of another {:?}",
-            planes[index].dim(),
-            planes[0].dim()
-        );
+    let pictures: Vec<Numbered> =
+        wavelengths_nm.iter().copied().zip(pictures.into_iter().map(|(_, path)| path)).collect();
+    let (planes, top) = planes_of(folder, &pictures, &mut notes)?;
+    Ok(Cube { planes, top, wavelengths_nm: Some(wavelengths_nm), quantity: None, unit: None, notes })
+}
+
+/// Returns the numbers of all pictures, each with its wavelength, and the largest of whole numbers: codes of fewer bits are so many times as large.
+fn planes_of(
+    folder: &Path,
+    pictures: &[Numbered],
+    notes: &mut Vec<String>,
+) -> Result<(Vec<Array2<f32>>, Option<f64>), SceneError> {
+    let read: Result<Vec<_>, _> = pictures.par_iter().map(|(_, path)| read_gray(path, None)).collect();
+    let mut told = vec![];
+    let mut grays = vec![];
+    for (noted, (own_nm, path)) in read?.into_iter().zip(pictures) {
+        let mut own = vec![];
+        let gray = noted.told_in(&mut own);
+        let stated_nm = gray.wavelength_nm.filter(|nm| (nm - own_nm).abs() > 0.5);
+        own.extend(stated_nm.map(|nm| format!("{}: its wavelength, {nm} nm, is not used", name_of(path))));
+        told.push((path.clone(), own));
+        grays.push(gray);
+    }
+    notes.extend(merged(told.into_iter()));
+    let size = grays[0].values.dim();
+    if let Some(gray) = grays.iter().find(|gray| gray.values.dim() != size) {
+        let reason =
+            format!("the rows of a band and its columns are {:?}, those of another {size:?}", gray.values.dim());
         return Err(unreadable(folder, reason));
     }
-    let notes = note_of(folder, "picture", &unused).into_iter().collect();
-    Ok(Cube { planes, top: Some(1.0), wavelengths_nm: Some(wavelengths_nm), quantity: None, unit: None, notes })
+    let top = grays
+        .iter()
+        .filter_map(|gray| gray.top)
+        .fold(None, |top: Option<f64>, own| Some(top.map_or(own, |top| top.max(own))));
+    if let Some(index) = grays.iter().position(|gray| gray.top.is_some() != top.is_some()) {
+        let reason = "it holds floats, but others of the folder whole numbers: expected one kind";
+        return Err(unreadable(&pictures[index].1, reason));
+    }
+    let plane = |gray: GrayPicture| match (gray.top, top) {
+        (Some(own), Some(top)) if own < top => gray.values.mapv(|code| (f64::from(code) * top / own) as f32),
+        _ => gray.values,
+    };
+    Ok((grays.into_iter().map(plane).collect(), top))
 }
 
 /// A picture with the number that its name ends in.
@@ -68,6 +111,13 @@ fn numbered_pictures(folder: &Path) -> Result<(Vec<Numbered>, Vec<String>), Scen
     for entry in entries {
         let path = entry.map_err(|error| unreadable(folder, error))?.path();
         let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
+        // What macOS leaves beside files.
+        if name_of(&path).starts_with("._") {
+            continue;
+        }
+        if OTHERS.contains(&extension.as_str()) {
+            unused.push(name_of(&path));
+        }
         if !matches!(extension.as_str(), "png" | "tif" | "tiff") {
             continue;
         }
@@ -107,24 +157,6 @@ fn wavelengths_of(folder: &Path, pictures: &[(f64, PathBuf)]) -> Result<Vec<f64>
         file: folder.to_owned(),
         expected: "a file wavelengths.txt with the wavelength in nm of each numbered picture",
     })
-}
-
-/// Reads a gray picture, white being 1, which may be saved as RGB.
-fn gray(path: &Path) -> Result<Array2<f32>, SceneError> {
-    let picture = decode(path, 4)?;
-    let (columns, rows) = (picture.width() as usize, picture.height() as usize);
-    let samples: Vec<f32> = match picture {
-        DynamicImage::ImageLuma8(p) => p.into_raw().into_iter().map(|v| f32::from(v) / 255.0).collect(),
-        DynamicImage::ImageLuma16(p) => p.into_raw().into_iter().map(|v| f32::from(v) / 65535.0).collect(),
-        other => {
-            let picture = other.into_rgb16();
-            if picture.pixels().any(|p| p.0[0] != p.0[1] || p.0[2] != p.0[1]) {
-                return Err(unreadable(path, "it has colors, expected gray pictures, one a band"));
-            }
-            picture.pixels().map(|p| f32::from(p.0[1]) / 65535.0).collect()
-        }
-    };
-    Array2::from_shape_vec((rows, columns), samples).map_err(|error| unreadable(path, error))
 }
 
 #[cfg(test)]

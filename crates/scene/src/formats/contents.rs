@@ -1,6 +1,6 @@
 //! What a reader found in a file, before it is a scene.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use dioptric_pictures::{DynamicImage, StatedColors};
 use dioptric_spectrum::{Quantity, SpectralImage, SpectrumError, WavelengthGrid};
@@ -37,11 +37,17 @@ pub(super) struct Contents {
     pub(super) is_turned: bool,
     /// Whether the file says that its picture is one of all directions.
     pub(super) panorama: Option<Panorama>,
-    pub(super) hidden: Option<(SpectralImage, Array2<f32>)>,
+    pub(super) hidden: Option<Box<Hidden>>,
     pub(super) light: Option<SceneLight>,
     pub(super) notes: Vec<String>,
     /// What may be said of such a file.
     pub(super) heeds: Heeds,
+}
+
+/// What lies behind the first surface, and its file.
+pub(super) struct Hidden {
+    pub(super) file: PathBuf,
+    pub(super) contents: Contents,
 }
 
 /// The samples of a file.
@@ -74,7 +80,11 @@ impl Image {
     /// Puts the samples into a larger picture.
     pub(super) fn pad(&mut self, place: Place) -> Result<(), SceneError> {
         match self {
-            Self::Spectral(image) => pad_spectral(image, place),
+            Self::Spectral(image) => {
+                let planes = image.planes().iter().map(|plane| place.pad(plane)).collect();
+                *image = SpectralImage::new(image.quantity(), image.grid().clone(), planes)?;
+                Ok(())
+            }
             Self::Linear { planes, .. } => {
                 planes.iter_mut().for_each(|plane| *plane = place.pad(plane));
                 Ok(())
@@ -83,13 +93,6 @@ impl Image {
             Self::Codes(..) => Ok(()),
         }
     }
-}
-
-/// Puts the samples of an image into a larger picture.
-pub(super) fn pad_spectral(image: &mut SpectralImage, place: Place) -> Result<(), SceneError> {
-    let planes = image.planes().iter().map(|plane| place.pad(plane)).collect();
-    *image = SpectralImage::new(image.quantity(), image.grid().clone(), planes)?;
-    Ok(())
 }
 
 impl Contents {
@@ -111,6 +114,24 @@ impl Contents {
         }
     }
 
+    /// The picture of which the samples are a part.
+    pub(super) fn frame(&self) -> Frame {
+        let (rows, columns) = self.size();
+        self.frame.unwrap_or_else(|| Frame::whole(rows, columns))
+    }
+
+    /// Puts samples and depths, and those behind, into a larger picture.
+    pub(super) fn pad(&mut self, place: Place) -> Result<(), SceneError> {
+        self.image.pad(place)?;
+        if let Some(depth) = &mut self.depth {
+            depth.values = place.pad_depth(&depth.values);
+        }
+        match &mut self.hidden {
+            Some(hidden) => hidden.contents.pad(place),
+            None => Ok(()),
+        }
+    }
+
     /// Refuses what was said of the file and does not apply to it.
     pub(super) fn check_heeds(&self, path: &Path, options: &ReadOptions) -> Result<(), SceneError> {
         let reading = &options.reading;
@@ -120,8 +141,16 @@ impl Contents {
             ("a quantity (--quantity)", reading.quantity.is_some(), !self.heeds_quantity(reading.quantity)),
             ("a white level (--white-level)", options.white_level.is_some(), self.heeds != Heeds::Cube),
             ("wavelengths (--scene-wavelengths-nm)", reading.wavelengths_nm.is_some(), self.heeds != Heeds::Cube),
-            ("a variable (--variable)", reading.variable.is_some(), !is_of(path, &["mat", "h5", "hdf5", "npz"])),
-            ("an order of axes (--axes)", reading.axes.is_some(), !is_of(path, &["npy", "npz", "mat", "h5", "hdf5"])),
+            (
+                "a variable (--variable)",
+                reading.variable.is_some(),
+                !(is_of(path, MATLAB_OR_HDF5) || is_of(path, &["npz", "exr"])),
+            ),
+            (
+                "an order of axes (--axes)",
+                reading.axes.is_some(),
+                !(is_of(path, MATLAB_OR_HDF5) || is_of(path, &["npy", "npz"])),
+            ),
         ];
         match given.into_iter().find(|(_, is_given, is_wrong)| *is_given && *is_wrong) {
             Some((what, ..)) => Err(SceneError::DoesNotApply { file: path.to_owned(), what, kind: self.what.clone() }),
@@ -146,6 +175,9 @@ impl Contents {
         }
     }
 }
+
+/// Endings of MATLAB and HDF5 files, of which `NetCDF` and HDF-EOS are kinds.
+pub(super) const MATLAB_OR_HDF5: &[&str] = &["mat", "h5", "hdf5", "he5", "nc", "nc4"];
 
 /// Whether the name of a file has one of these endings.
 pub(super) fn is_of(path: &Path, endings: &[&str]) -> bool {

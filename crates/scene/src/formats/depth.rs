@@ -7,7 +7,7 @@ use std::{
 
 use super::{
     camera_files::beside,
-    contents::is_of,
+    contents::{MATLAB_OR_HDF5, is_of},
     depth_numbers::{DepthNumbers, depth_numbers},
     raw_depth::{DepthWords, RawDepth},
     reading::{DepthKind, DepthUnit},
@@ -68,7 +68,8 @@ pub(super) fn likely_beside(picture: &Path) -> Vec<String> {
     let is_likely = |path: &PathBuf| {
         let name = name_of(path).to_lowercase();
         let ending = name.rsplit('.').next().unwrap_or_default();
-        let is_map = ["png", "tif", "tiff", "exr", "pfm", "npy", "npz", "dpt", "h5", "hdf5", "mat"].contains(&ending);
+        let is_map =
+            ["png", "tif", "tiff", "exr", "pfm", "npy", "npz", "dpt"].contains(&ending) || is_of(path, MATLAB_OR_HDF5);
         let rest =
             name.strip_prefix(&stem).or_else(|| name.strip_suffix(ending)?.trim_end_matches('.').strip_suffix(&stem));
         let says = |rest: &str| ["depth", "disp"].iter().any(|word| rest.contains(word));
@@ -93,7 +94,8 @@ fn is_of_hypersim(path: &Path) -> bool {
 /// # Errors
 /// When the file is none of these, or its unit is not known.
 pub(super) fn read_depth(path: &Path, words: DepthWords<'_>) -> Result<RawDepth, SceneError> {
-    let numbers = depth_numbers(path, words.variable)?;
+    let mut notes = vec![];
+    let numbers = depth_numbers(path, words.variable)?.told_in(&mut notes);
     // Distances that are counted from the camera say so by the name of their channel, or their file.
     let kind = if is_of_hypersim(path) { DepthKind::Radial } else { numbers.kind };
     let unit_m = unit_m_of(path, &numbers, words)?;
@@ -108,7 +110,7 @@ pub(super) fn read_depth(path: &Path, words: DepthWords<'_>) -> Result<RawDepth,
         values: numbers.values,
         file: path.to_owned(),
         from: numbers.from,
-        notes: numbers.notes,
+        notes,
     };
     depth.told(words)
 }

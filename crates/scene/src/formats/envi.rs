@@ -423,7 +423,11 @@ impl EnviFile {
             .filter(|path| path.file_name().is_some_and(|name| name.to_string_lossy().starts_with(start)))
             .collect();
         found.sort();
-        found.first().map(|path| Self::open(path, None, Some(&self.wavelengths_nm))).transpose()
+        let Some((first, others)) = found.split_first() else { return Ok(None) };
+        let mut reference = Self::open(first, None, Some(&self.wavelengths_nm))?;
+        let others: Vec<String> = others.iter().map(|path| name_of(path)).collect();
+        reference.notes.extend(note_of(&self.header_path, "reference", &others));
+        Ok(Some(reference))
     }
 }
 

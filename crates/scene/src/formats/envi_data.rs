@@ -16,6 +16,7 @@ use super::{
     no_data::{Mended, mend_rows},
     reading::NoData,
     reduced::{block_of, start_of},
+    stated::name_of,
     unusable::{check_made, unreadable},
 };
 use crate::SceneError;
@@ -153,7 +154,17 @@ impl EnviFile {
                 }
             }
         }
-        Ok((planes, mended.checked(&self.header_path)?))
+        let mended = mended.checked(&self.header_path).map_err(|error| match meaning {
+            Meaning::Between(pair, _) => {
+                let (white, dark) = (name_of(&pair[0].header_path), name_of(&pair[1].header_path));
+                unreadable(
+                    &self.header_path,
+                    format!("{white} is nowhere brighter than {dark}: expected them the other way round"),
+                )
+            }
+            _ => error,
+        })?;
+        Ok((planes, mended))
     }
 
     /// Returns a reference's lines: as many as the cube has, or else their mean.

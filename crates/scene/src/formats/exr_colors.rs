@@ -1,15 +1,29 @@
 //! The colors of EXR files without bands: which channels they are, and of what primaries.
 
+use std::path::Path;
+
 use dioptric_spectrum::{Xyz, adapt_bradford};
 use exr::meta::attribute::Chromaticities;
 use glam::{DMat3, DVec3};
 use ndarray::Array2;
 
-use super::stated::Stated;
+use super::{stated::Stated, unusable::unreadable};
+use crate::SceneError;
 
-/// Takes red, green and blue: `R`, `G` and `B`, or those of a layer, Blender's `….Combined` before others; or gray, `Y`. Returns
-/// them with what stands before their letters.
-pub(super) fn colors_of(channels: &mut Stated<Array2<f32>>) -> Option<(String, [Array2<f32>; 3])> {
+/// The channels that a picture has.
+pub(super) const EXPECTED: &str =
+    "channels R, G and B or Y, or named like S0.550,000000nm (light) or T.550,000000nm (reflectance)";
+
+/// Takes red, green and blue of the layer told, or else `R`, `G` and `B`, or those of a layer, Blender's `….Combined` before others; or
+/// gray, `Y`. Returns them with what stands before their letters.
+///
+/// # Errors
+/// When there are no such channels, or layers of which none is called a picture.
+pub(super) fn colors_of(
+    path: &Path,
+    channels: &mut Stated<Array2<f32>>,
+    told: Option<&str>,
+) -> Result<(String, [Array2<f32>; 3]), SceneError> {
     let names: Vec<String> = channels.names().map(str::to_owned).collect();
     let full =
         |prefix: &str, letter: &str| if prefix.is_empty() { letter.to_owned() } else { format!("{prefix}.{letter}") };
@@ -21,19 +35,32 @@ pub(super) fn colors_of(channels: &mut Stated<Array2<f32>>) -> Option<(String, [
         })
         .filter(|prefix| ["G", "B"].iter().all(|letter| names.contains(&full(prefix, letter))))
         .collect();
+    let listed = || prefixes.iter().map(|prefix| format!("'{prefix}'")).collect::<Vec<_>>().join(", ");
     let last = |prefix: &str| prefix.rsplit('.').next().unwrap_or_default().to_ascii_lowercase();
     let is_beauty =
         |prefix: &&&str| ["combined", "rgb", "rgba", "color", "beauty", "image"].contains(&last(prefix).as_str());
-    let prefix = prefixes.iter().find(|prefix| prefix.is_empty()).or_else(|| prefixes.iter().find(is_beauty));
-    let prefix = prefix.or_else(|| prefixes.first().filter(|_| prefixes.len() == 1)).map(|prefix| (*prefix).to_owned());
-    if let Some(prefix) = prefix {
-        let mut take = |letter| channels.take(&full(&prefix, letter));
+    let of_picture = || prefixes.iter().find(|prefix| prefix.is_empty()).or_else(|| prefixes.iter().find(is_beauty));
+    let prefix = match told {
+        Some(told) => {
+            let found = prefixes.iter().find(|prefix| **prefix == told);
+            let reason = || format!("it has no layer '{told}' of red, green and blue (--variable), but {}", listed());
+            Some(found.ok_or_else(|| unreadable(path, reason()))?)
+        }
+        None => of_picture().or_else(|| prefixes.first().filter(|_| prefixes.len() == 1)),
+    };
+    let no_bands = || SceneError::NoBands { file: path.to_owned(), expected: EXPECTED };
+    if let Some(prefix) = prefix.map(|prefix| (*prefix).to_owned()) {
+        let mut take = |letter| channels.take(&full(&prefix, letter)).ok_or_else(no_bands);
         let planes = [take("R")?, take("G")?, take("B")?];
-        return Some((prefix, planes));
+        return Ok((prefix, planes));
+    }
+    if prefixes.len() > 1 {
+        let reason = format!("it has several layers of colors, {}: expected --variable with the name of one", listed());
+        return Err(unreadable(path, reason));
     }
     let has_chroma = ["RY", "BY"].iter().any(|name| channels.get(name).is_some());
-    let gray = if has_chroma { None } else { channels.take("Y") }?;
-    Some((String::new(), [gray.clone(), gray.clone(), gray]))
+    let gray = if has_chroma { None } else { channels.take("Y") }.ok_or_else(no_bands)?;
+    Ok((String::new(), [gray.clone(), gray.clone(), gray]))
 }
 
 /// Returns the matrix from colors of these primaries to linear sRGB, their white adapted to D65 (Bradford).
@@ -100,21 +127,26 @@ mod tests {
 
     #[test]
     fn colors_are_the_picture_not_another_pass() {
-        let take = |names: &[&str]| {
+        let take_of = |names: &[&str], told: Option<&str>| {
             let planes = names.iter().map(|name| ((*name).to_owned(), Array2::zeros((1, 1)))).collect();
             let mut channels = Stated::new("channel", planes);
-            colors_of(&mut channels)
+            colors_of(Path::new("a.exr"), &mut channels, told)
                 .map(|(prefix, _)| (prefix, channels.names().map(str::to_owned).collect::<Vec<_>>()))
         };
+        let take = |names: &[&str]| take_of(names, None);
         let pass = |pass: &str| ["R", "G", "B"].map(|letter| format!("{pass}.{letter}"));
         let both = [pass("V.Noisy Image"), pass("V.Combined")].concat();
         let names: Vec<&str> = both.iter().map(String::as_str).collect();
         let (prefix, left) = take(&names).unwrap();
         assert_eq!((prefix.as_str(), left.len()), ("V.Combined", 3));
         assert_eq!(take(&["Y"]).unwrap().0, "");
-        assert!(take(&["Y", "RY", "BY"]).is_none() && take(&["R", "G"]).is_none());
+        assert!(take(&["Y", "RY", "BY"]).is_err() && take(&["R", "G"]).is_err());
         // Of two passes neither of which is called a picture none is chosen.
         let two = [pass("x"), pass("y")].concat();
-        assert!(take(&two.iter().map(String::as_str).collect::<Vec<_>>()).is_none());
+        let two: Vec<&str> = two.iter().map(String::as_str).collect();
+        let message = take(&two).unwrap_err().to_string();
+        assert!(message.contains("'x', 'y'") && message.contains("--variable"), "{message}");
+        assert_eq!(take_of(&two, Some("y")).unwrap().0, "y");
+        assert!(take_of(&two, Some("z")).is_err());
     }
 }

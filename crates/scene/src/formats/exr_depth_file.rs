@@ -6,9 +6,9 @@ use ndarray::Array2;
 
 use super::{
     exr_depth::{depth_channel, kind_of, note_of_kind},
+    exr_layers::{PlacedPlane, read_placed_planes},
     reading::{DepthKind, Frame},
-    spectral_exr::read_placed_planes,
-    stated::note_of,
+    stated::{Noted, note_of},
     unusable::unreadable,
 };
 use crate::SceneError;
@@ -20,18 +20,17 @@ pub(super) struct DepthChannel {
     pub(super) kind: DepthKind,
     /// The picture of which it has a part.
     pub(super) frame: Frame,
-    /// What of the file is not used.
-    pub(super) notes: Vec<String>,
 }
 
 /// Reads the channel of depth of an EXR file: that of the name told, or else the one that is called a depth, or the only one.
 ///
 /// # Errors
 /// When the file cannot be read, or has no such channel.
-pub(super) fn read_depth_exr(path: &Path, told: Option<&str>) -> Result<DepthChannel, SceneError> {
-    let placed = read_placed_planes(path)?;
+pub(super) fn read_depth_exr(path: &Path, told: Option<&str>) -> Result<Noted<DepthChannel>, SceneError> {
+    let mut notes = vec![];
+    let placed = read_placed_planes(path)?.told_in(&mut notes);
     let wrong = |reason: String| unreadable(path, reason);
-    let names = placed.iter().map(|(name, ..)| name.clone()).collect::<Vec<_>>();
+    let names = placed.iter().map(|own| own.name.clone()).collect::<Vec<_>>();
     let (name, others) = match told {
         Some(told) if names.iter().any(|name| name == told) => {
             (told.to_owned(), names.iter().filter(|name| *name != told && *name != "A").cloned().collect())
@@ -40,15 +39,15 @@ pub(super) fn read_depth_exr(path: &Path, told: Option<&str>) -> Result<DepthCha
             return Err(wrong(format!("it has no channel '{told}', expected one of {}", names.join(", "))));
         }
         None => {
-            let planes = placed.iter().map(|(name, plane, _)| (name.clone(), plane)).collect();
+            let planes = placed.iter().map(|own| (own.name.clone(), &own.plane)).collect();
             let expected = "it has no channel that is known for a depth, expected 'Z', 'Depth.Z', 'distance', a single channel, or a name \
                             (--depth-variable)";
             depth_channel(planes).ok_or_else(|| wrong(expected.to_owned()))?
         }
     };
-    let found = placed.into_iter().find(|(own, ..)| *own == name);
-    let (name, plane, frame) = found.ok_or_else(|| wrong("its depth is not there".to_owned()))?;
-    let mut notes: Vec<String> = note_of(path, "channel", &others).into_iter().collect();
+    let found = placed.into_iter().find(|own| own.name == name);
+    let PlacedPlane { name, plane, frame } = found.ok_or_else(|| wrong("its depth is not there".to_owned()))?;
+    notes.extend(note_of(path, "channel", &others));
     notes.extend(note_of_kind(path, &name));
-    Ok(DepthChannel { kind: kind_of(&name), name, plane, frame, notes })
+    Ok(Noted::new(DepthChannel { kind: kind_of(&name), name, plane, frame }, notes))
 }

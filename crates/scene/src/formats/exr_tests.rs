@@ -391,9 +391,9 @@ fn wrong_contents_are_refused_in_one_sentence() {
     refused(vec![(s0, FlatSamples::F32(vec![1.0, 1.0, 1.0, -2.0]))], &[], &["row 1, column 1", "-2"]);
     refused(vec![(s0, flat(1.0)), ("Z", flat(0.0))], &[], &["depth", "row 0"]);
     refused(vec![(s0, flat(1.0)), ("distance", flat(-1.0))], &[], &["depth"]);
-    refused(vec![(s0, flat(1.0)), ("T.600nm", flat(1.0))], &[], &["mixed", s0, "T.600nm"]);
+    refused(vec![(s0, flat(1.0)), ("T.600nm", flat(1.0))], &[], &["one quantity", s0, "T.600nm"]);
     refused(vec![(s0, flat(1.0)), ("S0.500,0nm", flat(1.0))], &[], &["same wavelength", s0]);
-    refused(vec![(s0, flat(1.0))], &[("emissiveUnits", "lm")], &["units", "'lm'"]);
+    refused(vec![(s0, flat(1.0))], &[("emissiveUnits", "lm")], &["emissiveUnits", "'lm'"]);
     refused(vec![(s0, flat(1.0))], &[("viewFocalPx", "-3")], &["focal"]);
     refused(vec![(s0, flat(1.0))], &[("viewHorizontalFovDeg", "200")], &["200°"]);
 }

@@ -13,6 +13,8 @@ use super::{
     reading::FileQuantity,
     smooth_lift::{Colors, SmoothLift},
     stated::name_of,
+    understood::bands,
+    unusable::unreadable,
 };
 use crate::{SceneError, SceneLight, resampled};
 
@@ -51,7 +53,14 @@ pub(super) fn lit(
             };
             let lux = lux(own_lux);
             let (basis, light) = white_basis(&grid, options.light.as_ref(), lux)?;
-            let n_dark = (0..grid.len()).filter(|&band| basis.iter().all(|color| color[band] <= 0.0)).count();
+            let n_dark = (0..grid.len()).filter(|&band| basis.iter().all(|color| color[band].max(0.0) == 0.0)).count();
+            if n_dark == grid.len() {
+                let reason = format!(
+                    "a display sends no light at {}, and its colors do not tell what would be there: expected bands in 380–780 nm, or a cube",
+                    bands(&grid)
+                );
+                return Err(unreadable(path, reason));
+            }
             if n_dark > 0 {
                 let name = name_of(path);
                 notes.push(format!(

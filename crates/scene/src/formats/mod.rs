@@ -21,12 +21,15 @@ mod exr_attributes;
 mod exr_colors;
 mod exr_depth;
 mod exr_depth_file;
+mod exr_layers;
 mod exr_samples;
 mod exr_stream;
 #[cfg(test)]
 mod exr_tests;
 mod exr_write;
 mod flat_size;
+mod gray_picture;
+mod hidden_layer;
 #[cfg(test)]
 mod input_tests;
 #[cfg(test)]
@@ -48,15 +51,21 @@ mod point_table;
 mod primaries;
 mod radiance_header;
 mod raw_depth;
+mod read_contents;
 mod read_options;
 mod read_scene;
 mod reading;
 mod reduced;
 mod scene_depth;
+#[cfg(test)]
+mod secondary_tests;
 mod smooth_lift;
 mod spectral_exr;
 mod stated;
+mod tiff_bands;
+mod tiff_directory;
 mod tiff_file;
+mod tiff_page;
 mod understood;
 mod unmeasured;
 mod unusable;
@@ -80,7 +89,7 @@ pub use photons::joules_per_photon;
 pub use picture::{PictureSamples, notes_on_samples, read_picture, read_picture_samples};
 pub use point_table::PointTable;
 pub use read_options::{Part, ReadOptions};
-pub use read_scene::{read_hidden_layer, read_scene};
+pub use read_scene::read_scene;
 pub use reading::{DepthKind, FileQuantity, FileReading, NoData, Panorama};
 pub use spectral_exr::{SpectralFile, read_planes_exr, read_spectral_exr};
 pub use unmeasured::{FillDepth, filled_depth};

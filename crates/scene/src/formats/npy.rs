@@ -3,7 +3,7 @@
 use std::{fs::File, io::Read, path::Path};
 
 use super::{
-    stated::{Stated, short},
+    stated::{Noted, Stated, name_of, short},
     unusable::{check_memory, unreadable},
 };
 use crate::SceneError;
@@ -19,25 +19,50 @@ pub(super) struct NpyArray {
     pub(super) values: Vec<f32>,
     /// The largest number that whole numbers of its type have; `None` for floats.
     pub(super) top: Option<f64>,
+    /// Bytes behind its numbers, as of another array.
+    n_more: usize,
+}
+
+impl NpyArray {
+    /// Returns the array with what is to be said of its file.
+    pub(super) fn noted(self, path: &Path) -> Noted<Self> {
+        let n = self.n_more;
+        let note = (n > 0).then(|| format!("{}: {n} bytes behind its array are not used", name_of(path)));
+        Noted::new(self, note)
+    }
 }
 
 /// Reads an array.
 ///
 /// # Errors
 /// When it is none, is truncated, or has other elements than real numbers.
-pub(super) fn read_npy(path: &Path) -> Result<NpyArray, SceneError> {
+pub(super) fn read_npy(path: &Path) -> Result<Noted<NpyArray>, SceneError> {
     let mut file = File::open(path).map_err(|error| unreadable(path, error))?;
     let length = file.metadata().map_err(|error| unreadable(path, error))?.len();
     // The numbers of the file, the single floats that they become, and the planes that are made of these.
     check_memory(path, length.saturating_mul(9), length)?;
     let mut bytes = vec![];
     file.read_to_end(&mut bytes).map_err(|error| unreadable(path, error))?;
-    parse(&bytes).map_err(|reason| unreadable(path, reason))
+    parse(&bytes).map_err(|reason| unreadable(path, reason)).map(|array| array.noted(path))
 }
 
-/// Reads the array of these bytes.
-pub(super) fn parse(bytes: &[u8]) -> Result<NpyArray, String> {
-    let truncated = || "the file ends too early (truncated)".to_owned();
+/// What stands before the numbers of an array.
+struct Header {
+    sides: Vec<usize>,
+    /// The kind of its elements, without their order.
+    kind: String,
+    is_big_endian: bool,
+    /// Whether the first axis is the fastest.
+    is_fortran: bool,
+    /// Where its numbers begin.
+    n_bytes: usize,
+}
+
+fn truncated() -> String {
+    "the file ends too early (truncated)".to_owned()
+}
+
+fn header_of(bytes: &[u8]) -> Result<Header, String> {
     if !bytes.starts_with(MAGIC) {
         return Err("it is no array of NumPy".to_owned());
     }
@@ -67,12 +92,18 @@ pub(super) fn parse(bytes: &[u8]) -> Result<NpyArray, String> {
     }
     let kind = kind.trim_matches(['\'', '"']).to_owned();
     let (order, kind) = kind.split_at(usize::from(kind.starts_with(['<', '>', '|', '='])));
-    let is_big_endian = order == ">";
-    let Some((size, top, number)) = element(kind) else {
-        return Err(format!("its elements are '{}', expected real numbers", short(kind)));
+    let (is_big_endian, kind) = (order == ">", kind.to_owned());
+    Ok(Header { sides, kind, is_big_endian, is_fortran, n_bytes: from + length })
+}
+
+/// Reads the array of these bytes.
+pub(super) fn parse(bytes: &[u8]) -> Result<NpyArray, String> {
+    let Header { sides, kind, is_big_endian, is_fortran, n_bytes } = header_of(bytes)?;
+    let Some((size, top, number)) = element(&kind) else {
+        return Err(format!("its elements are '{}', expected real numbers", short(&kind)));
     };
     let n = sides.iter().try_fold(1_usize, |n, &side| n.checked_mul(side)).unwrap_or(usize::MAX);
-    let data = &bytes[from + length..];
+    let data = &bytes[n_bytes..];
     if data.len() / size < n {
         return Err(truncated());
     }
@@ -100,7 +131,12 @@ pub(super) fn parse(bytes: &[u8]) -> Result<NpyArray, String> {
     } else {
         (0..n).map(value).collect()
     };
-    Ok(NpyArray { sides, values, top })
+    Ok(NpyArray { sides, values, top, n_more: data.len() - n * size })
+}
+
+/// Whether an array of these bytes has sides that are wanted and real numbers.
+pub(super) fn is_array_of(start: &[u8], is_wanted: impl Fn(&[usize]) -> bool) -> bool {
+    header_of(start).is_ok_and(|header| element(&header.kind).is_some() && is_wanted(&header.sides))
 }
 
 /// The bytes of an element, the largest whole number of its type, and how it is read.
@@ -172,7 +208,7 @@ pub(super) mod tests {
         let check = |descr: &str, data: Vec<u8>, top: Option<f64>| {
             let array = parse(&npy(descr, false, "(2, 3)", &data)).unwrap();
             let values = vec![0.0, 1.0, 2.0, 3.0, 4.0, 5.0];
-            assert_eq!(array, NpyArray { sides: vec![2, 3], values, top }, "{descr}");
+            assert_eq!(array, NpyArray { sides: vec![2, 3], values, top, n_more: 0 }, "{descr}");
         };
         let of = |f: &dyn Fn(u8) -> Vec<u8>| (0..6).flat_map(f).collect::<Vec<u8>>();
         check("<f4", of(&|v| f32::from(v).to_le_bytes().to_vec()), None);

@@ -12,12 +12,15 @@ use super::{
     axes,
     contents::Cube,
     mat::{DEPTHS, WAVES},
-    npy::{NpyArray, parse},
+    npy::{NpyArray, is_array_of, parse},
     read_options::ReadOptions,
-    stated::{name_of, note_of, short},
+    stated::{Noted, name_of, note_of, short},
     unusable::{check_memory, unreadable},
 };
 use crate::SceneError;
+
+/// Bytes of an array in which its header ends.
+const MOST_HEADER_BYTES: u64 = 1 << 16;
 
 /// An archive whose arrays are read by name.
 struct Archive<'a> {
@@ -26,6 +29,8 @@ struct Archive<'a> {
     length: u64,
     /// The names of its files.
     names: Vec<String>,
+    /// What is to be said of what was read.
+    notes: Vec<String>,
 }
 
 impl<'a> Archive<'a> {
@@ -36,7 +41,7 @@ impl<'a> Archive<'a> {
         let zip = ZipArchive::new(BufReader::new(file)).map_err(|error| wrong(format!("it is no archive: {error}")))?;
         let names = zip.file_names().map(|name| Ok(name?.into_owned())).collect::<Result<Vec<String>, ZipError>>();
         let names = names.map_err(|error| wrong(format!("it is no archive: {error}")))?;
-        Ok(Self { path, zip, length, names })
+        Ok(Self { path, zip, length, names, notes: vec![] })
     }
 
     fn read(&mut self, name: &str) -> Result<NpyArray, SceneError> {
@@ -48,7 +53,7 @@ impl<'a> Archive<'a> {
         let mut bytes = vec![];
         let limit = entry.size();
         entry.by_ref().take(limit).read_to_end(&mut bytes).map_err(|error| wrong(error.to_string()))?;
-        parse(&bytes).map_err(wrong)
+        Ok(parse(&bytes).map_err(wrong)?.noted(Path::new(name)).told_in(&mut self.notes))
     }
 
     /// Returns the file of the array of this name.
@@ -59,11 +64,15 @@ impl<'a> Archive<'a> {
         })
     }
 
-    /// Returns the arrays whose number of sides is wanted, but for lists of wavelengths.
-    fn of_sides(&mut self, is_wanted: impl Fn(&NpyArray) -> bool) -> Result<Vec<String>, SceneError> {
+    /// Returns the arrays of numbers whose sides are wanted, but for lists of wavelengths; what else there is, as texts, is none.
+    fn of_sides(&mut self, is_wanted: impl Fn(&[usize]) -> bool) -> Result<Vec<String>, SceneError> {
         let mut found = vec![];
         for name in self.names.clone() {
-            if name.ends_with(".npy") && !is_list(&name) && is_wanted(&self.read(&name)?) {
+            let wrong = |error: String| unreadable(self.path, format!("its '{}': {error}", short(&name)));
+            let entry = self.zip.by_name(&name).map_err(|error| wrong(error.to_string()))?;
+            let mut start = vec![];
+            entry.take(MOST_HEADER_BYTES).read_to_end(&mut start).map_err(|error| wrong(error.to_string()))?;
+            if name.ends_with(".npy") && !is_list(&name) && is_array_of(&start, &is_wanted) {
                 found.push(name);
             }
         }
@@ -89,9 +98,13 @@ pub(super) fn read_npz(path: &Path, options: &ReadOptions) -> Result<Cube, Scene
     let reading = &options.reading;
     let chosen = match &reading.variable {
         Some(told) => archive.named(told)?,
-        None => match &archive.of_sides(|array| array.sides.len() == 3)?[..] {
+        None => match &archive.of_sides(|sides| sides.len() == 3)?[..] {
             [one] => one.clone(),
-            [] => return Err(wrong("it has no array of three axes: expected --variable".to_owned())),
+            [] => {
+                let reason =
+                    format!("it has no array of three axes, but {}: expected a cube", shown(archive.names.iter()));
+                return Err(wrong(reason));
+            }
             cubes => return Err(wrong(format!("it has several cubes, {}: expected --variable", shown(cubes.iter())))),
         },
     };
@@ -112,20 +125,20 @@ pub(super) fn read_npz(path: &Path, options: &ReadOptions) -> Result<Cube, Scene
     let unused: Vec<String> = archive.names.iter().filter(is_unused).map(|name| bare(name).to_owned()).collect();
     let ambiguous = axes::note(&array.sides, reading.axes.as_deref(), n_bands);
     let ambiguous = ambiguous.map(|note| format!("{}: '{}': {note}", name_of(path), bare(&chosen)));
-    let notes = note_of(path, "array", &unused).into_iter().chain(ambiguous).collect();
+    let notes = archive.notes.into_iter().chain(note_of(path, "array", &unused)).chain(ambiguous).collect();
     Ok(Cube { planes, top: array.top, wavelengths_nm: own, quantity: None, unit: None, notes })
 }
 
-/// Reads the depth of an archive: the array that is told, that which is called one, or the only one of two axes; with its name and notes.
+/// Reads the depth of an archive: the array that is told, that which is called one, or the only one of two axes; with its name.
 ///
 /// # Errors
 /// When it is no archive, an array cannot be read, or no array or several could be the depth.
-pub(super) fn read_npz_plane(path: &Path, told: Option<&str>) -> Result<(String, NpyArray, Vec<String>), SceneError> {
+pub(super) fn read_npz_plane(path: &Path, told: Option<&str>) -> Result<Noted<(String, NpyArray)>, SceneError> {
     let mut archive = Archive::open(path)?;
     let chosen = match told {
         Some(told) => archive.named(told)?,
         None => {
-            let planes = archive.of_sides(|array| array.sides.iter().filter(|side| **side != 1).count() == 2)?;
+            let planes = archive.of_sides(|sides| sides.iter().filter(|side| **side != 1).count() == 2)?;
             let called = DEPTHS.iter().find_map(|own| planes.iter().find(|name| bare(name).eq_ignore_ascii_case(own)));
             match (called, &planes[..]) {
                 (Some(called), _) => called.clone(),
@@ -143,7 +156,8 @@ pub(super) fn read_npz_plane(path: &Path, told: Option<&str>) -> Result<(String,
     let array = archive.read(&chosen)?;
     let unused: Vec<String> =
         archive.names.iter().filter(|name| **name != chosen).map(|name| bare(name).to_owned()).collect();
-    Ok((bare(&chosen).to_owned(), array, note_of(path, "array", &unused).into_iter().collect()))
+    let notes = archive.notes.into_iter().chain(note_of(path, "array", &unused));
+    Ok(Noted::new((bare(&chosen).to_owned(), array), notes))
 }
 
 fn shown<'a>(names: impl Iterator<Item = &'a String>) -> String {

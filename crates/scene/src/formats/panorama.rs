@@ -12,7 +12,6 @@ use rayon::prelude::*;
 use super::{
     contents::{Contents, Image},
     picture::linear_srgb,
-    raw_depth::RawDepth,
     read_options::ReadOptions,
     reading::{DepthKind, Frame, Panorama},
     unusable::{check_made, unreadable},
@@ -30,7 +29,6 @@ const MOST_COLUMNS: usize = 65_536;
 pub(super) fn look(
     path: &Path,
     contents: &mut Contents,
-    depth: &mut Option<RawDepth>,
     kind: Panorama,
     options: &ReadOptions,
 ) -> Result<(), SceneError> {
@@ -52,7 +50,7 @@ pub(super) fn look(
     // A film that needs less gets means over blocks; depths stay as they are.
     let coarser = options.finest_tangent.map_or(1, |finest| (finest / sphere.step()) as usize);
     let divides = |bin: &usize| {
-        sphere.may_be_binned() && rows.is_multiple_of(*bin) && columns.is_multiple_of(*bin) && depth.is_none()
+        sphere.may_be_binned() && rows.is_multiple_of(*bin) && columns.is_multiple_of(*bin) && contents.depth.is_none()
     };
     let bin = (1..=coarser.clamp(1, 64)).rev().find(divides).unwrap_or(1);
     let sphere = Sphere::new(path, kind, rows / bin, columns / bin)?;
@@ -93,7 +91,7 @@ pub(super) fn look(
                 Image::Linear { planes: planes.each_ref().map(seen), white_cd_m2: None }
             }
         };
-    if let Some(depth) = depth {
+    if let Some(depth) = &mut contents.depth {
         if options.reading.depth_kind.is_none() && depth.kind == DepthKind::Axial {
             depth.kind = DepthKind::Radial;
         }

@@ -5,22 +5,22 @@ use std::path::Path;
 use ndarray::Array2;
 
 use super::{
-    stated::name_of,
+    stated::{Noted, name_of},
     unusable::{check_memory, unreadable},
 };
 use crate::SceneError;
 
-/// The planes of a portable float map: one of gray, or red, green and blue; and what of it is not used.
+/// The planes of a portable float map: one of gray, or red, green and blue.
 ///
 /// The scale in its header says by its sign in which order bytes are. Its size is what most programs write anyhow and none multiplies by (the
 /// disparities of Middlebury have 1/255): it is named.
-pub(super) fn read_pfm(path: &Path) -> Result<(Vec<Array2<f32>>, Option<String>), SceneError> {
+pub(super) fn read_pfm(path: &Path) -> Result<Noted<Vec<Array2<f32>>>, SceneError> {
     let length = std::fs::metadata(path).map_err(|error| unreadable(path, error))?.len();
     check_memory(path, length.saturating_mul(2), length)?;
     let bytes = std::fs::read(path).map_err(|error| unreadable(path, error))?;
     let (planes, unused) = parse(&bytes).map_err(|reason| unreadable(path, reason))?;
     let note = (!unused.is_empty()).then(|| format!("{}: {} are not used", name_of(path), unused.join(" and ")));
-    Ok((planes, note))
+    Ok(Noted::new(planes, note))
 }
 
 /// Returns the planes, and in words what else there is.

@@ -197,19 +197,21 @@ pub(super) fn oriented(path: &Path, size: Option<(usize, usize)>) -> Result<Orie
     notes.extend(colors.as_ref().map(|colors| {
         format!("{}: its codes are converted to light by what it states, {}", name_of(path), colors.name)
     }));
-    if picture.color().has_alpha() {
-        let opaque = match &picture {
-            DynamicImage::ImageLumaA8(p) => p.pixels().all(|p| p.0[1] == u8::MAX),
-            DynamicImage::ImageRgba8(p) => p.pixels().all(|p| p.0[3] == u8::MAX),
-            DynamicImage::ImageLumaA16(p) => p.pixels().all(|p| p.0[1] == u16::MAX),
-            DynamicImage::ImageRgba16(p) => p.pixels().all(|p| p.0[3] == u16::MAX),
-            _ => false,
-        };
-        if !opaque {
-            notes.extend(note_of(path, "channel", &["opacity".to_owned()]));
-        }
+    if has_holes(&picture) {
+        notes.extend(note_of(path, "channel", &["opacity".to_owned()]));
     }
     Ok(Oriented { picture, colors, is_turned, notes })
+}
+
+/// Whether a pixel of a picture is not opaque.
+pub(super) fn has_holes(picture: &DynamicImage) -> bool {
+    match picture {
+        DynamicImage::ImageLumaA8(p) => p.pixels().any(|p| p.0[1] < u8::MAX),
+        DynamicImage::ImageRgba8(p) => p.pixels().any(|p| p.0[3] < u8::MAX),
+        DynamicImage::ImageLumaA16(p) => p.pixels().any(|p| p.0[1] < u16::MAX),
+        DynamicImage::ImageRgba16(p) => p.pixels().any(|p| p.0[3] < u16::MAX),
+        other => other.color().has_alpha(),
+    }
 }
 
 /// Returns the note on colors that a display cannot show, a share of all pixels.

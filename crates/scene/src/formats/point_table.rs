@@ -176,7 +176,7 @@ impl Color {
         if lumens > 0.0 {
             return Ok(self.on(grid).into_iter().map(|value| value / lumens).collect());
         }
-        Err("a light that no eye sees has no lux or candela: expected w_per_sr".to_owned())
+        Err("lux or candela of a light that no eye sees".to_owned())
     }
 
     /// Returns the spectrum, relative, as means over bands: of a line its whole power, 1 W, in the band that it falls into.
@@ -220,10 +220,10 @@ impl Line {
     }
 
     fn on(&self, grid: &WavelengthGrid) -> Result<PointLight, SceneError> {
-        let wrong = |reason: String| SceneError::Setting {
+        let wrong = |value: String| SceneError::Setting {
             what: "the brightness of a point",
-            value: reason,
-            expected: "another".to_owned(),
+            value,
+            expected: "w_per_sr".to_owned(),
         };
         let relative = || self.color.on(grid).into_iter();
         let scaled = |values: Vec<f64>, by: f64| values.into_iter().map(|value| (by * value) as f32).collect();

@@ -1,5 +1,7 @@
 //! What may be said of a scene beside its file.
 
+use std::path::PathBuf;
+
 use dioptric_spectrum::{Illuminant, WavelengthGrid};
 
 use super::{reading::FileReading, unmeasured::FillDepth};
@@ -67,6 +69,9 @@ pub struct ReadOptions {
     pub part: Option<Part>,
     /// Whether means over blocks of samples do of a cube that is larger than the memory allows.
     pub summary: bool,
+    /// A file of what lies behind the first surface: radiance and depth of the same samples, seen from the same place. Depth 0 or NaN says that
+    /// nothing is known there: it becomes that of the first surface.
+    pub hidden: Option<PathBuf>,
     /// What else the file does not say itself.
     pub reading: FileReading,
 }

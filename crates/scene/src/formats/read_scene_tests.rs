@@ -3,7 +3,7 @@
 use super::*;
 use crate::{FillDepth, SceneLight, write_spectral_exr};
 use approx::assert_relative_eq;
-use dioptric_spectrum::Illuminant;
+use dioptric_spectrum::{Illuminant, Quantity};
 use ndarray::Array2;
 
 #[test]

@@ -27,7 +27,7 @@ pub struct FileReading {
     /// The center of each band, nm, in the order of the file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub wavelengths_nm: Option<Vec<f64>>,
-    /// The variable of a MATLAB file, or the array of an HDF5 or `.npz` file, that holds the cube.
+    /// The variable of a MATLAB file, or the array of an HDF5 or `.npz` file, that holds the cube; the layer of an EXR file that holds the colors.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub variable: Option<String>,
     /// The order of the axes of an array: `yxb` (rows, columns, bands) and its like.
@@ -46,7 +46,7 @@ pub struct FileReading {
     /// What the depth's numbers are; along the axis if left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub depth_kind: Option<DepthKind>,
-    /// The channel of an EXR file, or the array of a MATLAB, HDF5 or `.npz` file, that holds the depth.
+    /// The channel of an EXR file, or the array of a MATLAB, HDF5 or `.npz` file, that holds the depth; the number of one of several planes of a TIFF.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub depth_variable: Option<String>,
     /// A file of camera data, in place of one in the scene's file or beside it.
@@ -205,7 +205,7 @@ pub enum NoData {
     /// They are black.
     #[default]
     Black,
-    /// They get the nearest sample of their row.
+    /// They get the nearest sample of their row, but negative ones, which are noise around 0, become 0.
     Fill,
     /// The scene is refused by the place of the first.
     Refuse,

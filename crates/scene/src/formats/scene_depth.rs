@@ -7,7 +7,7 @@ use ndarray::Array2;
 
 use super::{
     camera::CameraData,
-    contents::{Contents, is_of},
+    contents::{Contents, MATLAB_OR_HDF5, is_of},
     depth::{depth_beside, files_beside, likely_beside, read_depth},
     raw_depth::{DepthWords, RawDepth},
     read_options::ReadOptions,
@@ -48,7 +48,7 @@ pub(super) fn raw_depth(
             unused.extend(beside().into_iter().filter(|name| *name != name_of(file)));
             Some(read_depth(file, words)?)
         }
-        (None, own) if words.variable.is_some() && is_of(path, &["mat", "h5", "hdf5", "npz"]) => {
+        (None, own) if words.variable.is_some() && (is_of(path, MATLAB_OR_HDF5) || is_of(path, &["npz"])) => {
             unused = beside();
             unused.extend(own.map(|own| own.from));
             Some(read_depth(path, words)?)

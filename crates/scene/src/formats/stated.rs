@@ -2,8 +2,9 @@
 //!
 //! Whatever a reader meets by name (keys of a header, attributes, channels, parts, variables, pages) it puts into a [`Stated`] and
 //! takes out what it uses. What is left and is not known to be harmless is named in a note: nothing that a file states is dropped.
+//! Readers, of a scene's own file as of those beside it, return [`Noted`] values, which cannot be had without a place for the notes.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// How many names a note holds; of more it has the number.
 const MOST_NAMES: usize = 6;
@@ -68,6 +69,46 @@ impl<T> Stated<T> {
     }
 }
 
+/// What was read of a file, with what is to be said of it: the first cannot be had without a place for the second.
+#[must_use]
+#[derive(Debug)]
+pub(super) struct Noted<T> {
+    value: T,
+    notes: Vec<String>,
+}
+
+impl<T> Noted<T> {
+    pub(super) fn new(value: T, notes: impl IntoIterator<Item = String>) -> Self {
+        Self { value, notes: notes.into_iter().collect() }
+    }
+
+    /// Returns what was read, and puts what is to be said of it behind the notes of who asked.
+    pub(super) fn told_in(self, notes: &mut Vec<String>) -> T {
+        notes.extend(self.notes);
+        self.value
+    }
+}
+
+/// Returns the notes on several files of a folder, each of the same words once.
+pub(super) fn merged(files: impl Iterator<Item = (PathBuf, Vec<String>)>) -> Vec<String> {
+    let mut told: Vec<(String, String, usize)> = vec![];
+    for (file, notes) in files {
+        let start = format!("{}: ", name_of(&file));
+        for note in notes {
+            let words = note.strip_prefix(&start).unwrap_or(&note).to_owned();
+            match told.iter_mut().find(|(own, ..)| *own == words) {
+                Some((.., n_more)) => *n_more += 1,
+                None => told.push((words, note, 0)),
+            }
+        }
+    }
+    let sentence = |(_, note, n_more): (String, String, usize)| match n_more {
+        0 => note,
+        n => format!("{note}; {n} files beside it say the same"),
+    };
+    told.into_iter().map(sentence).collect()
+}
+
 /// Returns the sentence that names what of a file is not used.
 pub(super) fn note_of(file: &Path, kind: &str, names: &[String]) -> Option<String> {
     if names.is_empty() {
@@ -95,6 +136,18 @@ pub(super) fn short(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn notes_of_several_files_are_told_once() {
+        let notes = |name: &str, words: &[&str]| {
+            (PathBuf::from("f").join(name), words.iter().map(|words| format!("{name}: {words}")).collect::<Vec<_>>())
+        };
+        let told = merged([notes("a", &["x"]), notes("b", &["x", "y"]), notes("c", &["x"])].into_iter());
+        assert_eq!(told, ["a: x; 2 files beside it say the same", "b: y"]);
+        let mut all = vec!["before".to_owned()];
+        assert_eq!(Noted::new(4, told).told_in(&mut all), 4);
+        assert_eq!(all.len(), 3);
+    }
 
     #[test]
     fn what_is_left_is_named() {

@@ -79,6 +79,9 @@ impl MatFile {
         check_memory(path, length, length)?;
         let mut bytes = Vec::new();
         file.read_to_end(&mut bytes).map_err(|error| unreadable(path, error))?;
+        if bytes.starts_with(b"CDF") {
+            return Err(unreadable(path, "it is a classic NetCDF file, expected one of NetCDF-4 (nccopy -k nc4)"));
+        }
         if is_hdf5(&bytes) {
             return Self::of_hdf5(path, bytes, wanted);
         }

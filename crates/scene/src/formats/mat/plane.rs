@@ -5,7 +5,10 @@ use std::path::Path;
 use ndarray::Array2;
 
 use super::{
-    super::{stated::note_of, unusable::unreadable},
+    super::{
+        stated::{Noted, note_of},
+        unusable::unreadable,
+    },
     container::{MatFile, WHOLE},
     elements::Listed,
     packing::{Packing, length_m},
@@ -25,14 +28,13 @@ pub(in super::super) struct Plane {
     pub(in super::super) top: Option<f64>,
     /// The length of 1, m, where the file states it.
     pub(in super::super) unit_m: Option<f64>,
-    pub(in super::super) notes: Vec<String>,
 }
 
 /// Reads the one plane of a file, that whose name says that it is a depth, or that of the name told.
 ///
 /// # Errors
 /// When it has none, or several of other names.
-pub(in super::super) fn read_plane(path: &Path, told: Option<&str>) -> Result<Plane, SceneError> {
+pub(in super::super) fn read_plane(path: &Path, told: Option<&str>) -> Result<Noted<Plane>, SceneError> {
     let sides_of = |own: &Listed| own.sides.iter().copied().filter(|side| *side != 1).collect::<Vec<usize>>();
     let is_plane = |own: &Listed| own.is_numeric && sides_of(own).len() == 2;
     let file = MatFile::read(path, &is_plane)?;
@@ -73,11 +75,11 @@ pub(in super::super) fn read_plane(path: &Path, told: Option<&str>) -> Result<Pl
     let of_file = file.attributes_of(WHOLE).iter().map(|own| own.name.clone());
     let left = packing.left(unit_m.is_some(), false);
     notes.extend(note_of(path, "attribute", &of_file.chain(left).collect::<Vec<_>>()));
-    Ok(Plane {
+    let plane = Plane {
         name: chosen.name.clone(),
         values: Array2::from_shape_fn((rows, columns), |place| packing.unpacked(numbers.at(at(place))) as f32),
         top: (numbers.is_integer && !packing.is_packed()).then(|| numbers.top()),
         unit_m,
-        notes,
-    })
+    };
+    Ok(Noted::new(plane, notes))
 }

@@ -1,0 +1,206 @@
+//! The layers of EXR files: their channels as single floats, and what their headers state.
+
+use std::{fs::File, io::BufReader, path::Path};
+
+use exr::{
+    meta::{MetaData, attribute::Chromaticities},
+    prelude::{AnyChannel, AnyChannels, FlatSamples, Layer, ReadChannels, ReadLayers, SampleType, read},
+};
+use ndarray::Array2;
+
+use super::{
+    band_name,
+    exr_attributes::{self, Attributes},
+    exr_colors::are_srgb,
+    reading::Frame,
+    stated::{Noted, Stated},
+    unusable::{check_memory, unreadable},
+};
+use crate::SceneError;
+
+/// What a file states of all its layers.
+pub(super) struct Head {
+    /// The display window's first column and row.
+    display: (i64, i64),
+    /// Its size, and how wide its samples are.
+    frame: Frame,
+    /// Those of its primaries and white, where they are not sRGB's.
+    pub(super) chromaticities: Option<Chromaticities>,
+}
+
+impl Head {
+    /// The display window, and where in it samples at this position begin.
+    pub(super) fn frame_of(&self, position: (i64, i64)) -> Frame {
+        Frame { x0: position.0 - self.display.0, y0: position.1 - self.display.1, ..self.frame }
+    }
+}
+
+/// A layer, its channels as single floats.
+pub(super) struct RawLayer {
+    pub(super) name: String,
+    /// Which of several eyes sees it.
+    view: Option<String>,
+    pub(super) attributes: Attributes,
+    pub(super) planes: Vec<(String, Array2<f32>)>,
+    /// Rows and columns.
+    pub(super) size: (usize, usize),
+    /// The first column and row of the data window.
+    pub(super) position: (i64, i64),
+}
+
+impl RawLayer {
+    /// Puts the name of the layer before those of its channels that have none; a layer that is called like a band is that band.
+    pub(super) fn name_channels(&mut self) {
+        if band_name::parse(&self.name).is_some() && self.planes.len() == 1 {
+            self.planes[0].0.clone_from(&self.name);
+            return;
+        }
+        // A part that is called as its channel is.
+        if let [(name, _)] = &self.planes[..]
+            && name.eq_ignore_ascii_case(&self.name)
+        {
+            return;
+        }
+        let layer = self.name.as_str();
+        for (name, _) in &mut self.planes {
+            if !layer.is_empty() && !name.contains('.') && band_name::parse(name).is_none() {
+                *name = format!("{layer}.{name}");
+            }
+        }
+    }
+
+    pub(super) fn has_bands(&self) -> bool {
+        let is_band = band_name::parse(&self.name).is_some() && self.planes.len() == 1;
+        is_band || self.planes.iter().any(|(name, _)| band_name::parse(name).is_some())
+    }
+}
+
+/// Leaves the layers of the first view, and those of none, and returns the names of the other views.
+pub(super) fn leave_other_views(layers: &mut Vec<RawLayer>) -> Vec<String> {
+    let first = layers.iter().find_map(|layer| layer.view.clone());
+    let is_other = |layer: &RawLayer| layer.view.is_some() && layer.view != first;
+    let mut others: Vec<String> =
+        layers.iter().filter(|layer| is_other(layer)).filter_map(|layer| layer.view.clone()).collect();
+    others.dedup();
+    layers.retain(|layer| !is_other(layer));
+    // Parts of a view are named after it, as `left` or `depth.left`, which its channels need not be.
+    for layer in layers.iter_mut() {
+        let Some(view) = &layer.view else { continue };
+        let rest = layer.name.strip_suffix(view.as_str()).map(|rest| rest.trim_end_matches(['.', '_']).to_owned());
+        layer.name = rest.unwrap_or_else(|| layer.name.clone());
+    }
+    others
+}
+
+/// Reads all layers; at least one.
+pub(super) fn read_layers(path: &Path) -> Result<(Head, Vec<RawLayer>), SceneError> {
+    let open = || File::open(path).map_err(|error| unreadable(path, error));
+    guard(path, open()?)?;
+    let image = read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .all_channels()
+        .all_layers()
+        .all_attributes()
+        .from_buffered(BufReader::new(open()?))
+        .map_err(|error| unreadable(path, explain(&error)))?;
+    let layers: Result<Vec<_>, _> = image.layer_data.into_iter().map(|layer| raw_layer(path, layer)).collect();
+    let layers = layers?;
+    if layers.is_empty() {
+        return Err(unreadable(path, "it has no layer"));
+    }
+    let window = image.attributes.display_window;
+    let aspect = f64::from(image.attributes.pixel_aspect);
+    if !(aspect.is_finite() && aspect > 0.0) {
+        return Err(unreadable(path, format!("its pixelAspectRatio is {aspect}, expected a number above 0")));
+    }
+    let head = Head {
+        display: (window.position.0.into(), window.position.1.into()),
+        frame: Frame { columns: window.size.0, rows: window.size.1, x0: 0, y0: 0, aspect },
+        chromaticities: image.attributes.chromaticities.filter(|own| !are_srgb(own)),
+    };
+    Ok((head, layers))
+}
+
+fn raw_layer(path: &Path, layer: Layer<AnyChannels<FlatSamples>>) -> Result<RawLayer, SceneError> {
+    let (columns, rows) = (layer.size.0, layer.size.1);
+    let planes: Result<Vec<_>, _> =
+        layer.channel_data.list.into_iter().map(|channel| plane_of(path, channel, rows, columns)).collect();
+    let position = layer.attributes.layer_position;
+    Ok(RawLayer {
+        size: (rows, columns),
+        position: (position.0.into(), position.1.into()),
+        name: layer.attributes.layer_name.as_ref().map(ToString::to_string).unwrap_or_default(),
+        view: layer.attributes.view_name.as_ref().map(ToString::to_string),
+        attributes: exr_attributes::from_layer(&layer.attributes),
+        planes: planes?,
+    })
+}
+
+fn plane_of(
+    path: &Path,
+    channel: AnyChannel<FlatSamples>,
+    rows: usize,
+    columns: usize,
+) -> Result<(String, Array2<f32>), SceneError> {
+    let samples: Vec<f32> = match channel.sample_data {
+        FlatSamples::F16(samples) => samples.into_iter().map(|v| v.to_f32()).collect(),
+        FlatSamples::F32(samples) => samples,
+        FlatSamples::U32(samples) => samples.into_iter().map(|v| v as f32).collect(),
+    };
+    let name = channel.name.to_string();
+    match Array2::from_shape_vec((rows, columns), samples) {
+        Ok(plane) => Ok((name, plane)),
+        Err(_) => Err(unreadable(path, format!("channel '{name}' has not {rows} × {columns} samples"))),
+    }
+}
+
+/// Refuses a file whose samples take more memory than they may: as they stand in the file, and as single floats where they are none.
+fn guard(path: &Path, file: File) -> Result<(), SceneError> {
+    let length = file.metadata().map_err(|error| unreadable(path, error))?.len();
+    let meta =
+        MetaData::read_from_buffered(BufReader::new(file), false).map_err(|error| unreadable(path, explain(&error)))?;
+    let bytes = meta.headers.iter().fold(0_u64, |sum, header| {
+        let samples = (header.layer_size.0 as u64).saturating_mul(header.layer_size.1 as u64);
+        let sample_bytes = header.channels.list.iter().map(|channel| match channel.sample_type {
+            SampleType::F32 => 4,
+            other => other.bytes_per_sample() as u64 + 4,
+        });
+        // Even a file without channels has a table of its rows.
+        sum.saturating_add(samples.saturating_mul(sample_bytes.sum::<u64>().max(1)))
+    });
+    check_memory(path, bytes, length)
+}
+
+/// Returns what is wrong with an EXR file in a few words.
+fn explain(error: &exr::error::Error) -> String {
+    let text = error.to_string();
+    // The crate turns the end of a file into these words.
+    if text.contains("reference to missing bytes") {
+        return "the file ends too early (truncated)".to_owned();
+    }
+    format!("no OpenEXR file that can be read ({text})")
+}
+
+/// A channel of a file, with the part of the display window that it has.
+pub(super) struct PlacedPlane {
+    pub(super) name: String,
+    pub(super) plane: Array2<f32>,
+    pub(super) frame: Frame,
+}
+
+/// Reads all channels of all layers as single floats, by name; what their headers state beside is named.
+pub(super) fn read_placed_planes(path: &Path) -> Result<Noted<Vec<PlacedPlane>>, SceneError> {
+    let (head, mut layers) = read_layers(path)?;
+    if layers.len() > 1 {
+        layers.iter_mut().for_each(RawLayer::name_channels);
+    }
+    let mut stated = Stated::new("attribute", vec![]);
+    let mut planes = vec![];
+    for layer in layers {
+        stated.merge(layer.attributes.others);
+        let frame = head.frame_of(layer.position);
+        planes.extend(layer.planes.into_iter().map(|(name, plane)| PlacedPlane { name, plane, frame }));
+    }
+    Ok(Noted::new(planes, stated.note(path, exr_attributes::is_harmless)))
+}

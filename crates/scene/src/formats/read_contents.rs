@@ -1,0 +1,248 @@
+//! What is in a file of a scene of any kind.
+
+use std::path::Path;
+
+use dioptric_spectrum::{Quantity, SpectralImage, SpectrumError, WavelengthGrid};
+use ndarray::Array2;
+
+use super::{
+    band_folder::band_folder,
+    camera::CameraData,
+    chart_table::read_chart,
+    contents::{Contents, Cube, Heeds, Hidden, Image, MATLAB_OR_HDF5, is_of},
+    cube_folder::CubeFolder,
+    envi::{contents_of_envi, header_of},
+    mat::{MatScene, read_mat},
+    no_data::mend,
+    npy::read_npy,
+    npz::read_npz,
+    pfm::read_pfm,
+    picture::{Oriented, oriented, picture_size_of},
+    picture_parts::unknown_parts,
+    primaries::into_srgb,
+    radiance_header::RadianceHeader,
+    raw_depth::RawDepth,
+    read_options::ReadOptions,
+    reading::{DepthKind, FileQuantity, light_unit},
+    reduced::reduced_size,
+    spectral_exr::{AskedChannels, RawFile, RawImage, read_raw_exr},
+    stated::{name_of, note_of},
+    tiff_file::{TiffAs, TiffFile, TiffStack, read_tiff},
+    unusable::{starts_with, unreadable},
+};
+use crate::{SceneError, View};
+
+/// Reads what is in a file of a scene, by its name and its first bytes.
+pub(super) fn contents_of(path: &Path, options: &ReadOptions) -> Result<Contents, SceneError> {
+    if path.is_dir() {
+        if let Some(cube) = CubeFolder::find(path) {
+            return cube.read(path, |face| contents_of(face, options));
+        }
+        if let Some(missing) = CubeFolder::missing(path) {
+            let reason =
+                format!("it has some faces of a cube, but of its six faces {} are missing", missing.join(", "));
+            return Err(unreadable(path, reason));
+        }
+        return band_folder(path, options.reading.wavelengths_nm.as_deref())?.into_contents(path, options);
+    }
+    if !path.exists() {
+        return Err(unreadable(path, "there is no such file"));
+    }
+    let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
+    match extension.as_str() {
+        "exr" => of_exr(path, options),
+        "hdr" if !starts_with(path, b"#?")? => contents_of_envi(path, options),
+        _ if is_of(path, MATLAB_OR_HDF5) => of_mat(path, options),
+        "npy" => of_npy(path, options),
+        "npz" => read_npz(path, options)?.into_contents(path, options),
+        "csv" => read_chart(path)?.into_contents(path, options),
+        "pfm" => of_pfm(path),
+        "tif" | "tiff" => of_tiff(path, options),
+        "jpg" | "jpeg" if cfg!(not(feature = "jpeg")) => {
+            Err(SceneError::LacksFeature { file: path.to_owned(), feature: "jpeg" })
+        }
+        "png" | "jpg" | "jpeg" | "webp" | "bmp" | "ppm" | "pgm" | "pnm" | "hdr" => of_picture(path, options, vec![]),
+        _ => match header_of(path) {
+            Some(header) => contents_of_envi(&header, options),
+            None => Err(SceneError::UnknownKind { file: path.to_owned() }),
+        },
+    }
+}
+
+/// An ordinary picture: what a display shows, or linear colors where it has floats.
+fn of_picture(path: &Path, options: &ReadOptions, mut notes: Vec<String>) -> Result<Contents, SceneError> {
+    let (columns, rows) = picture_size_of(path)?;
+    let bands = options.grid.as_ref().map_or(31, WavelengthGrid::len);
+    let reduced = reduced_size(path, options, (rows, columns), 4 * bands as u64);
+    let Oriented { picture, colors, is_turned, notes: more } =
+        oriented(path, reduced.as_ref().map(|reduced| (reduced.columns, reduced.rows)))?;
+    notes.extend(more);
+    notes.extend(reduced.map(|reduced| reduced.note));
+    notes.extend(note_of(path, "part", &unknown_parts(path)?));
+    let what = format!("a picture as a display shows it ({})", super::picture::kind_of(&picture, colors.as_ref()));
+    let image = match picture {
+        dioptric_pictures::DynamicImage::ImageRgb32F(_) | dioptric_pictures::DynamicImage::ImageRgba32F(_) => {
+            let (columns, rows) = (picture.width() as usize, picture.height() as usize);
+            let samples = picture.into_rgb32f().into_raw();
+            let plane = |k: usize| {
+                let values = samples.iter().skip(k).step_by(3).copied().collect();
+                Array2::from_shape_vec((rows, columns), values).expect("three samples a pixel")
+            };
+            let mut planes = [plane(0), plane(1), plane(2)];
+            if let Some(colors) = &colors {
+                into_srgb(&mut planes, &colors.to_srgb);
+            }
+            if is_of(path, &["hdr"]) {
+                notes.extend(RadianceHeader::read(path)?.apply(path, &mut planes)?);
+            }
+            return Ok(linear(planes, None, notes));
+        }
+        picture => Image::Codes(picture, colors),
+    };
+    Ok(Contents { is_turned, notes, heeds: Heeds::Nothing, ..Contents::of(image, what) })
+}
+
+fn linear(planes: [Array2<f32>; 3], white_cd_m2: Option<f64>, notes: Vec<String>) -> Contents {
+    let what = "linear colors as a display shows them";
+    Contents { notes, heeds: Heeds::Scale, ..Contents::of(Image::Linear { planes, white_cd_m2 }, what) }
+}
+
+fn of_pfm(path: &Path) -> Result<Contents, SceneError> {
+    let mut notes = vec![];
+    let mut planes = read_pfm(path)?.told_in(&mut notes).into_iter();
+    Ok(match (planes.next(), planes.next(), planes.next()) {
+        (Some(r), Some(g), Some(b)) => linear([r, g, b], None, notes),
+        (Some(gray), ..) => linear([gray.clone(), gray.clone(), gray], None, notes),
+        _ => return Err(unreadable(path, "it has no samples")),
+    })
+}
+
+fn of_tiff(path: &Path, options: &ReadOptions) -> Result<Contents, SceneError> {
+    // Bands that are told make a cube of what would be a picture.
+    let n_told = options.reading.wavelengths_nm.as_ref().map(Vec::len);
+    let wanted = n_told.map_or(TiffAs::Marked, |n| TiffAs::Planes(Some(n)));
+    let mut notes = vec![];
+    match read_tiff(path, wanted)?.told_in(&mut notes) {
+        TiffFile::Picture(page) => {
+            let no_data = page.no_data.map(|none| none.to_string());
+            notes.extend(note_of(path, "number for no data (GDAL)", no_data.as_slice()));
+            of_picture(path, options, notes)
+        }
+        TiffFile::Linear(mut planes, page) => {
+            planes.iter_mut().for_each(|plane| page.ignore(plane));
+            Ok(linear(planes, None, notes))
+        }
+        TiffFile::Stack(mut stack) => {
+            stack.planes.iter_mut().for_each(|plane| stack.page.ignore(plane));
+            let described = stack.page.note_of_description(path).filter(|_| stack.wavelengths_nm.is_none());
+            notes.extend(described);
+            let TiffStack { planes, wavelengths_nm, top, .. } = stack;
+            Cube { planes, top, wavelengths_nm, quantity: None, unit: None, notes }.into_contents(path, options)
+        }
+    }
+}
+
+fn of_npy(path: &Path, options: &ReadOptions) -> Result<Contents, SceneError> {
+    let mut notes = vec![];
+    let array = read_npy(path)?.told_in(&mut notes);
+    let told = options.reading.wavelengths_nm.as_ref().map(Vec::len);
+    let n_bands = told.or_else(|| options.grid.as_ref().map(WavelengthGrid::len));
+    let at = |index: usize| array.values[index];
+    let planes = super::axes::planes(&array.sides, options.reading.axes.as_deref(), n_bands, true, at)
+        .map_err(|reason| unreadable(path, reason))?;
+    let note = super::axes::note(&array.sides, options.reading.axes.as_deref(), n_bands);
+    notes.extend(note.map(|note| format!("{}: {note}", name_of(path))));
+    Cube { planes, top: array.top, wavelengths_nm: None, quantity: None, unit: None, notes }
+        .into_contents(path, options)
+}
+
+fn of_exr(path: &Path, options: &ReadOptions) -> Result<Contents, SceneError> {
+    let reading = &options.reading;
+    let depth = reading.depth_variable.as_deref().filter(|_| reading.depth.is_none());
+    let asked = AskedChannels { depth, colors: reading.variable.as_deref() };
+    let RawFile { image, depth, view, frame, panorama, light, hidden, mut notes } = read_raw_exr(path, asked)?;
+    let choice = reading.no_data.unwrap_or_default();
+    let view = view.map(|view| CameraData::of_view(path, view));
+    let (image, what, heeds) = match image {
+        RawImage::Spectral { image, is_unit_stated } => {
+            let is_light = image.quantity() != Quantity::Reflectance;
+            let says_other = match reading.quantity {
+                Some(FileQuantity::Reflectance) => is_light,
+                Some(_) => !is_light,
+                None => false,
+            };
+            let is_unit_open = is_light && !is_unit_stated;
+            if says_other || (reading.unit.is_some() && !is_unit_open) {
+                let what = if is_light { "light, whose unit it states" } else { "reflectances" };
+                let reason = format!("it holds {what}, and --quantity or --unit says something else");
+                return Err(SceneError::Units { file: path.to_owned(), reason });
+            }
+            let told = reading.unit.as_deref().map(light_unit).transpose()?;
+            let unit = told.or_else(|| reading.quantity.and_then(FileQuantity::light_unit)).filter(|_| is_unit_open);
+            let scale = reading.scale.unwrap_or(1.0);
+            let (quantity, grid) = (image.quantity(), image.grid().clone());
+            let mut planes = image.into_planes();
+            for (plane, &nm) in planes.iter_mut().zip(grid.centers_nm()) {
+                let factor = scale * unit.map_or(1.0, |unit| unit.factor_at(nm));
+                if factor != 1.0 {
+                    plane.mapv_inplace(|v| (f64::from(v) * factor) as f32);
+                }
+            }
+            notes.extend(mend(path, &grid, &mut planes, choice)?.note(path, choice));
+            let values = |reason: SpectrumError| SceneError::Values { file: path.to_owned(), reason };
+            let image = SpectralImage::new(quantity, grid, planes).map_err(values)?;
+            let what = match (is_light, is_unit_stated) {
+                (false, _) => "reflectance".to_owned(),
+                (true, true) => "radiance".to_owned(),
+                (true, false) => {
+                    format!("radiance, taken for {}", reading.unit.as_deref().unwrap_or("W/m^2/sr/nm"))
+                }
+            };
+            (Image::Spectral(image), what, if is_unit_open { Heeds::Unit } else { Heeds::Scale })
+        }
+        RawImage::Rgb { planes, white_cd_m2 } => {
+            let what = "linear colors as a display shows them".to_owned();
+            (Image::Linear { planes, white_cd_m2 }, what, Heeds::Scale)
+        }
+    };
+    let hidden = hidden.map(|(image, depth)| {
+        image.check_samples().map_err(|reason| SceneError::Values { file: path.to_owned(), reason })?;
+        let contents = Contents { depth: Some(depth), ..Contents::of(Image::Spectral(image), "radiance") };
+        Ok::<_, SceneError>(Box::new(Hidden { file: path.to_owned(), contents }))
+    });
+    let hidden = hidden.transpose()?;
+    Ok(Contents { depth, view, frame: Some(frame), panorama, light, hidden, notes, heeds, ..Contents::of(image, what) })
+}
+
+/// Depths that differ are taken as distances from the camera, as renderers leave them; depths that are all alike are those of a
+/// plane that faces it.
+fn of_mat(path: &Path, options: &ReadOptions) -> Result<Contents, SceneError> {
+    let scene = match read_mat(path, &options.reading)? {
+        MatScene::Cube(cube) => return cube.into_contents(path, options),
+        MatScene::Linear(planes, notes) => return Ok(linear(planes, None, notes)),
+        MatScene::Iset(scene) => scene,
+    };
+    let (rows, columns) = (scene.image.rows(), scene.image.columns());
+    let view = scene.horizontal_fov_deg.map(|fov_deg| View::from_horizontal_fov_deg(fov_deg, columns, rows));
+    let is_flat = |map: &Array2<f32>| map.iter().all(|z| *z == map[(0, 0)]);
+    let depth = match (scene.depth_m, scene.distance_m) {
+        (Some(values), _) => {
+            let kind = if is_flat(&values) { DepthKind::Axial } else { DepthKind::Radial };
+            Some(RawDepth::in_file(path, "its depth map".to_owned(), values, kind))
+        }
+        (None, Some(z_m)) => {
+            let values = Array2::from_elem((rows, columns), z_m as f32);
+            Some(RawDepth::in_file(path, "its distance".to_owned(), values, DepthKind::Axial))
+        }
+        (None, None) => None,
+    };
+    let mut notes = scene.notes;
+    let view = view.transpose().map_err(|error| unreadable(path, error))?.map(|view| CameraData::of_view(path, view));
+    let choice = options.reading.no_data.unwrap_or_default();
+    let grid = scene.image.grid().clone();
+    let mut planes = scene.image.into_planes();
+    notes.extend(mend(path, &grid, &mut planes, choice)?.note(path, choice));
+    let image = SpectralImage::new(Quantity::Radiance, grid, planes)?;
+    let contents = Contents::of(Image::Spectral(image), "radiance of its photons");
+    Ok(Contents { depth, view, light: scene.light, notes, heeds: Heeds::Nothing, ..contents })
+}

@@ -1,0 +1,301 @@
+//! What files beside a scene's state, and parts of its own file that are not its picture, is used or named as what the picture states is.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use exr::{
+    image::Layers,
+    prelude::{
+        AnyChannel, AnyChannels, AttributeValue, Encoding, FlatSamples, Image, Layer, LayerAttributes, Text,
+        WritableImage,
+    },
+};
+use flate2::Crc;
+use ndarray::Array2;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use tiff::{
+    encoder::{TiffEncoder, colortype},
+    tags::{ExtraSamples, Tag},
+};
+
+use super::{
+    FileQuantity, FileReading, ReadOptions,
+    contents::Image as Samples,
+    kinds_tests::{folder_and, npy_of, told, waves_npy, zip_of},
+    npy::tests::npy,
+    read_contents::contents_of,
+    read_scene,
+    word_tests::{alone, n_cases, word},
+};
+use crate::Scene;
+
+const ROWS: usize = 3;
+const COLUMNS: usize = 4;
+
+fn picture(folder: &Path) -> PathBuf {
+    let path = folder.join("room.png");
+    let pixels = image::RgbImage::from_pixel(COLUMNS as u32, ROWS as u32, image::Rgb([99; 3]));
+    dioptric_pictures::save(&pixels.into(), &path).unwrap();
+    path
+}
+
+#[track_caller]
+fn check_named(scene: &Scene, word: &str) {
+    let n = scene.notes.iter().filter(|note| note.contains(word)).count();
+    assert_eq!(n, 1, "{word}: {:?}", scene.notes);
+}
+
+fn quoted(word: &str) -> String {
+    format!("'{word}'")
+}
+
+/// A layer of an EXR file, one of whose attributes has this name.
+fn layer(name: &str, attribute: &str, channels: &[(&str, f32)]) -> Layer<AnyChannels<FlatSamples>> {
+    let plane = |v: f32| FlatSamples::F32(vec![v; ROWS * COLUMNS]);
+    let channels = channels.iter().map(|(name, v)| AnyChannel::new(*name, plane(*v))).collect();
+    let mut attributes = LayerAttributes::named(name);
+    attributes.other.insert(Text::from(attribute), AttributeValue::Text(Text::from("mm")));
+    Layer::new((COLUMNS, ROWS), attributes, Encoding::FAST_LOSSLESS, AnyChannels::sort(channels))
+}
+
+fn write_exr(path: &Path, layers: Vec<Layer<AnyChannels<FlatSamples>>>) {
+    let layers: Layers<AnyChannels<FlatSamples>> = layers.into_iter().collect();
+    let window = exr::meta::attribute::IntegerBounds::from_dimensions((COLUMNS, ROWS));
+    Image::from_layers(exr::meta::header::ImageAttributes::new(window), layers).write().to_file(path).unwrap();
+}
+
+fn options(hidden: Option<PathBuf>, depth: Option<PathBuf>) -> ReadOptions {
+    let reading = FileReading { depth, ..FileReading::default() };
+    ReadOptions { horizontal_fov_deg: Some(20.0), hidden, reading, ..ReadOptions::default() }
+}
+
+#[test]
+fn unknown_words_of_depths_and_hidden_layers_are_named() {
+    alone(|| {
+        let mut rng = ChaCha8Rng::seed_from_u64(21);
+        let folder = tempfile::tempdir().unwrap();
+        let picture = picture(folder.path());
+        let at = |name: &str| folder.path().join(name);
+        let bands = [("S0.450,0nm", 0.1), ("S0.550,0nm", 0.1), ("Z", 2.0)];
+        let behind = [("S0.450,0nm", 0.2), ("S0.550,0nm", 0.2), ("Z", 3.0)];
+        for _ in 0..n_cases() {
+            let [word, other] = [word(&mut rng), word(&mut rng)];
+            // An attribute of a file of depth.
+            write_exr(&at("z.exr"), vec![layer("", &word, &[("Z", 2.0)])]);
+            let scene = read_scene(&picture, &options(None, Some(at("z.exr")))).unwrap();
+            check_named(&scene, &quoted(&word));
+            // Attributes and channels of a layer behind, in the file and in one of its own.
+            let more = [&behind[..], &[(other.as_str(), 1.0)]].concat();
+            write_exr(&at("a.exr"), vec![layer("", "Time", &bands), layer("hidden", &word, &more)]);
+            let scene = read_scene(&at("a.exr"), &options(None, None)).unwrap();
+            check_named(&scene, &quoted(&word));
+            check_named(&scene, &quoted(&other));
+            write_exr(&at("front.exr"), vec![layer("", "Time", &bands)]);
+            write_exr(&at("behind.exr"), vec![layer("", &word, &more)]);
+            let scene = read_scene(&at("front.exr"), &options(Some(at("behind.exr")), None)).unwrap();
+            check_named(&scene, &quoted(&word));
+            check_named(&scene, &quoted(&other));
+            let hidden = scene.hidden.unwrap();
+            assert_eq!(hidden.depth.range_m(), (3.0, 3.0));
+            assert_eq!(hidden.radiance.planes()[0][(1, 1)], 0.2);
+        }
+    });
+}
+
+/// Puts a text before the end of a PNG file.
+fn with_text(png: &[u8], key: &str) -> Vec<u8> {
+    let (head, end) = png.split_at(png.len() - 12);
+    let content = [b"tEXt".to_vec(), key.as_bytes().to_vec(), b"\0 20".to_vec()].concat();
+    let mut checksum = Crc::new();
+    checksum.update(&content);
+    [head, &(content.len() as u32 - 4).to_be_bytes(), &content, &checksum.sum().to_be_bytes(), end].concat()
+}
+
+/// A key of text, a tag or a page of one band or of each is named, and once.
+#[test]
+fn unknown_words_of_band_pictures_are_named() {
+    alone(|| {
+        let mut rng = ChaCha8Rng::seed_from_u64(22);
+        let folder = tempfile::tempdir().unwrap();
+        let at = |nm: u32, ending: &str| folder.path().join(format!("a_{nm}.{ending}"));
+        let clear =
+            || fs::read_dir(folder.path()).unwrap().for_each(|entry| fs::remove_file(entry.unwrap().path()).unwrap());
+        let plane = image::ImageBuffer::from_pixel(COLUMNS as u32, ROWS as u32, image::Luma([30_000_u16]));
+        dioptric_pictures::save(&plane.into(), &at(450, "png")).unwrap();
+        let plain = fs::read(at(450, "png")).unwrap();
+        for case in 0..n_cases() {
+            let word = word(&mut rng);
+            let n_words = 1 + case % 3;
+            for (index, nm) in [450, 550, 650].into_iter().enumerate() {
+                let bytes = if index < n_words { with_text(&plain, &word) } else { plain.clone() };
+                fs::write(at(nm, "png"), bytes).unwrap();
+            }
+            let scene = read_scene(folder.path(), &ReadOptions::default()).unwrap();
+            check_named(&scene, &quoted(&word));
+        }
+        clear();
+        for case in 0..n_cases() {
+            let (tag, word) = (rng.random_range(50_000..60_000_u16), word(&mut rng));
+            for nm in [450, 550, 650] {
+                let mut encoder = TiffEncoder::new(fs::File::create(at(nm, "tif")).unwrap()).unwrap();
+                for page in 0..1 + case % 2 {
+                    let mut image = encoder.new_image::<colortype::Gray16>(COLUMNS as u32, ROWS as u32).unwrap();
+                    if page == 0 {
+                        image.encoder().write_tag(Tag::Unknown(tag), 7_u16).unwrap();
+                        image.encoder().write_tag(Tag::ImageDescription, word.as_str()).unwrap();
+                    }
+                    image.write_data(&[1000 * (1 + page as u16); ROWS * COLUMNS]).unwrap();
+                }
+            }
+            let found = read_scene(folder.path(), &ReadOptions::default());
+            if case % 2 == 1 {
+                // Which of two pages is the band nobody says.
+                let message = found.unwrap_err().to_string();
+                assert!(message.contains("2 planes"), "{message}");
+            } else {
+                let scene = found.unwrap();
+                check_named(&scene, &quoted(&tag.to_string()));
+                check_named(&scene, &quoted(&word));
+            }
+        }
+    });
+}
+
+#[test]
+fn texts_and_dates_beside_a_cube_are_named() {
+    let (_folder, file) = folder_and("a.npz");
+    let options = told(Some(FileQuantity::Reflectance), Some("yxb"), false);
+    let text = npy("<U2", false, "()", &[0; 8]);
+    let date = npy("<M8[s]", false, "(1,)", &[0; 8]);
+    let parts = [("cube", npy_of("<f4", "yxb")), ("wave", waves_npy()), ("unit", text), ("when", date)];
+    fs::write(&file, zip_of(&parts, false)).unwrap();
+    check_named(&read_scene(&file, &options).unwrap(), "'unit', 'when'");
+    // Another array behind the first, as two calls of `save` leave it.
+    let (_folder, file) = folder_and("a.npy");
+    fs::write(&file, [npy_of("<f4", "yxb"), npy_of("<f4", "yxb")].concat()).unwrap();
+    let options = told(Some(FileQuantity::Reflectance), Some("yxb"), true);
+    check_named(&read_scene(&file, &options).unwrap(), "bytes behind its array");
+}
+
+/// Writes codes of four samples a pixel, of which the last is marked so.
+fn write_four<C: colortype::ColorType<Inner = T>, T>(path: &Path, last: ExtraSamples, values: &[T])
+where
+    [T]: tiff::encoder::TiffValue,
+{
+    let mut encoder = TiffEncoder::new(fs::File::create(path).unwrap()).unwrap();
+    let mut image = encoder.new_image::<C>(COLUMNS as u32, ROWS as u32).unwrap();
+    image.extra_samples(&[last]).unwrap();
+    image.write_data(values).unwrap();
+}
+
+/// Red, green, blue and a near infrared: a picture whose fourth sample is named, or four bands where their wavelengths are told.
+#[test]
+fn four_samples_are_bands_where_wavelengths_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let codes: Vec<u16> = (0..ROWS * COLUMNS).flat_map(|i| [100, 200, 300, 400].map(|v| v + i as u16)).collect();
+    let floats: Vec<f32> = codes.iter().map(|v| f32::from(*v) / 1000.0).collect();
+    write_four::<colortype::RGB16, _>(&at("nir.tif"), ExtraSamples::Unspecified, &codes);
+    write_four::<colortype::RGB16, _>(&at("alpha.tif"), ExtraSamples::UnassociatedAlpha, &codes);
+    write_four::<colortype::RGB32Float, _>(&at("float.tif"), ExtraSamples::Unspecified, &floats);
+    let as_cube = |nm: &[f64]| {
+        let reading = FileReading {
+            quantity: Some(FileQuantity::Reflectance),
+            wavelengths_nm: Some(nm.to_vec()),
+            ..FileReading::default()
+        };
+        ReadOptions { reading, ..ReadOptions::default() }
+    };
+    for (name, white) in [("nir.tif", 65535.0), ("alpha.tif", 65535.0), ("float.tif", 1000.0)] {
+        let contents = contents_of(&at(name), &as_cube(&[650.0, 550.0, 450.0, 850.0])).unwrap();
+        let Samples::Spectral(image) = contents.image else { panic!("{name}: no cube") };
+        assert_eq!(image.grid().centers_nm(), [450.0, 550.0, 650.0, 850.0]);
+        let expected = [300.0, 200.0, 100.0, 400.0].map(|code: f64| (code + 6.0) / white);
+        for (value, expected) in image.spectrum_at(1, 2).into_iter().zip(expected) {
+            assert!((value - expected).abs() < 1e-7, "{name}: {value} {expected}");
+        }
+        let scene = read_scene(&at(name), &ReadOptions::default()).unwrap();
+        let word = if name == "alpha.tif" { "'opacity'" } else { "'sample 4 (ExtraSamples 0)'" };
+        check_named(&scene, word);
+    }
+    // Without the opacity there are three.
+    let contents = contents_of(&at("alpha.tif"), &as_cube(&[650.0, 550.0, 450.0])).unwrap();
+    assert!(contents.notes.iter().any(|note| note.contains("opacity")), "{:?}", contents.notes);
+    assert!(contents_of(&at("nir.tif"), &as_cube(&[650.0, 550.0, 450.0])).is_err());
+}
+
+/// A depth with a confidence beside it, as a sample or as a page, is asked for by its number.
+#[test]
+fn one_of_several_planes_of_depth_is_asked_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let picture = picture(folder.path());
+    let file = folder.path().join("d.tif");
+    let mut encoder = TiffEncoder::new(fs::File::create(&file).unwrap()).unwrap();
+    let mut image = encoder.new_image::<colortype::Gray16>(COLUMNS as u32, ROWS as u32).unwrap();
+    image.extra_samples(&[ExtraSamples::Unspecified]).unwrap();
+    image.write_data(&[2000_u16, 99].repeat(ROWS * COLUMNS)).unwrap();
+    drop(encoder);
+    let with = |number: Option<&str>| {
+        let mut options = options(None, Some(file.clone()));
+        options.reading.depth_variable = number.map(str::to_owned);
+        read_scene(&picture, &options)
+    };
+    let message = with(None).unwrap_err().to_string();
+    assert!(message.contains("2 planes") && message.contains("--depth-variable, 1 to 2"), "{message}");
+    let scene = with(Some("1")).unwrap();
+    assert_eq!(scene.require_depth().unwrap().range_m(), (2.0, 2.0));
+    check_named(&scene, "its plane '2' is not used");
+    assert!(with(Some("3")).is_err() && with(Some("z")).is_err());
+}
+
+/// Bands in which a display sends no light at all are no black scene.
+#[test]
+fn pictures_in_the_infrared_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let picture = picture(folder.path());
+    let grid = Some(dioptric_spectrum::WavelengthGrid::new(vec![850.0, 900.0]).unwrap());
+    let message = read_scene(&picture, &ReadOptions { grid, ..options(None, None) }).unwrap_err().to_string();
+    assert!(message.contains("2 bands of 850–900 nm"), "{message}");
+}
+
+/// Bands of floats stay as they are; of 8 and of 16 bits one white is white.
+#[test]
+fn bands_of_several_kinds_have_one_white() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let save = |name: &str, code: u16| {
+        let picture: image::DynamicImage = match code {
+            0..=255 => image::GrayImage::from_pixel(4, 3, image::Luma([code as u8])).into(),
+            _ => image::ImageBuffer::from_pixel(4, 3, image::Luma([code])).into(),
+        };
+        dioptric_pictures::save(&picture, &at(name)).unwrap();
+    };
+    save("a_450.png", 51);
+    save("a_550.png", 13_107);
+    let of = |options: &ReadOptions| contents_of(folder.path(), options).map(|contents| contents.image);
+    let Ok(Samples::Spectral(image)) = of(&ReadOptions::default()) else { panic!("no cube") };
+    for value in image.spectrum_at(0, 0) {
+        assert!((value - 0.2).abs() < 1e-7, "{value}");
+    }
+    // The white level counts codes.
+    let Ok(Samples::Spectral(image)) = of(&ReadOptions { white_level: Some(26_214.0), ..ReadOptions::default() })
+    else {
+        panic!("no cube")
+    };
+    assert!((image.spectrum_at(0, 0)[1] - 0.5).abs() < 1e-6);
+    let floats = Array2::from_elem((3, 4), 3.5_f32);
+    let mut encoder = TiffEncoder::new(fs::File::create(at("a_650.tif")).unwrap()).unwrap();
+    encoder.write_image::<colortype::Gray32Float>(4, 3, floats.as_slice().unwrap()).unwrap();
+    drop(encoder);
+    assert!(of(&ReadOptions::default()).is_err_and(|error| error.to_string().contains("one kind")));
+    fs::remove_file(at("a_450.png")).unwrap();
+    fs::remove_file(at("a_550.png")).unwrap();
+    let reading = FileReading { quantity: Some(FileQuantity::Radiance), ..FileReading::default() };
+    let Ok(Samples::Spectral(image)) = of(&ReadOptions { reading, ..ReadOptions::default() }) else {
+        panic!("no cube")
+    };
+    assert_eq!(image.spectrum_at(0, 0), [3.5]);
+}

@@ -1,0 +1,75 @@
+//! The directory of a TIFF page as it stands in the file (TIFF 6.0, section 2, and `BigTIFF`).
+
+use std::{
+    fs::File,
+    io::{Read, Result, Seek, SeekFrom},
+};
+
+/// Bytes of a text that are read.
+const MOST_BYTES: u64 = 1 << 20;
+
+/// The entries of a directory.
+pub(super) struct Directory {
+    is_big_endian: bool,
+    is_big_file: bool,
+    /// Each tag, with the place of its entry.
+    entries: Vec<(u16, u64)>,
+}
+
+impl Directory {
+    /// Reads the directory at a place of a file.
+    pub(super) fn read(file: &mut File, at: u64) -> Result<Self> {
+        let mut start = [0; 4];
+        file.rewind()?;
+        file.read_exact(&mut start)?;
+        let mut this = Self { is_big_endian: start[0] == b'M', is_big_file: false, entries: vec![] };
+        this.is_big_file = this.number(&start[2..]) == 43;
+        let (n_count, n_entry) = if this.is_big_file { (8, 20) } else { (2, 12) };
+        let count = this.number_at(file, at, n_count)?;
+        for index in 0..count.min(u16::MAX.into()) {
+            let place = at + n_count as u64 + n_entry * index;
+            this.entries.push((this.number_at(file, place, 2)? as u16, place));
+        }
+        Ok(this)
+    }
+
+    /// Returns where the values of a tag stand that fit into its entry.
+    pub(super) fn place_of(&self, tag: u16) -> Option<u64> {
+        let (_, place) = self.entries.iter().find(|(own, _)| *own == tag)?;
+        Some(place + if self.is_big_file { 12 } else { 8 })
+    }
+
+    /// Returns the two bytes of a whole number.
+    pub(super) fn bytes_of(&self, value: u16) -> [u8; 2] {
+        if self.is_big_endian { value.to_be_bytes() } else { value.to_le_bytes() }
+    }
+
+    /// Returns all texts of a tag, which some writers have twice.
+    pub(super) fn texts(&self, file: &mut File, tag: u16) -> Result<Vec<String>> {
+        let side = if self.is_big_file { 8 } else { 4 };
+        let mut texts = vec![];
+        for (_, place) in self.entries.iter().filter(|(own, _)| *own == tag) {
+            let n_bytes = self.number_at(file, place + 4, side)?;
+            let values = place + 4 + side as u64;
+            let from = if n_bytes <= side as u64 { values } else { self.number_at(file, values, side)? };
+            let mut bytes = vec![];
+            file.seek(SeekFrom::Start(from))?;
+            file.by_ref().take(n_bytes.min(MOST_BYTES)).read_to_end(&mut bytes)?;
+            texts.push(String::from_utf8_lossy(&bytes).trim_matches(['\0', ' ', '\n']).to_owned());
+        }
+        texts.retain(|text| !text.is_empty());
+        Ok(texts)
+    }
+
+    fn number_at(&self, file: &mut File, at: u64, n_bytes: usize) -> Result<u64> {
+        let mut bytes = [0; 8];
+        file.seek(SeekFrom::Start(at))?;
+        file.read_exact(&mut bytes[..n_bytes])?;
+        Ok(self.number(&bytes[..n_bytes]))
+    }
+
+    fn number(&self, bytes: &[u8]) -> u64 {
+        let put = |number: u64, byte: &u8| number << 8 | u64::from(*byte);
+        if self.is_big_endian { bytes.iter().fold(0, put) } else { bytes.iter().rev().fold(0, put) }
+    }
+}

@@ -1,0 +1,252 @@
+//! Pages of TIFF files: what each states of itself.
+
+use std::{
+    io::{Read, Seek},
+    path::Path,
+};
+
+use ndarray::Array2;
+use serde_json::Value;
+use tiff::{decoder::Decoder, tags::Tag};
+
+use super::stated::{name_of, note_of};
+
+/// The name of a page.
+const PAGE_NAME: Tag = Tag::Unknown(285);
+/// Tags that say how samples lie in the file, or what changes nothing: from sizes and strips to who made it when.
+const HARMLESS: [u16; 46] = [
+    254, 255, 256, 257, 258, 259, 262, 263, 266, 269, 270, 271, 272, 273, 274, 277, 278, 279, 282, 283, 284, 285, 288,
+    289, 292, 293, 296, 297, 305, 306, 315, 316, 317, 320, 322, 323, 324, 325, 338, 339, 347, 530, 531, 532, 33432,
+    42113,
+];
+
+/// Keys of a description under which its wavelengths stand, nm.
+const WAVELENGTHS: [&str; 4] = ["wavelengths_nm", "wavelength_nm", "wavelengths", "wavelength"];
+
+/// How large the numbers of a page can be.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum SampleDepth {
+    Unsigned(u8),
+    Signed(u8),
+    Float,
+}
+
+/// What the samples of a page are marked as.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Marked {
+    /// Gray, 0 being white or black.
+    Gray {
+        is_white_zero: bool,
+    },
+    /// Red, green and blue.
+    Rgb,
+    /// Numbers of colors in a table.
+    Palette,
+    /// Brightness and differences of colors.
+    Chroma,
+    /// Cyan, magenta, yellow and black.
+    Inks,
+    Other,
+}
+
+/// What a page states of itself.
+pub(super) struct Page {
+    pub(super) index: usize,
+    /// Columns and rows.
+    pub(super) size: (u32, u32),
+    pub(super) n_samples: usize,
+    pub(super) depth: SampleDepth,
+    pub(super) bits: u8,
+    pub(super) marked: Marked,
+    /// What each of the last samples is: 0 unspecified, 1 and 2 an opacity.
+    pub(super) extra: Vec<u16>,
+    pub(super) is_reduced: bool,
+    pub(super) has_tiles_of_planes: bool,
+    /// Whether its samples are compressed as those of a JPEG picture.
+    pub(super) is_jpeg: bool,
+    name: Option<String>,
+    /// What its descriptions say, of which some writers have two.
+    pub(super) descriptions: Vec<String>,
+    no_data: Option<f64>,
+    /// How the picture lies, 1 being upright.
+    orientation: u16,
+    /// Tags that nobody here knows.
+    pub(super) unknown: Vec<u16>,
+}
+
+impl Page {
+    /// Reads what the page states that a decoder stands at.
+    pub(super) fn of<R: Read + Seek>(decoder: &mut Decoder<R>, index: usize) -> tiff::TiffResult<Self> {
+        let size = decoder.dimensions()?;
+        let n_samples = decoder.find_tag_unsigned::<u16>(Tag::SamplesPerPixel)?.unwrap_or(1).max(1);
+        let bits = decoder.find_tag_unsigned_vec::<u16>(Tag::BitsPerSample)?.and_then(|list| list.first().copied());
+        let bits = bits.unwrap_or(1).min(64) as u8;
+        let format = decoder.find_tag_unsigned_vec::<u16>(Tag::SampleFormat)?.and_then(|list| list.first().copied());
+        let photometric = decoder.find_tag_unsigned::<u16>(Tag::PhotometricInterpretation)?.unwrap_or(1);
+        let kind = decoder.find_tag_unsigned::<u32>(Tag::NewSubfileType)?.unwrap_or(0);
+        let compression = decoder.find_tag_unsigned::<u16>(Tag::Compression)?.unwrap_or(1);
+        let is_planar = decoder.find_tag_unsigned::<u16>(Tag::PlanarConfiguration)? == Some(2);
+        let has_tiles = decoder.find_tag_unsigned::<u32>(Tag::TileWidth)?.is_some();
+        let orientation = decoder.find_tag_unsigned::<u16>(Tag::Orientation)?.unwrap_or(1);
+        let extra = decoder.find_tag_unsigned_vec::<u16>(Tag::ExtraSamples)?.unwrap_or_default();
+        let mut text = |tag| decoder.get_tag_ascii_string(tag).ok().filter(|text| !text.trim().is_empty());
+        let (name, descriptions) = (text(PAGE_NAME), text(Tag::ImageDescription).into_iter().collect());
+        let no_data = text(Tag::GdalNodata).and_then(|text| text.trim().parse().ok());
+        let tags = decoder.tag_iter().filter_map(|entry| entry.ok()).map(|(tag, _)| tag.to_u16());
+        let unknown = tags.filter(|tag| !HARMLESS.contains(tag)).collect();
+        Ok(Self {
+            index,
+            size,
+            n_samples: n_samples.into(),
+            depth: match format {
+                Some(2) => SampleDepth::Signed(bits),
+                Some(3) => SampleDepth::Float,
+                _ => SampleDepth::Unsigned(bits),
+            },
+            bits,
+            marked: match photometric {
+                0 | 1 => Marked::Gray { is_white_zero: photometric == 0 },
+                2 => Marked::Rgb,
+                3 => Marked::Palette,
+                5 => Marked::Inks,
+                6 => Marked::Chroma,
+                _ => Marked::Other,
+            },
+            extra,
+            is_reduced: kind & 1 != 0,
+            has_tiles_of_planes: is_planar && n_samples > 1 && has_tiles,
+            is_jpeg: matches!(compression, 6 | 7),
+            name,
+            descriptions,
+            no_data,
+            orientation,
+            unknown,
+        })
+    }
+
+    pub(super) fn words(&self) -> PageWords {
+        PageWords {
+            no_data: self.no_data,
+            // Of several samples none is counted from white.
+            is_white_zero: self.marked == Marked::Gray { is_white_zero: true } && self.n_samples == 1,
+            descriptions: self.descriptions.clone(),
+            orientation: self.orientation,
+        }
+    }
+
+    pub(super) fn bytes(&self) -> u64 {
+        4 * u64::from(self.size.0) * u64::from(self.size.1) * self.n_samples as u64
+    }
+
+    /// Whether its samples are no gray or colors of a picture.
+    pub(super) fn is_stack(&self) -> bool {
+        let most = if self.is_colored() { 4 } else { 2 };
+        matches!(self.depth, SampleDepth::Signed(_))
+            || self.n_samples > most
+            || self.bits > 16 && self.depth != SampleDepth::Float
+    }
+
+    pub(super) fn is_colored(&self) -> bool {
+        matches!(self.marked, Marked::Rgb | Marked::Palette | Marked::Chroma)
+    }
+
+    /// Whether its samples are numbers by themselves, a plane each.
+    pub(super) fn has_plain_samples(&self) -> bool {
+        let is_marked = matches!(self.marked, Marked::Gray { .. } | Marked::Rgb);
+        is_marked && !self.is_jpeg && matches!(self.bits, 8 | 16 | 32 | 64)
+    }
+
+    /// Which of its samples are opacities: a fourth of colors of which nothing is said, too.
+    pub(super) fn opacities(&self) -> Vec<usize> {
+        if self.extra.is_empty() && self.is_colored() && self.n_samples == 4 {
+            return vec![3];
+        }
+        let first = self.n_samples.saturating_sub(self.extra.len());
+        (first..self.n_samples).filter(|sample| matches!(self.extra[sample - first], 1 | 2)).collect()
+    }
+
+    /// Returns the number, from 1, of a last sample that is neither a color nor an opacity: it may be a near infrared.
+    pub(super) fn unknown_sample(&self) -> Option<usize> {
+        let n_colors = if self.is_colored() { 3 } else { 1 };
+        let says_nothing = self.extra == [0] || self.extra.is_empty() && !self.is_colored();
+        (self.n_samples == n_colors + 1 && says_nothing).then_some(self.n_samples)
+    }
+
+    pub(super) fn top(&self) -> Option<f64> {
+        match self.depth {
+            SampleDepth::Unsigned(bits) => Some(2.0_f64.powi(bits.into()) - 1.0),
+            SampleDepth::Signed(bits) => Some(2.0_f64.powi(i32::from(bits) - 1) - 1.0),
+            SampleDepth::Float => None,
+        }
+    }
+}
+
+/// What the first page says besides its numbers.
+#[derive(Clone, Debug, Default)]
+pub(super) struct PageWords {
+    /// The number that stands for none.
+    pub(super) no_data: Option<f64>,
+    /// Whether 0 is white, so that decoded samples are counted from there.
+    is_white_zero: bool,
+    descriptions: Vec<String>,
+    orientation: u16,
+}
+
+impl PageWords {
+    /// Makes what stands for no number no number.
+    pub(super) fn ignore(&self, plane: &mut Array2<f32>) {
+        if let Some(none) = self.no_data.map(|v| v as f32) {
+            plane.mapv_inplace(|v| if v == none { f32::NAN } else { v });
+        }
+    }
+
+    /// Returns decoded samples, whose largest is `top`, to the numbers of the file: what stands for none becomes no number.
+    pub(super) fn undo(&self, plane: &mut Array2<f32>, top: f32) {
+        if self.is_white_zero {
+            plane.mapv_inplace(|v| top - v);
+        }
+        self.ignore(plane);
+    }
+
+    /// Returns what is said of numbers that lie as stored.
+    pub(super) fn note_of_orientation(&self, path: &Path) -> Option<String> {
+        (self.orientation != 1)
+            .then(|| format!("{}: its orientation, {} (tag 274), is not used", name_of(path), self.orientation))
+    }
+
+    /// Returns what is said of a description that nothing took.
+    pub(super) fn note_of_description(&self, path: &Path) -> Option<String> {
+        // Writers put the shape of the array there.
+        let says = |text: &&String| !(text.starts_with("{\"shape\":") || text.starts_with("ImageJ="));
+        let described: Vec<String> = self.descriptions.iter().filter(says).cloned().collect();
+        note_of(path, "description", &described)
+    }
+}
+
+/// Returns the wavelengths of so many planes that pages are named after, or that the first one's description lists as JSON; with the keys
+/// there that are not used.
+pub(super) fn wavelengths_of(pages: &[Page], n_planes: usize) -> Option<(Vec<f64>, Vec<String>)> {
+    let named = |text: Option<&String>| text.and_then(|text| wavelength_in(text));
+    let of_names: Option<Vec<f64>> = pages.iter().map(|page| named(page.name.as_ref())).collect();
+    let of_texts: Option<Vec<f64>> = pages.iter().map(|page| named(page.descriptions.first())).collect();
+    if let Some(list) = of_names.or(of_texts).filter(|list| list.len() == n_planes) {
+        return Some((list, vec![]));
+    }
+    let maps = pages.first()?.descriptions.iter().filter_map(|text| match serde_json::from_str(text) {
+        Ok(Value::Object(map)) => Some(map),
+        _ => None,
+    });
+    let mut map = maps.into_iter().find(|map| WAVELENGTHS.iter().any(|key| map.contains_key(*key)))?;
+    let list = WAVELENGTHS.iter().find_map(|key| map.remove(*key))?;
+    let list = list.as_array()?.iter().map(Value::as_f64).collect::<Option<Vec<f64>>>()?;
+    // The shape of the array is written by tifffile.
+    let left = map.into_iter().map(|(key, _)| key).filter(|key| !["shape", "axes"].contains(&key.as_str())).collect();
+    (list.len() == n_planes).then_some((list, left))
+}
+
+/// Returns the wavelength of a text such as `450 nm` or `Band 450.5nm`.
+fn wavelength_in(text: &str) -> Option<f64> {
+    let before = text.trim().strip_suffix("nm")?.trim_end();
+    let number = before.rsplit(|c: char| !(c.is_ascii_digit() || c == '.')).next()?;
+    number.parse().ok().filter(|nm: &f64| *nm > 0.0)
+}
