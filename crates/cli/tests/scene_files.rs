@@ -182,9 +182,6 @@ fn relit_picture_is_white() {
             "30",
             "--depth-m",
             "2",
-            // White balance knows the light and the sensor, and not the tint of a coated lens.
-            "--coating",
-            "ideal",
             "--illuminant",
             light,
             "--noise",

@@ -21,6 +21,8 @@ pub const MGF2_INDEX: f64 = 1.38;
 const DENSE_INDEX: f64 = 2.1;
 /// The wavelength for which coatings are made unless they say otherwise, nm.
 pub const COATING_CENTER_NM: f64 = 550.0;
+/// The thickest layer, nm: light of a band would no longer interfere in one much thicker.
+const THICKEST_NM: f64 = 100_000.0;
 /// The largest number of layers.
 const MOST_LAYERS: usize = 1000;
 
@@ -114,8 +116,10 @@ impl Coating {
             }
             for CoatingLayer { medium, thickness_nm } in layers {
                 medium.check()?;
-                if !(*thickness_nm > 0.0 && thickness_nm.is_finite()) {
-                    return wrong(format!("thickness_nm of a layer is {thickness_nm}, expected a number above 0"));
+                if !(*thickness_nm > 0.0 && *thickness_nm <= THICKEST_NM) {
+                    return wrong(format!(
+                        "thickness_nm of a layer is {thickness_nm}, expected a number above 0, at most {THICKEST_NM}"
+                    ));
                 }
             }
             Ok(())
@@ -175,9 +179,21 @@ impl CoatingLayer {
     }
 }
 
-/// Returns n + ik of a medium; k is 0 where it is not known.
-pub(crate) fn complex_index(medium: &Glass, wavelength_nm: f64) -> Result<Complex64, OpticsError> {
-    Ok(Complex64::new(medium.index_at(wavelength_nm)?, medium.extinction_at(wavelength_nm).unwrap_or(0.0)))
+/// Returns n + ik of the medium of a layer; k is 0 of one of which none is stated.
+fn complex_index(medium: &Glass, wavelength_nm: f64) -> Result<Complex64, OpticsError> {
+    match medium {
+        Glass::Absorbing { .. } => absorbing_index(medium, wavelength_nm),
+        _ => Ok(Complex64::new(medium.index_at(wavelength_nm)?, medium.extinction_at(wavelength_nm).unwrap_or(0.0))),
+    }
+}
+
+/// Returns n + ik of a medium whose k must be known, as that of a metal.
+pub(crate) fn absorbing_index(medium: &Glass, wavelength_nm: f64) -> Result<Complex64, OpticsError> {
+    let index = medium.index_at(wavelength_nm)?;
+    let extinction = medium.extinction_at(wavelength_nm).ok_or_else(|| OpticsError::Coating {
+        reason: format!("the extinction is not known at {wavelength_nm} nm, expected a medium with that, as Absorbing"),
+    })?;
+    Ok(Complex64::new(index, extinction))
 }
 
 /// Returns the phase thicknesses of magnesium fluoride, outside, and of the dense layer that together reflect nothing on glass of this

@@ -71,7 +71,9 @@ pub struct Ghosts {
 impl Ghosts {
     /// The light of all ghosts on the film over that of the image: the veil, where ghosts are wide.
     pub fn veil(&self) -> f64 {
-        self.pairs.iter().map(|ghost| ghost.light.power_on_film).sum::<f64>() / self.direct.power_on_film
+        // Of no pairs the sum would be −0.
+        self.pairs.iter().map(|ghost| ghost.light.power_on_film).fold(0.0, |sum, power| sum + power)
+            / self.direct.power_on_film
     }
 }
 

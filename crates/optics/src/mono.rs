@@ -282,7 +282,8 @@ impl MonoLens {
     }
 
     /// The lens with the circle of as much area in place of the opening of blades; `None` where it has no such opening.
-    pub(crate) fn with_round_iris(&self) -> Option<Self> {
+    #[must_use]
+    pub fn with_round_iris(&self) -> Option<Self> {
         if !self.steps[self.stop].apertures.iter().any(Aperture::is_iris) {
             return None;
         }

@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use crate::{
     Coating, DiffractiveSurface, Film, Lens, OpticsError,
-    coating::{complex_index, share_between},
+    coating::{absorbing_index, share_between},
     trace::{Argument, LightPass, Lights, Real},
 };
 
@@ -25,8 +25,10 @@ pub(crate) enum SurfaceLoss {
     MirrorTable(Vec<(f64, [f64; 2])>),
 }
 
-/// Points at which a surface is looked at, and so the most terms of its series.
+/// Points at which a surface is looked at to begin with, and how often they are doubled at most where series of as many terms have not
+/// died away: those of stacks of many layers.
 const N_NODES: usize = 32;
+const MOST_DOUBLINGS: usize = 4;
 /// Terms below these are left out of the four series: in double precision, in single, and in single for ghosts, whose light is less.
 ///
 /// What turns the polarization (the last two) counts for the power by the square of what polarizes, and the very last once more by its own.
@@ -69,7 +71,7 @@ impl SurfaceLoss {
                 Coating::Table(table) => Ok(Self::MirrorTable(table.at(wavelength_nm).map_err(of_surface)?)),
                 Coating::Metal { metal, .. } => {
                     let layers = coating.layers_at(wavelength_nm, &|_| None).map_err(of_surface)?;
-                    let metal = complex_index(metal, wavelength_nm).map_err(of_surface)?;
+                    let metal = absorbing_index(metal, wavelength_nm).map_err(of_surface)?;
                     Ok(Self::MirrorFilm(Film::new(before, &layers, metal, wavelength_nm)))
                 }
                 _ => wrong("mirrors have: Ideal, Metal or Table"),
@@ -202,22 +204,39 @@ struct Series {
 impl Series {
     /// Fits the series of a function of one argument, without terms below the least.
     fn of(ends: [f64; 2], is_constant: bool, least_terms: [f64; 4], values_at: impl Fn(f64) -> [f64; 4]) -> Self {
-        let [from, to] = ends;
-        let angle = |j: usize| std::f64::consts::PI * (j as f64 + 0.5) / N_NODES as f64;
-        let values: Vec<[f64; 4]> =
-            (0..N_NODES).map(|j| values_at(0.5 * (from + to) + 0.5 * (to - from) * angle(j).cos())).collect();
-        let coefficients = std::array::from_fn(|k| {
-            let coefficient = |i: usize| {
-                let sum: f64 = (0..N_NODES).map(|j| values[j][k] * (i as f64 * angle(j)).cos()).sum();
-                sum * if i == 0 { 1.0 } else { 2.0 } / N_NODES as f64
+        let of_nodes = |n: usize| Self { ends, coefficients: Self::coefficients(ends, n, &values_at) };
+        let mut series = of_nodes(N_NODES);
+        for doubling in 1..=MOST_DOUBLINGS {
+            let has_died_away = |(list, least): (&Vec<f64>, &f64)| {
+                // What the last eighth of the terms still add is about what aliases into the others.
+                list[list.len() - list.len() / 8..].iter().all(|term| term.abs() < *least)
             };
-            let mut list: Vec<f64> = (0..if is_constant { 1 } else { N_NODES }).map(coefficient).collect();
-            while list.last().is_some_and(|last| last.abs() < least_terms[k]) {
+            if is_constant || series.coefficients.iter().zip(&least_terms).all(has_died_away) {
+                break;
+            }
+            series = of_nodes(N_NODES << doubling);
+        }
+        for (list, least) in series.coefficients.iter_mut().zip(least_terms) {
+            list.truncate(if is_constant { 1 } else { list.len() });
+            while list.last().is_some_and(|last| last.abs() < least) {
                 list.pop();
             }
-            list
-        });
-        Self { ends, coefficients }
+        }
+        series
+    }
+
+    /// Returns the first so many coefficients of the series, by the values at as many nodes.
+    fn coefficients([from, to]: [f64; 2], n: usize, values_at: &impl Fn(f64) -> [f64; 4]) -> [Vec<f64>; 4] {
+        let angle = |j: usize| std::f64::consts::PI * (j as f64 + 0.5) / n as f64;
+        let values: Vec<[f64; 4]> =
+            (0..n).map(|j| values_at(0.5 * (from + to) + 0.5 * (to - from) * angle(j).cos())).collect();
+        std::array::from_fn(|k| {
+            let coefficient = |i: usize| {
+                let sum: f64 = (0..n).map(|j| values[j][k] * (i as f64 * angle(j)).cos()).sum();
+                sum * if i == 0 { 1.0 } else { 2.0 } / n as f64
+            };
+            (0..n).map(coefficient).collect()
+        })
     }
 
     fn pass<T: Real>(self, argument: Argument<T>, per_mm: T) -> LightPass<T> {

@@ -46,9 +46,8 @@ pub fn irradiance_files(capture: &Capture) -> Vec<String> {
 pub fn write_irradiance(capture: &Capture, folder: &Path) -> Result<(), PipelineError> {
     let irradiances = std::iter::once(&*capture.irradiance).chain(capture.irradiance.photodiodes());
     let mut files = irradiance_files(capture).into_iter().zip(irradiances);
-    let (light, samples) =
-        (capture.scene.light.as_ref().map(|light| &light.illuminant), capture.camera.outputs.exr_samples);
-    files.try_for_each(|(file, own)| own.write_exr_under(light, &folder.join(file), samples))
+    let (white, samples) = (capture.white_of(), capture.camera.outputs.exr_samples);
+    files.try_for_each(|(file, own)| own.write_exr_under(&white, &folder.join(file), samples))
 }
 
 /// Writes what [`write_capture`] does but for the irradiance, the largest file by far.

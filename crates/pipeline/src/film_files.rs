@@ -43,8 +43,8 @@ pub fn convert_irradiance(
         return Err(no_exr_samples(output));
     }
     if !is_mat(output) {
-        let (irradiance, light, notes) = Irradiance::read(input, None)?;
-        irradiance.write_exr_under(light.as_ref(), output, samples.unwrap_or_default())?;
+        let (irradiance, white, notes) = Irradiance::read(input, None)?;
+        irradiance.write_exr_under(&white, output, samples.unwrap_or_default())?;
         return Ok(Some(notes));
     }
     let name = input.file_stem().unwrap_or_default().to_string_lossy();

@@ -78,7 +78,7 @@ pub use stages::{
     AberrationSummary, CameraSummary, Capture, FilmPart, FilmPlace, FrameSet, Given, GivenParts, IRRADIANCE_FILE,
     Imaged, Irradiance, IrradianceSummary, KeptCamera, LensAberrations, NarrowSurfaces, PaintReach, RESUME_FILE,
     RenderingSummary, ResolvedLens, ResolvedScene, Resumed, SceneSummary, StageCounts, UnseenPoints, Video, VideoFrame,
-    VideoFrameFacts, WorldRender, WorldSummary, has_kept_bands, world_camera, write_seen_png,
+    VideoFrameFacts, WhiteOf, WorldRender, WorldSummary, has_kept_bands, world_camera, write_seen_png,
 };
 pub use video_files::{VideoFacts, write_video_frame};
 pub use words::{with_analog_gain, with_auto_exposure, with_exposure_s};

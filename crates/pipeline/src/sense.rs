@@ -124,7 +124,8 @@ impl SenseRequest {
             let covering = sensor.with_size(covered(rows, sensor.rows), covered(columns, sensor.columns));
             (Illumination::with_pitch_um(&irradiance, sample_um), covering)
         };
-        let illuminant = self.illuminant.clone().or(stated);
+        let illuminant = self.illuminant.clone().or(stated.light);
+        let sensor = Sensor { calibrated_behind: sensor.calibrated_behind.or(stated.lens), ..sensor };
         if !(0.5..=2.0).contains(&(sample_um / pixel_um)) {
             notes.push(format!(
                 "the image has a sample every {} µm and the sensor a pixel every {} µm: samples are laid over pixels by area",

@@ -227,6 +227,12 @@ impl Bundle {
             + size_of_val(self.outline.rho.as_slice())
     }
 
+    /// Returns it without its rays, where those are not asked for any more.
+    #[must_use]
+    pub(crate) fn without_rays(self) -> Self {
+        Self { rays: Vec::new(), at_stop: Vec::new(), ..self }
+    }
+
     /// Returns sums over the cells of a function of the mean of their corners, weighted by energy.
     fn mean<T: std::iter::Sum>(&self, of: impl Fn([usize; 4], f64) -> T) -> T {
         let corners = self.mesh.cells().map(|(ring, j)| self.mesh.corners(ring, j));

@@ -22,7 +22,7 @@ const LEAST_COSINE: f64 = 1.745_328_4e-3;
 #[derive(Clone, Debug)]
 pub struct FilmMap {
     kind: Kind,
-    /// Of a part of a pupil, its share of the light.
+    /// Of a part of a pupil, or of a pupil that blades bound, the share of the light of the whole, or of a round one.
     share: Option<Arc<ShareMap>>,
     /// What is added to a point before it is looked up, mm.
     from_mm: DVec2,
@@ -101,7 +101,7 @@ impl FilmMap {
         }
     }
 
-    /// Returns the map with the irradiances of a part of the pupil.
+    /// Returns the map with this share of the irradiances.
     pub(crate) fn with_share(self, share: ShareMap) -> Self {
         Self { share: Some(Arc::new(share)), ..self }
     }
@@ -238,7 +238,7 @@ fn tangent(direction: DVec3) -> Option<DVec2> {
     (direction.z > LEAST_COSINE * direction.length()).then(|| direction.truncate() / direction.z)
 }
 
-/// The share of the light that goes through a part of the pupil, over the film.
+/// The share of the light that goes through a part of the pupil, or an opening of blades, over the film.
 #[derive(Clone, Debug)]
 pub(crate) struct ShareMap {
     /// Where the axis meets the film, mm.

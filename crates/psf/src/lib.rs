@@ -10,6 +10,7 @@
 //! This crate knows nothing of scenes or sensors.
 #![doc = include_str!("../README.md")]
 
+mod bladed;
 mod blurred_edge;
 mod bundle;
 mod count;
@@ -36,7 +37,9 @@ mod ring;
 mod settings;
 mod splat;
 mod spots;
+mod station;
 mod survey;
+mod symmetry;
 mod traced;
 
 pub use count::{AuthorsBending, CountingFilm, FrontGrid, mean_place_mm, trace_as_authors};

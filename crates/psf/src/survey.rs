@@ -7,12 +7,14 @@ use rayon::prelude::*;
 
 use crate::{
     FilmMap,
-    bundle::{Bundle, FilmPointJob, Frame, Moments},
-    decenter::Decenter,
+    bladed::BladedSurvey,
+    bundle::{Bundle, Frame, Moments},
     film_map::{PlaneMap, RadialMap, ShareMap},
     mesh::Mesh,
     pupil::Outline,
     pupil_division::PupilDivision,
+    station::{Station, SurveyedLens},
+    symmetry::Symmetry,
 };
 
 /// Intervals along a radius to begin with, and how often they are halved at most.
@@ -37,36 +39,6 @@ const RIM: f64 = 0.1;
 const N_SHARE_RADII: usize = 65;
 const N_SHARE_AZIMUTHS: usize = 32;
 
-/// A lens, centered, whose film is surveyed at one wavelength.
-#[derive(Clone, Copy)]
-pub(crate) struct SurveyedLens<'a> {
-    /// Of any point of the film.
-    pub(crate) job: FilmPointJob<'a>,
-    pub(crate) is_rotational: bool,
-    /// How it stands aside from where it is surveyed.
-    pub(crate) decenter: Decenter,
-    pub(crate) focus_dioptres: f64,
-}
-
-impl SurveyedLens<'_> {
-    /// Looks out from a point of the film, seeded by the outline of another.
-    fn station(&self, place_mm: DVec2, seed: Option<&Outline>) -> Station {
-        let bundle = FilmPointJob { place_mm, ..self.job }.trace(seed, false);
-        Station::new(place_mm, bundle, self.focus_dioptres)
-    }
-}
-
-/// A point of the film and what it sees.
-#[derive(Clone, Debug)]
-pub(crate) struct Station {
-    place_mm: DVec2,
-    /// Tangents of half the angle of the chief ray.
-    half_tan: Option<DVec2>,
-    irradiance_sr: f64,
-    /// None in darkness, and where a grid foresaw what is seen.
-    bundle: Option<Arc<Bundle>>,
-}
-
 /// The film of the centered lens up to some distance from its axis.
 #[derive(Debug)]
 pub(crate) struct Survey {
@@ -76,40 +48,31 @@ pub(crate) struct Survey {
     /// Along +x by distance from the axis, or over a grid of so many columns, rows from the bottom up.
     stations: Vec<Station>,
     n_columns: Option<usize>,
+    /// Of a lens that is round but for its blades; the other stations are then of the round one.
+    bladed: Option<BladedSurvey>,
     /// Where the axis meets the film, mm from its middle.
     axis_mm: DVec2,
     /// Of each station, or of each point of the first grid; of dark ones those of a lit one near by.
     moments: Vec<Moments>,
 }
 
-impl Station {
-    /// A point whose bundle was traced; none in darkness.
-    fn new(place_mm: DVec2, bundle: Option<Bundle>, focus_dioptres: f64) -> Self {
-        let half_tan = bundle.as_ref().and_then(|bundle| {
-            let chief = bundle.chief(focus_dioptres);
-            let half_tan = chief.truncate() / (chief.z + chief.length());
-            half_tan.is_finite().then_some(half_tan)
-        });
-        let irradiance_sr = bundle.as_ref().map_or(0.0, |bundle| bundle.irradiance_sr);
-        Self { place_mm, half_tan, irradiance_sr, bundle: bundle.map(Arc::new) }
-    }
-
-    fn outline(&self) -> Option<&Outline> {
-        self.bundle.as_ref().map(|bundle| &bundle.outline)
-    }
-}
-
 impl Survey {
     /// Surveys the film up to `reach_mm` from the axis of the centered lens.
     pub(crate) fn new(lens: &SurveyedLens<'_>, reach_mm: f64) -> Self {
-        let (map, stations, n_columns) = match lens.is_rotational {
-            true => {
+        let (map, stations, n_columns, bladed) = match (lens.symmetry, lens.round_job) {
+            (Symmetry::Axis, _) => {
                 let radius = Radius::survey(lens, reach_mm);
-                (FilmMap::from(radius.map(reach_mm)), radius.stations, None)
+                (FilmMap::from(radius.map(reach_mm)), radius.stations, None, None)
             }
-            false => {
+            (Symmetry::Blades(n_blades), Some(job)) => {
+                let radius = Radius::survey(&SurveyedLens { job, ..*lens }, reach_mm);
+                let round_sr = |radius_mm: f64| radius.irradiance_sr.at(radius_mm).max(0.0);
+                let bladed = BladedSurvey::new(lens, n_blades, reach_mm, &round_sr);
+                (FilmMap::from(radius.map(reach_mm)), radius.stations, None, Some(bladed))
+            }
+            _ => {
                 let (map, stations, n) = surveyed_grid(lens, reach_mm);
-                (FilmMap::from(map), stations, Some(n))
+                (FilmMap::from(map), stations, Some(n), None)
             }
         };
         // Of a grid the first one's points say it well enough.
@@ -126,12 +89,20 @@ impl Survey {
         // Move it to where the lens stands.
         let decenter = lens.decenter;
         let axis_tan = decenter.mm() * (1e-3 * lens.focus_dioptres);
-        let map = Arc::new(map.about(decenter.axis_mm(), axis_tan));
-        Self { reach_mm, map, stations, n_columns, axis_mm: decenter.axis_mm(), moments }
+        let axis_mm = decenter.axis_mm();
+        let map = map.about(axis_mm, axis_tan);
+        let map = match &bladed {
+            Some(bladed) => map.with_share(bladed.share_map(axis_mm, reach_mm)),
+            None => map,
+        };
+        Self { reach_mm, map: Arc::new(map), stations, n_columns, bladed, axis_mm, moments }
     }
 
     /// Returns the outline of what is seen from a station near a point, if light is.
     pub(crate) fn seed(&self, place_mm: DVec2) -> Option<&Outline> {
+        if let Some(bladed) = &self.bladed {
+            return bladed.seed(place_mm);
+        }
         let lit = self.stations.iter().filter(|station| station.bundle.is_some());
         let nearest = lit.min_by(|a, b| {
             let square = |station: &Station| station.place_mm.distance_squared(place_mm);
@@ -165,6 +136,10 @@ impl Survey {
 
     /// Returns the map of a part of the pupil: the directions of the whole, and its share of the irradiances.
     pub(crate) fn part_map(&self, mesh: Mesh, division: &PupilDivision, part: usize) -> FilmMap {
+        if let Some(bladed) = &self.bladed {
+            let shares = bladed.part_share_map((self.axis_mm, self.reach_mm), mesh, (division, part));
+            return FilmMap::clone(&self.map).with_share(shares);
+        }
         let n_directions = if self.n_columns.is_some() { 2 } else { N_SHARE_AZIMUTHS };
         let turn = |i: usize| DVec2::from_angle(TAU * i as f64 / n_directions as f64);
         let cell_shares: Vec<Vec<f64>> = (0..n_directions).map(|i| division.cell_shares(part, mesh, turn(i))).collect();
@@ -486,7 +461,7 @@ fn surveyed_grid(lens: &SurveyedLens<'_>, reach_mm: f64) -> (PlaneMap, Vec<Stati
                     false => Station::new(at_mm, None, focus_dioptres),
                 };
                 let is_foreseen = is_foreseen(&station);
-                (station, is_foreseen)
+                (station.without_rays(), is_foreseen)
             })
             .collect();
         let is_done = found.iter().enumerate().all(|(i, (_, is_foreseen))| {

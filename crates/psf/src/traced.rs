@@ -16,7 +16,9 @@ use crate::{
     hurb_splatter::bending,
     pupil::Outline,
     render::{Layout, wave_energies},
-    survey::{Survey, SurveyedLens},
+    station::SurveyedLens,
+    survey::Survey,
+    symmetry::Symmetry,
 };
 
 /// Bytes of bundles that are kept for each wavelength.
@@ -33,7 +35,7 @@ pub(crate) struct Shared {
     lens: Lens,
     /// The lens as it is traced: on its axis where it has one.
     centered: Lens,
-    is_rotational: bool,
+    symmetry: Symmetry,
     decenter: Decenter,
     settings: ImageSettings,
     wavelengths_nm: Vec<f64>,
@@ -51,6 +53,8 @@ pub(crate) struct Color {
     pub(crate) lens: MonoLens,
     reversed: ReversedLens,
     unobscured: Option<ReversedLens>,
+    /// With a circle of as much area in place of the opening of blades: the lens, and it without obscurations.
+    round: Option<(ReversedLens, Option<ReversedLens>)>,
     surveys: Mutex<Vec<Arc<Survey>>>,
     bundles: Mutex<KeptBundles>,
 }
@@ -81,7 +85,7 @@ impl Shared {
         let focus_dioptres = focus_mm.map_or(0.0, |distance_mm| 1e3 / (distance_mm + center_z_mm));
         let shared = Self {
             lens: lens.clone(),
-            is_rotational: centered.is_rotational(),
+            symmetry: Symmetry::of(&centered),
             centered,
             decenter,
             settings: *settings,
@@ -113,7 +117,7 @@ impl Shared {
 
     /// Whether the lens as it is traced has an axis of symmetry.
     pub(crate) fn is_rotational(&self) -> bool {
-        self.is_rotational
+        self.symmetry == Symmetry::Axis
     }
 
     pub(crate) fn decenter(&self) -> Decenter {
@@ -126,7 +130,9 @@ impl Shared {
 
     fn new_color(&self, wavelength_nm: f64) -> Result<Color, PsfError> {
         let lens = self.centered.at(wavelength_nm)?;
+        let round = lens.with_round_iris().map(|lens| (lens.reversed(), unobscured(&lens)));
         Ok(Color {
+            round,
             reversed: lens.reversed(),
             unobscured: unobscured(&lens),
             lens,
@@ -152,7 +158,7 @@ impl Shared {
     /// Fails if no light reaches the film about its middle.
     fn check_light(&self, color: &Color) -> Result<(), PsfError> {
         const N_DIRECTIONS: usize = 16;
-        let n_directions = if self.is_rotational { 1 } else { N_DIRECTIONS };
+        let n_directions = if self.symmetry == Symmetry::Axis { 1 } else { N_DIRECTIONS };
         let directions =
             (0..n_directions).map(|i| DVec2::from_angle(std::f64::consts::TAU * i as f64 / n_directions as f64));
         let mut probes = directions
@@ -172,9 +178,16 @@ impl Shared {
     }
 
     fn surveyed<'a>(&self, color: &'a Color) -> SurveyedLens<'a> {
+        let job = self.job(color, DVec2::ZERO);
+        let round_job = color.round.as_ref().map(|(lens, unobscured)| FilmPointJob {
+            lens,
+            unobscured: unobscured.as_ref(),
+            ..job
+        });
         SurveyedLens {
-            job: self.job(color, DVec2::ZERO),
-            is_rotational: self.is_rotational,
+            job,
+            round_job,
+            symmetry: self.symmetry,
             decenter: self.decenter,
             focus_dioptres: self.focus_dioptres,
         }
@@ -228,11 +241,8 @@ impl Shared {
     pub(crate) fn bundle(&self, color: &Color, place_mm: DVec2) -> Option<(Arc<Bundle>, Arc<FilmMap>, Frame)> {
         let survey = self.survey_of_film(color, 0.0);
         let from_axis_mm = place_mm - self.decenter.axis_mm();
-        // Of a lens with an axis, bundles are traced along +x and turned.
-        let (traced_mm, turn) = match self.is_rotational {
-            true => (DVec2::X * from_axis_mm.length(), from_axis_mm.try_normalize().unwrap_or(DVec2::X)),
-            false => (from_axis_mm, DVec2::X),
-        };
+        // Of a lens with an axis bundles are traced along +x, of one with blades in one sector, and turned.
+        let (traced_mm, turn) = self.symmetry.traced(from_axis_mm);
         let frame = Frame { turn, aside_mm: self.decenter.mm() };
         let key = traced_mm.to_array().map(f64::to_bits);
         let known = locked(&color.bundles).by_place.get(&key).cloned();

@@ -3,7 +3,7 @@
 
 use std::f64::consts::PI;
 
-use dioptric_optics::{Iris, Lens, ObjectPoint, Vignetting, glam::DVec2, rays_towards};
+use dioptric_optics::{FilmCone, Iris, Lens, ObjectPoint, Vignetting, glam::DVec2, rays_towards};
 use dioptric_psf::{Diffraction, FilmQuery, ImageSettings, Kernel, LensImage, LensImageModel, PointImage};
 
 const PITCH_UM: f64 = 6.0;
@@ -139,5 +139,47 @@ fn the_light_on_the_film_is_that_of_the_f_number() {
         let (area_mm2, blur_mm2) = (0.02 * 0.02 / squares, PI * mono.stop_semi_aperture_mm().powi(2) * 0.04f64.powi(2));
         assert!((area_mm2 / blur_mm2 - 1.0).abs() < 0.06, "{area_mm2} {blur_mm2}");
         assert!((kernel.sum() - 1.0).abs() < 1e-6);
+    }
+}
+
+/// The light over the film of a lens that is round but for its blades, in one sector and beyond: against rays counted from the film.
+#[test]
+fn the_light_on_the_film_is_that_of_counted_rays() {
+    const N: usize = 600;
+    for (blades, curvature, f_number) in [(6, 0.2, 2.8), (5, 0.0, 2.4), (3, 0.0, 4.0), (16, 0.0, 2.2)] {
+        let iris = Iris { blades, rotation_deg: 12.0, curvature };
+        let lens = stopped(&Lens::built_in("dgauss-50mm").unwrap(), iris, f_number);
+        let mono = lens.at(550.0).unwrap();
+        let (reversed, film_mm) = (mono.reversed(), 37.5);
+        let image = LensImageModel::new(&lens, &[550.0], &ImageSettings::new(film_mm, Diffraction::None)).unwrap();
+        let map = image.film_map(550.0, 21.0);
+        let middle_sr = map.irradiance_sr(DVec2::ZERO);
+        for (radius_mm, angle_deg) in
+            [(0.0, 0.0), (4.1, 200.0), (9.3, 31.0), (13.9, 97.0), (16.4, 355.0), (20.3, 143.0f64)]
+        {
+            let place_mm = DVec2::from_angle(angle_deg.to_radians()) * radius_mm;
+            // The picture is the film turned by 180°.
+            let cone = FilmCone::new(&reversed, -place_mm, film_mm).unwrap();
+            // Towards the axis, as far as the exit pupil is.
+            let aim = place_mm / (film_mm + 18.0).hypot(radius_mm);
+            let (half, step) = (0.32, 0.64 / N as f64);
+            let at = |i: usize| (i as f64 + 0.5) * step - half;
+            let sr = |sign: f64| {
+                let cosines: Vec<DVec2> = (0..N * N).map(|i| sign * aim + DVec2::new(at(i % N), at(i / N))).collect();
+                let mut rays = cone.rays(&cosines);
+                reversed.trace(&mut rays, Vignetting::On);
+                rays.n_in_flight() as f64 * step * step
+            };
+            // Whichever way cosines count.
+            let counted_sr = sr(1.0).max(sr(-1.0));
+            let found_sr = map.irradiance_sr(place_mm);
+            // Surveys hold 1e-3 of the middle; a grid of rays counts to a few of the cells along the edge.
+            assert!(
+                (found_sr - counted_sr).abs() < 2e-3 * middle_sr,
+                "{blades} blades, {radius_mm} mm at {angle_deg}°: {} {}",
+                found_sr / middle_sr,
+                counted_sr / middle_sr
+            );
+        }
     }
 }

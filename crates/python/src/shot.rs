@@ -367,8 +367,11 @@ impl Shot {
         let outputs = &capture.camera.outputs;
         let mut files = Vec::new();
         if outputs.irradiance {
-            let light = capture.scene.light.as_ref().map(|light| &light.illuminant);
-            capture.irradiance.write_exr_under(light, &folder.join(IRRADIANCE_FILE), outputs.exr_samples)?;
+            capture.irradiance.write_exr_under(
+                &capture.white_of(),
+                &folder.join(IRRADIANCE_FILE),
+                outputs.exr_samples,
+            )?;
             files.push(IRRADIANCE_FILE.to_owned());
         }
         if outputs.depth {

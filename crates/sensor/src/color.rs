@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     Sensor, SensorError,
     least_squares::Normal,
-    white_light::{fine_grid, white_response},
+    white_light::{color_weights, fine_grid, white_response},
 };
 
 /// How the sensor's channels become colors.
@@ -220,7 +220,7 @@ impl Training {
     fn new(sensor: &Sensor, light: &Illuminant, reflectances: &[Spectrum]) -> Self {
         let grid = fine_grid();
         let light_values = light.spectrum().sample_held(&grid);
-        let weights = sensor.electron_weights(&grid);
+        let weights = color_weights(sensor, &grid);
         let white = white_response(sensor, light);
         // Once for all colors: they take longer than everything else here.
         let observer = Observer::Cie1931.weights(&grid);

@@ -41,6 +41,10 @@ pub struct Sensor {
     /// Glass over the whole array: infrared cut, cover glass, anti-alias filter.
     #[serde(default)]
     pub filter_stack: Vec<Layer>,
+    /// What lies before the sensor in the camera that its colors are calibrated for: a lens. Its transmittance counts in what is white and
+    /// in color matrices, not in the electrons, which are those of the light that comes through.
+    #[serde(default)]
+    pub calibrated_behind: Option<Layer>,
     /// Volts an electron.
     pub conversion_gain_v_per_e: f64,
     /// The electrons that a pixel holds.

@@ -8,7 +8,19 @@ use crate::Sensor;
 pub(crate) fn white_response(sensor: &Sensor, light: &Illuminant) -> Vec<f64> {
     let grid = fine_grid();
     let white = light.spectrum().sample_held(&grid);
-    sensor.electron_weights(&grid).iter().map(|w| w.iter().zip(&white).map(|(w, s)| w * s).sum()).collect()
+    color_weights(sensor, &grid).iter().map(|w| w.iter().zip(&white).map(|(w, s)| w * s).sum()).collect()
+}
+
+/// Returns, for each filter, the electrons of light before the lens that the colors are calibrated for, up to a factor common to all.
+pub(crate) fn color_weights(sensor: &Sensor, grid: &WavelengthGrid) -> Vec<Vec<f64>> {
+    let mut weights = sensor.electron_weights(grid);
+    if let Some(lens) = &sensor.calibrated_behind {
+        let transmittance = lens.transmittance.sample_held(grid);
+        for list in &mut weights {
+            list.iter_mut().zip(&transmittance).for_each(|(weight, share)| *weight *= share);
+        }
+    }
+    weights
 }
 
 /// Returns the black body or daylight whose white the gains come nearest to making neutral, from 1800 to 15 000 K; D65 for
@@ -18,7 +30,7 @@ pub(crate) fn light_of_gains(sensor: &Sensor, gains: &[f64]) -> Illuminant {
         return Illuminant::D65;
     }
     let grid = fine_grid();
-    let weights = sensor.electron_weights(&grid);
+    let weights = color_weights(sensor, &grid);
     // How far from equal the balanced channels of a light are: the variance of their logarithms.
     let unevenness = |light: &Illuminant| {
         let white = light.spectrum().sample_held(&grid);
@@ -41,6 +53,23 @@ pub(crate) fn fine_grid() -> WavelengthGrid {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Layer;
+
+    #[test]
+    fn what_is_before_a_calibrated_sensor_is_part_of_white() {
+        let sensor = Sensor::built_in("imx363").unwrap();
+        let filter = crate::OpticalFilter::built_in("wratten-81a").unwrap();
+        let lens = Layer { name: "lens".to_owned(), transmittance: filter.transmittance.clone() };
+        let calibrated = Sensor { calibrated_behind: Some(lens), ..sensor.clone() };
+        let grid = fine_grid();
+        assert_eq!(calibrated.electron_weights(&grid), sensor.electron_weights(&grid));
+        // As of the sensor whose light goes through the filter, to the finer steps in which its bands are averaged.
+        let [found, behind] =
+            [calibrated, sensor.behind(&[filter])].map(|sensor| white_response(&sensor, &Illuminant::D65));
+        for (found, behind) in found.iter().zip(&behind) {
+            assert!((found / behind - 1.0).abs() < 1e-4, "{found} {behind}");
+        }
+    }
 
     #[test]
     fn gains_tell_the_light_they_balance() {

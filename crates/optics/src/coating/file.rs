@@ -44,14 +44,18 @@ impl Coating {
 
 /// Reads a table whose rows are all pairs of some wavelengths and some angles, in any order.
 fn table_from_csv(text: &str) -> Result<ReflectanceTable, String> {
+    let text = text.trim_start_matches('\u{feff}');
     let lines = text.lines().enumerate().map(|(i, line)| (i + 1, line.trim()));
     let mut lines = lines.filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
     let (_, header) = lines.next().ok_or("is empty, expected wavelength_nm,angle_deg,r or r_s,r_p")?;
     let names: Vec<String> =
-        header.trim_start_matches('\u{feff}').split(',').map(|name| name.trim().to_lowercase()).collect();
+        header.split(',').map(|name| name.trim().trim_matches('"').trim().to_lowercase()).collect();
     const KNOWN: [&str; 5] = ["wavelength_nm", "angle_deg", "r", "r_s", "r_p"];
     if let Some(unknown) = names.iter().find(|name| !KNOWN.contains(&name.as_str())) {
         return Err(format!("column '{unknown}' is unknown, expected wavelength_nm, angle_deg and r, or r_s and r_p"));
+    }
+    if let Some(twice) = names.iter().enumerate().find(|(i, name)| names[..*i].contains(name)) {
+        return Err(format!("has the column {} twice", twice.1));
     }
     let column = |name: &str| names.iter().position(|found| found == name);
     let needed = |name: &str| column(name).ok_or(format!("has no column {name}"));
@@ -112,7 +116,11 @@ mod tests {
         .unwrap();
         assert_eq!((table.wavelengths_nm.clone(), table.angles_deg.clone()), (vec![400.0, 600.0], vec![0.0, 30.0]));
         assert_eq!((table.r_s[0].clone(), table.r_p[1].clone()), (vec![0.01, 0.03], vec![0.02, 0.0]));
-        assert_eq!(table_from_csv("wavelength_nm,angle_deg,r\n500,0,.01").unwrap().r_p, vec![vec![0.01]]);
+        for text in
+            ["wavelength_nm,angle_deg,r\n500,0,.01", "\u{feff}# lab\n\"wavelength_nm\",\"angle_deg\",\"r\"\n500,0,.01"]
+        {
+            assert_eq!(table_from_csv(text).unwrap().r_p, vec![vec![0.01]]);
+        }
     }
 
     #[test]
@@ -123,6 +131,7 @@ mod tests {
         assert!(message("wavelength_nm,angle_deg,r\n500,0,x").contains("line 2: 'x' is no number"));
         assert!(message("wavelength_nm,angle_deg,r\n500,0,.1\n600,10,.1").contains("2 rows"));
         assert!(message("wavelength_nm,angle_deg,r\n500,0,.1\n500,0,.1\n").contains("2 rows"));
+        assert!(message("wavelength_nm,angle_deg,r,r\n500,0,.1,.2\n").contains("column r twice"));
         assert!(message("").contains("is empty"));
     }
 }

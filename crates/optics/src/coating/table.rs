@@ -4,20 +4,26 @@ use serde::{Deserialize, Serialize};
 
 use crate::OpticsError;
 
-/// What a coating reflects, by wavelength and by the angle of incidence in the medium of lower index, air as a rule; between its points
-/// straight lines, beyond the last angle up to 1 at 90°.
+/// What a coating reflects, by wavelength and by the angle of incidence in the medium of lower index, air as a rule.
+///
+/// Between wavelengths it is interpolated along straight lines, between angles by monotone cubics. Before the first angle it is as there.
+/// Beyond the last it rises to 1 at 90° as the reflectance of surfaces does, R + (1 − R) (1 − cos θ / cos θ_last)⁵ (Schlick, *An
+/// Inexpensive BRDF Model for Physically-based Rendering*, 1994).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ReflectanceTable {
     /// Ascending wavelengths, nm.
     pub wavelengths_nm: Vec<f64>,
-    /// Ascending angles of incidence from 0 on, degrees.
+    /// Ascending angles of incidence, degrees: from 0 on, or from one up to 15, at which instruments measure.
     pub angles_deg: Vec<f64>,
     /// For each wavelength, at each angle, the share reflected of light whose electric field is across the plane of incidence.
     pub r_s: Vec<Vec<f64>>,
     /// The same of light whose field is in that plane.
     pub r_p: Vec<Vec<f64>>,
 }
+
+/// The largest angle that may stand for light that falls straight on a surface, degrees: instruments measure at 5 to 12.
+const STRAIGHT_ON_DEG: f64 = 15.0;
 
 impl ReflectanceTable {
     /// Checks that all numbers are there and make sense.
@@ -36,9 +42,10 @@ impl ReflectanceTable {
             return wrong(format!("a table of reflectance begins at {} nm", self.wavelengths_nm[0]));
         }
         let (first_deg, last_deg) = (self.angles_deg[0], self.angles_deg[self.angles_deg.len() - 1]);
-        if first_deg != 0.0 || last_deg > 90.0 {
+        if !(0.0..=STRAIGHT_ON_DEG).contains(&first_deg) || last_deg > 90.0 {
             return wrong(format!(
-                "the angles of a table of reflectance are {first_deg} to {last_deg} degrees, expected 0 to at most 90"
+                "the angles of a table of reflectance are {first_deg} to {last_deg} degrees, expected from 0 (at most \
+                 {STRAIGHT_ON_DEG}) to at most 90"
             ));
         }
         for (what, rows) in [("r_s", &self.r_s), ("r_p", &self.r_p)] {
@@ -86,10 +93,39 @@ impl ReflectanceTable {
 pub(crate) fn share_between(table: &[(f64, [f64; 2])], cos: f64) -> [f64; 2] {
     let deg = cos.clamp(0.0, 1.0).acos().to_degrees();
     let above = table.partition_point(|(at, _)| *at <= deg);
-    let (from, from_r) = table[above.saturating_sub(1)];
-    let (to, to_r) = table.get(above).copied().unwrap_or((90.0, [1.0; 2]));
-    let share = if to > from { (deg - from) / (to - from) } else { 0.0 };
-    std::array::from_fn(|k| from_r[k] + share * (to_r[k] - from_r[k]))
+    let last = table.len() - 1;
+    if above == 0 {
+        return table[0].1;
+    }
+    let (from_deg, from_r) = table[above - 1];
+    if above > last {
+        let rise = (1.0 - cos.max(0.0) / from_deg.to_radians().cos()).clamp(0.0, 1.0).powi(5);
+        return if from_deg < 90.0 { from_r.map(|r| r + (1.0 - r) * rise) } else { from_r };
+    }
+    let (to_deg, to_r) = table[above];
+    let step = to_deg - from_deg;
+    let t = (deg - from_deg) / step;
+    std::array::from_fn(|k| {
+        let (from, to) = (from_r[k], to_r[k]);
+        let [slope_from, slope_to] = [above - 1, above].map(|i| step * slope_at(table, i, k));
+        let s = 1.0 - t;
+        from * s * s * (1.0 + 2.0 * t) + to * t * t * (3.0 - 2.0 * t) + t * s * (slope_from * s - slope_to * t)
+    })
+}
+
+/// Returns the slope of a share per degree at an angle of a table: the harmonic mean of those beside it, so that no cubic leaves the range
+/// of its ends (Fritsch & Butland 1984); level at the first, as what is even about 0° is.
+fn slope_at(table: &[(f64, [f64; 2])], i: usize, k: usize) -> f64 {
+    let secant = |i: usize| (table[i + 1].1[k] - table[i].1[k]) / (table[i + 1].0 - table[i].0);
+    if i == 0 {
+        return 0.0;
+    }
+    let before = secant(i - 1);
+    if i + 1 == table.len() {
+        return before;
+    }
+    let after = secant(i);
+    if before * after > 0.0 { 2.0 * before * after / (before + after) } else { 0.0 }
 }
 
 #[cfg(test)]
@@ -106,14 +142,22 @@ mod tests {
     }
 
     #[test]
-    fn straight_lines_lie_between_points() {
+    fn cubics_lie_between_points_and_a_rise_beyond() {
         let at = table().at(500.0).unwrap();
         let close = |found: [f64; 2], expected: [f64; 2]| {
             assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{found:?} {expected:?}");
         };
-        close(share_between(&at, 15f64.to_radians().cos()), [0.025, 0.01]);
-        close(share_between(&at, 60f64.to_radians().cos()), [0.5175, 0.5025]);
+        // Halfway with slopes of 0 and of the secant: less than the mean by an eighth of the step.
+        close(share_between(&at, 15f64.to_radians().cos()), [0.025 - 0.02 / 8.0, 0.01 + 0.01 / 8.0]);
+        let rise = (1.0 - 0.5 / 30f64.to_radians().cos()).powi(5);
+        close(share_between(&at, 60f64.to_radians().cos()), [0.035 + 0.965 * rise, 0.005 + 0.995 * rise]);
         close(share_between(&at, 0.0), [1.0, 1.0]);
+        // Catalogues state one angle, instruments measure at 8°: at small angles that is what a coating reflects.
+        for deg in [0.0, 8.0] {
+            let single = [(deg, [0.01, 0.01])];
+            close(share_between(&single, 1.0), [0.01, 0.01]);
+            assert!(share_between(&single, 20f64.to_radians().cos())[0] < 0.0101);
+        }
         close(share_between(&table().at(600.0).unwrap(), 1.0), [0.02, 0.02]);
         let single = ReflectanceTable {
             wavelengths_nm: vec![500.0],
@@ -132,7 +176,7 @@ mod tests {
                 .contains("r_s of a table of reflectance is 1.2")
         );
         assert!(message(ReflectanceTable { r_p: vec![vec![0.1; 2]], ..table() }).contains("needs 2 rows"));
-        assert!(message(ReflectanceTable { angles_deg: vec![5.0, 30.0], ..table() }).contains("5 to 30 degrees"));
+        assert!(message(ReflectanceTable { angles_deg: vec![25.0, 30.0], ..table() }).contains("25 to 30 degrees"));
         assert!(table().at(700.0).unwrap_err().to_string().contains("from 400 to 600 nm"));
     }
 }

@@ -2,6 +2,7 @@
 
 use super::{
     Kind, Step, Vignetting,
+    aperture::clip,
     asphere::{AllPowers, Asphere, EvenPowers, ManyPowers},
     block::Block,
     crossing::{ConicForm, Ideal, Interface},
@@ -43,6 +44,12 @@ impl<T: Real> Pass<T> {
     /// Whether there is more to end rays than the round rim.
     pub(super) fn is_clipped_further(&self) -> bool {
         self.rims == Vignetting::On && !self.apertures.is_empty()
+    }
+
+    /// Takes blocks through the surface, its rim and its apertures, and returns whether a ray ended there.
+    pub(super) fn pass_blocks(&self, shift: T, from: &[Block<T>], to: &mut [Block<T>]) -> bool {
+        let is_any_ended = self.form.pass_blocks(shift, from, to);
+        (self.is_clipped_further() && clip(&self.apertures, to)) || is_any_ended
     }
 
     /// Whether a ray that meets the surface here is inside its rim and its apertures.

@@ -165,7 +165,7 @@ impl<T: Real> GhostTree<T> {
 impl<T: Real> Side<T> {
     /// Lets light on, from a surface that lies before this one by `shift`.
     fn pass_on(&self, from: &Lit<T>, to: &mut Lit<T>, shift: T) {
-        self.on.form.pass_blocks(shift, &from.rays, &mut to.rays);
+        self.on.pass_blocks(shift, &from.rays, &mut to.rays);
         to.light = from.light;
         to.shade(&self.on_light, shift, from);
     }
@@ -173,7 +173,7 @@ impl<T: Real> Side<T> {
     /// Sends light back; returns whether any comes back.
     fn send_back(&self, from: &Lit<T>, to: &mut Lit<T>, shift: T) -> bool {
         let Some(light) = &self.back_light else { return false };
-        self.back.form.pass_blocks(shift, &from.rays, &mut to.rays);
+        self.back.pass_blocks(shift, &from.rays, &mut to.rays);
         // The kernel leaves directions behind a mirror reversed.
         for block in &mut to.rays {
             for list in [&mut block.l, &mut block.m, &mut block.n] {

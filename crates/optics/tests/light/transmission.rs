@@ -2,8 +2,8 @@
 
 use dioptric_golden::needs_shared;
 use dioptric_optics::{
-    Coating, CoordinateBreak, Film, Glass, Interface, Lens, ObjectPoint, RayBatch, RayBatchF32, RayLight, RayLightF32,
-    Shape, Surface, Vignetting,
+    Coating, CoatingLayer, CoordinateBreak, Film, Glass, Interface, Lens, ObjectPoint, RayBatch, RayBatchF32, RayLight,
+    RayLightF32, Shape, Surface, Vignetting,
     analysis::projected_solid_angle,
     glam::{DVec2, DVec3},
 };
@@ -52,6 +52,26 @@ fn a_slanted_plate_transmits_each_polarization_by_itself() {
     let film = Film::new(1.0, &[(1.38.into(), NM / 4.0 / 1.38)], 1.5.into(), NM).shares(0.6);
     let found = share_of(&mgf2, DVec3::ZERO, DVec3::new(0.8, 0.0, 0.6));
     assert!((found - 0.5 * (film.t_s.powi(2) + film.t_p.powi(2))).abs() < 1e-9, "{found}");
+}
+
+/// Stacks of many layers change within a few degrees: a filter of 24 layers, to the digits of a single one.
+#[test]
+fn stacks_of_many_layers_are_followed_at_all_angles() {
+    let layer = |index: f64| CoatingLayer { medium: Glass::Constant { index }, thickness_nm: 600.0 / 4.0 / index };
+    let layers: Vec<CoatingLayer> = (0..24).map(|i| layer(if i % 2 == 0 { 2.35 } else { 1.38 })).collect();
+    let index_and_nm: Vec<_> = (0..24)
+        .map(|i| if i % 2 == 0 { 2.35f64 } else { 1.38 })
+        .map(|index| (index.into(), 600.0 / 4.0 / index))
+        .collect();
+    let plate = lens(&[[f64::INFINITY, 1.5, 3.0], [f64::INFINITY, 1.0, 0.0]], 50.0);
+    let coated = plate.with_light_loss(Some(Coating::Layers(layers))).unwrap();
+    for degrees in 0..18 {
+        let (sin, cos) = (5.0 * f64::from(degrees)).to_radians().sin_cos();
+        let film = Film::new(1.0, &index_and_nm, 1.5.into(), NM).shares(cos);
+        let expected = 0.5 * (film.t_s.powi(2) + film.t_p.powi(2));
+        let found = share_of(&coated, DVec3::ZERO, DVec3::new(sin, 0.0, cos));
+        assert!((found - expected).abs() < 1e-7, "{degrees}: {found} {expected}");
+    }
 }
 
 /// Two plates of bare glass turned against each other by 90° about the light: what the first polarizes the second takes.
@@ -270,6 +290,9 @@ fn mirrors_are_perfect_unless_a_metal_is_stated() {
     let (n, k) = (0.958f64, 6.69f64);
     let expected = ((n - 1.0).powi(2) + k * k) / ((n + 1.0).powi(2) + k * k);
     assert!((found - expected).abs() < 1e-6, "{found} {expected}");
+    // Beyond what is known of the metal nothing is guessed.
+    let wrong = coated.at(700.0).unwrap_err().to_string();
+    assert!(wrong.contains("surface 0") && wrong.contains("not known at 700 nm"), "{wrong}");
     let wrong = mirror.with_coatings(vec![(0, Coating::Bare)]).unwrap().at(NM).unwrap_err().to_string();
     assert!(wrong.contains("surface 0") && wrong.contains("Ideal, Metal or Table"), "{wrong}");
     let singlet = Lens::built_in("singlet-50mm").unwrap().with_light_loss(Some(Coating::MGF2)).unwrap();

@@ -14,6 +14,7 @@ use super::{
     lens_tables::LensAberrations,
     scene::SceneSummary,
     spec::ElectronInputs,
+    white_of::WhiteOf,
 };
 use crate::{Camera, Frames, LensFacts, Quality};
 
@@ -54,6 +55,14 @@ impl Capture {
     /// The bands.
     pub fn grid(&self) -> &WavelengthGrid {
         self.irradiance.grid()
+    }
+
+    /// What is white on the film.
+    pub fn white_of(&self) -> WhiteOf {
+        WhiteOf {
+            light: self.scene.light.as_ref().map(|light| light.illuminant.clone()),
+            lens: self.sensor.calibrated_behind.clone(),
+        }
     }
 
     /// Notes on the lens at the bands of the picture, a sentence each: what its file states and this program does otherwise,

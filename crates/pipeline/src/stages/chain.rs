@@ -330,7 +330,8 @@ impl Chain<'_> {
             let irradiance = &inputs.frames.electrons.irradiance;
             let place = self.film(&irradiance.plan.bank.film, &irradiance.scene)?;
             let frames = self.frames(&inputs.frames)?;
-            let sensor = electrons::read_out(&inputs.frames.electrons, &place);
+            let lens = self.lens(&irradiance.plan.bank.film.lens)?;
+            let sensor = electrons::read_out(&inputs.frames.electrons, &place, &lens);
             let processing = processing.clone();
             self.watch.run(move || {
                 let tables = aberrations.as_ref().map(|aberrations| &aberrations.tables);

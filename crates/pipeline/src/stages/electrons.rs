@@ -17,9 +17,10 @@ pub(crate) struct PixelRates {
     pub(crate) photodiodes: Vec<ElectronRate>,
 }
 
-/// Returns the sensor as it lies on the film, with the noise of as many reads as the samples of its frames are sums of.
-pub(super) fn read_out(inputs: &ElectronInputs, place: &FilmPlace) -> Sensor {
-    let sensor = on_film(&inputs.sensor, place);
+/// Returns the sensor as its frames are developed: as it lies on the film, calibrated with the lens, with the noise of as many reads as the
+/// samples of its frames are sums of.
+pub(super) fn read_out(inputs: &ElectronInputs, place: &FilmPlace, lens: &ResolvedLens) -> Sensor {
+    let sensor = lens.calibrated(on_film(&inputs.sensor, place));
     match inputs.irradiance.dual_pixel {
         Some(spec) => sensor.of_summed_reads(spec.photodiodes.names().len()),
         None => sensor,

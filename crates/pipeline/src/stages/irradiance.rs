@@ -9,10 +9,8 @@ use std::{
 };
 
 use dioptric_forward::{ImagingPlan, ImagingTimes, Source};
-use dioptric_scene::{
-    ExrSamples, IsetIrradiance, Scene, SpectralHead, read_exr_light, read_iset_irradiance, read_spectral_exr,
-};
-use dioptric_spectrum::{Bands, Illuminant, Observer, Quantity, SpectralImage, SpectrumError, WavelengthGrid};
+use dioptric_scene::{ExrSamples, IsetIrradiance, Scene, SpectralHead, read_iset_irradiance, read_spectral_exr};
+use dioptric_spectrum::{Bands, Observer, Quantity, SpectralImage, SpectrumError, WavelengthGrid};
 use ndarray::{Array2, Array3, ArrayView3, Axis, s};
 
 use super::{
@@ -22,6 +20,7 @@ use super::{
     narrow_surfaces::NarrowSurfaces,
     spec::FileStamp,
     unseen_points::UnseenPoints,
+    white_of::WhiteOf,
 };
 use crate::{
     PipelineError, Stage,
@@ -186,20 +185,14 @@ impl Irradiance {
     /// # Errors
     /// When the file cannot be written.
     pub fn write_exr(&self, path: &Path, samples: ExrSamples) -> Result<(), PipelineError> {
-        self.write_exr_under(None, path, samples)
+        self.write_exr_under(&WhiteOf::default(), path, samples)
     }
 
-    /// Writes it with the light on the scene, by which whoever develops it makes white.
+    /// Writes it with what whoever develops it makes white.
     ///
     /// # Errors
     /// When the file cannot be written.
-    pub fn write_exr_under(
-        &self,
-        light: Option<&Illuminant>,
-        path: &Path,
-        samples: ExrSamples,
-    ) -> Result<(), PipelineError> {
-        let light = light.and_then(|light| ron::to_string(light).ok());
+    pub fn write_exr_under(&self, white: &WhiteOf, path: &Path, samples: ExrSamples) -> Result<(), PipelineError> {
         if let Some((file, of_file)) = &self.stored
             && *of_file == samples
             && FileStamp::of(file.path()) == *file
@@ -207,6 +200,8 @@ impl Irradiance {
         {
             return Ok(());
         }
+        let texts = white.texts();
+        let texts: Vec<(&str, &str)> = texts.iter().map(|(name, text)| (*name, text.as_str())).collect();
         let head = SpectralHead {
             quantity: Quantity::Irradiance,
             grid: &self.grid,
@@ -215,7 +210,7 @@ impl Irradiance {
             depth: None,
             view: None,
             light: None,
-            light_words: light.as_deref(),
+            texts: &texts,
             largest: self.summary.max.iter().fold(0.0, |a, &b| a.max(b as f32)),
             samples,
             at_once_bytes: STRIP_BYTES,
@@ -246,20 +241,21 @@ impl Irradiance {
         }
     }
 
-    /// Reads it from a spectral EXR, as [`read_exr`](Self::read_exr) does, or from an optical image of `ISETCam` (`.mat`); with the light on the
-    /// scene where the file states it, and what it says of how it was read, a sentence each.
+    /// Reads it from a spectral EXR, as [`read_exr`](Self::read_exr) does, or from an optical image of `ISETCam` (`.mat`); with what is
+    /// white on it, as far as the file states that, and what it says of how it was read, a sentence each.
     ///
     /// # Errors
     /// When the file cannot be read, or holds no irradiance.
-    pub fn read(path: &Path, pitch_um: Option<f64>) -> Result<(Self, Option<Illuminant>, Vec<String>), PipelineError> {
+    pub fn read(path: &Path, pitch_um: Option<f64>) -> Result<(Self, WhiteOf, Vec<String>), PipelineError> {
         if !path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("mat")) {
-            return Ok((Self::read_exr(path, pitch_um)?, stated_light(path)?, vec![]));
+            return Ok((Self::read_exr(path, pitch_um)?, WhiteOf::read(path)?, vec![]));
         }
         let IsetIrradiance { image, light, notes } = read_iset_irradiance(path)?;
         let pitch_um = image.pitch_um().or(pitch_um);
         let reason = "it states no distance between its samples".to_owned();
         let pitch_um = pitch_um.ok_or(PipelineError::Read { path: path.to_owned(), reason })?;
-        Ok((Self::of_image(image, pitch_um), light.map(|light| light.illuminant), notes))
+        let white = WhiteOf { light: light.map(|light| light.illuminant), lens: None };
+        Ok((Self::of_image(image, pitch_um), white, notes))
     }
 
     /// Reads it from a spectral EXR; one without a distance between samples has that of the film given.
@@ -383,16 +379,6 @@ impl Bands for Irradiance {
             Planes::Sums => sum_of(&self.photodiodes, band).map(Cow::Owned),
         }
     }
-}
-
-/// Returns the light on the scene that a file of irradiance states, as those of a run do.
-fn stated_light(image: &Path) -> Result<Option<Illuminant>, PipelineError> {
-    let Some(text) = read_exr_light(image)? else { return Ok(None) };
-    let wrong = |reason: String| PipelineError::Read { path: image.to_owned(), reason };
-    let light: Illuminant =
-        ron::from_str(&text).map_err(|e| wrong(format!("its light, '{text}', cannot be read: {e}")))?;
-    light.check().map_err(|e| wrong(e.to_string()))?;
-    Ok(Some(light))
 }
 
 /// Returns the sum of a band of several irradiances.

@@ -178,7 +178,7 @@ impl KeptCamera {
             factor => Arc::new(scene.brightened(factor)),
         };
         let rates = chain.electrons(electron_inputs)?;
-        let sensor = electrons::read_out(electron_inputs, &place);
+        let sensor = electrons::read_out(electron_inputs, &place, &lens);
         let frames = chain.frames(frame_inputs)?;
         let processing = self.camera.processing.under(scene.light.as_ref().map(|light| &light.illuminant));
         let aberrations = chain.aberrations(&inputs)?;

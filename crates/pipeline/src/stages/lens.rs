@@ -1,7 +1,10 @@
 //! The lens: read, its stop set, moved before the film.
 
+use std::sync::OnceLock;
+
 use dioptric_optics::{Lens, LensFile, MonoLens};
-use dioptric_spectrum::WavelengthGrid;
+use dioptric_sensor::{Layer, Sensor};
+use dioptric_spectrum::{Spectrum, WavelengthGrid};
 
 use super::spec::LensInputs;
 use crate::{PipelineError, REFERENCE_WAVELENGTH_NM, with_blades};
@@ -15,9 +18,50 @@ pub struct ResolvedLens {
     pub reference: MonoLens,
     /// What its file states and this program does otherwise or not at all, a sentence each.
     pub notes: Vec<String>,
+    /// The distance of the object that it is made for, mm from the first vertex.
+    object_distance_mm: f64,
+    /// What of the light on its axis it lets through, found once.
+    transmittance: OnceLock<Option<Layer>>,
 }
 
+/// The wavelengths at which the transmittance of a lens is tabulated, nm: where sensors see, in steps between which that of usual coatings
+/// is straight to 1e-4.
+const TRANSMITTANCE_NM: (f64, f64, f64) = (360.0, 830.0, 10.0);
+
 impl ResolvedLens {
+    /// Returns a sensor whose colors are calibrated with this lens, as those of a camera and its lens are: what is white before the lens
+    /// is white in its pictures. One that states another calibration keeps it.
+    pub(super) fn calibrated(&self, sensor: Sensor) -> Sensor {
+        match sensor.calibrated_behind {
+            Some(_) => sensor,
+            None => Sensor { calibrated_behind: self.transmittance().cloned(), ..sensor },
+        }
+    }
+
+    /// Returns what of the light on the axis gets through, at the wavelengths at which the lens is known; `None` where it loses none, or
+    /// no light comes along the axis.
+    fn transmittance(&self) -> Option<&Layer> {
+        let tabulate = || {
+            if self.lens.is_lossless() {
+                return None;
+            }
+            let (first_nm, last_nm, step_nm) = TRANSMITTANCE_NM;
+            let wavelengths_nm = (0..=((last_nm - first_nm) / step_nm) as usize).map(|i| first_nm + step_nm * i as f64);
+            let known = wavelengths_nm.filter_map(|nm| {
+                let lens = self.lens.at(nm).ok()?;
+                Some((nm, lens.axial_transmission(self.object_distance_mm)?))
+            });
+            let (wavelengths_nm, shares): (Vec<f64>, Vec<f64>) = known.unzip();
+            let are_all = |known: f64| shares.iter().all(|share| *share == known);
+            if are_all(1.0) || are_all(0.0) {
+                return None;
+            }
+            let transmittance = Spectrum::new(wavelengths_nm, shares).ok()?;
+            Some(Layer { name: self.lens.name().to_owned(), transmittance })
+        };
+        self.transmittance.get_or_init(tabulate).as_ref()
+    }
+
     /// What is to be known of it at these wavelengths, a sentence each: its [`notes`](Self::notes), and which glasses are continued beyond
     /// the range in which they are known.
     pub fn notes_at(&self, wavelengths_nm: &[f64]) -> Vec<String> {
@@ -36,9 +80,10 @@ pub(super) fn resolve(inputs: &LensInputs) -> Result<ResolvedLens, PipelineError
     let lens = inputs.movements.apply(lens)?;
     let reference = lens.at(REFERENCE_WAVELENGTH_NM)?;
     // What limits the light is that of the lens's own object.
-    let note_on_limit = reference.note_on_limit(file.object_distance_mm.unwrap_or(f64::INFINITY));
+    let object_distance_mm = file.object_distance_mm.unwrap_or(f64::INFINITY);
+    let note_on_limit = reference.note_on_limit(object_distance_mm);
     let notes = file.notes.into_iter().chain(note_on_stop).chain(note_on_iris).chain(note_on_limit).collect();
-    Ok(ResolvedLens { lens, reference, notes })
+    Ok(ResolvedLens { lens, reference, notes, object_distance_mm, transmittance: OnceLock::new() })
 }
 
 /// Checks that every medium of the lens is known at bands that are known before the scene is.

@@ -169,7 +169,7 @@ impl KeptCamera {
                 ..frame
             };
         }
-        let sensor = electrons::on_film(&inputs.frames.electrons.sensor, &frame);
+        let sensor = lens.calibrated(electrons::on_film(&inputs.frames.electrons.sensor, &frame));
         let exposed = sensor.behind(&inputs.frames.electrons.filters);
         let exit_pupil = electrons::exit_pupil(&sensor, &frame, &lens);
         let still = Arc::new(exposed.filter_rates(&Illumination::on_pixels(&*irradiance))?);

@@ -45,8 +45,8 @@ pub struct SpectralHead<'a> {
     pub view: Option<View>,
     /// The light on the scene, written as an attribute.
     pub light: Option<&'a SceneLight>,
-    /// The light on the scene, in words of whoever reads it.
-    pub light_words: Option<&'a str>,
+    /// Attributes of text, by name, in words of whoever reads them.
+    pub texts: &'a [(&'a str, &'a str)],
     /// The largest sample of all bands, which half floats are fitted to.
     pub largest: f32,
     /// How samples are stored.
@@ -93,18 +93,15 @@ impl SpectralHead<'_> {
     }
 }
 
-/// The attribute of the light on the scene.
-const LIGHT: &str = "illuminant";
-
-/// Returns the light on the scene that the header of an EXR file states, in the words of [`SpectralHead::light`].
+/// Returns an attribute of text that the header of an EXR file states, as of [`SpectralHead::texts`].
 ///
 /// # Errors
 /// When the file cannot be read.
-pub fn read_exr_light(path: &Path) -> Result<Option<String>, SceneError> {
+pub fn read_exr_text(path: &Path, name: &str) -> Result<Option<String>, SceneError> {
     let meta = MetaData::read_from_file(path, false).map_err(|error| unreadable(path, error.to_string()))?;
-    let stated = meta.headers.iter().find_map(|header| header.own_attributes.other.get(&Text::from(LIGHT)));
+    let stated = meta.headers.iter().find_map(|header| header.own_attributes.other.get(&Text::from(name)));
     Ok(match stated {
-        Some(AttributeValue::Text(light)) => Some(light.to_string()),
+        Some(AttributeValue::Text(text)) => Some(text.to_string()),
         _ => None,
     })
 }
@@ -151,8 +148,8 @@ impl Channels {
         let channels = self.by_name.iter().map(channel).collect();
         let mut attributes = LayerAttributes::default();
         exr_attributes::add_to(&mut attributes, stored.unit.text.as_deref(), head.pitch_um, head.view, head.light);
-        if let Some(light) = head.light_words {
-            attributes.other.insert(Text::from(LIGHT), AttributeValue::Text(Text::from(light)));
+        for (name, text) in head.texts {
+            attributes.other.insert(Text::from(*name), AttributeValue::Text(Text::from(*text)));
         }
         let (rows, columns) = head.size;
         let header = Header::new(Text::from("bands"), Vec2(columns, rows), channels)

@@ -190,7 +190,7 @@ fn head(image: &SpectralImage, samples: ExrSamples) -> SpectralHead<'_> {
         depth: None,
         view: None,
         light: None,
-        light_words: None,
+        texts: &[],
         largest,
         samples,
         at_once_bytes: 1 << 20,

@@ -64,7 +64,7 @@ fn write_single_layer(path: &Path, image: &SpectralImage, parts: &ExrParts<'_>) 
         depth: parts.depth,
         view: parts.view,
         light: parts.light,
-        light_words: None,
+        texts: &[],
         largest: largest(image.planes()),
         samples: parts.samples,
         at_once_bytes: AT_ONCE_BYTES,

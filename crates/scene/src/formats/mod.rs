@@ -78,7 +78,7 @@ pub(crate) use unusable::{check_made, unwritable};
 pub use belonging::may_be_read_with;
 pub use envi::envi_bytes;
 pub use exr_samples::ExrSamples;
-pub use exr_stream::{SpectralHead, is_irradiance_exr, read_exr_light};
+pub use exr_stream::{SpectralHead, is_irradiance_exr, read_exr_text};
 pub use exr_write::{ExrParts, write_planes_exr, write_scene_exr, write_spectral_exr};
 pub use flat_size::flat_size_of;
 pub use mat::{

@@ -5,7 +5,7 @@ use dioptric_spectrum::{Illuminant, Observer, Spectrum, Xyz, adapt_bradford, col
 use crate::{
     ColorMatrix, Raw, Sensor, SensorError, Tile,
     least_squares::Normal,
-    white_light::{fine_grid, white_response},
+    white_light::{color_weights, fine_grid, white_response},
 };
 
 /// The filters that DNG knows, in the order of their numbers (TIFF/EP, `CFAPattern`); W is clear.
@@ -75,7 +75,7 @@ pub(crate) fn camera_from_xyz(sensor: &Sensor, light: &Illuminant) -> Vec<[f64; 
     }
     let grid = fine_grid();
     let lit = light.spectrum().sample_held(&grid);
-    let weights = sensor.electron_weights(&grid);
+    let weights = color_weights(sensor, &grid);
     let white_y = Observer::Cie1931.xyz(&grid, &lit).0[1];
     let mut normals: Vec<Normal> = weights.iter().map(|_| Normal::new(3)).collect();
     for (reflectance, weight) in chart.iter().map(|s| (Some(s), 1.0)).chain([(None, WHITE_WEIGHT)]) {
