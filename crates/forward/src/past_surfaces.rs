@@ -2,7 +2,7 @@
 
 use crate::{
     ray::Ray,
-    sight::{Before, Met, Sight},
+    sight::{Before, Met, Sight, widest_px},
 };
 
 /// A point, as the surfaces before it hide it.
@@ -40,8 +40,10 @@ impl OpenPupil {
         let pixel = sight.pixel_at(point.place_px);
         let radius_px = sight.radius_px_of(point.dioptres, pixel);
         let parallax_px = met.iter().filter(|met| met.layer < point.layer).map(|met| (met.radius_px - radius_px).abs());
-        let widest_px = parallax_px.fold(radius_px.abs(), f32::max);
-        let side = 2 * (2.0 * widest_px).clamp(SQUARES.0, SQUARES.1).ceil() as usize;
+        let reach_px = parallax_px.fold(radius_px.abs(), f32::max);
+        let side = 2 * (2.0 * reach_px).clamp(SQUARES.0, SQUARES.1).ceil() as usize;
+        let farthest_px = widest_px(met);
+        let before_px = point.before.as_ref().map_or(0.0, |before| sight.radius_px_of(before.dioptres, pixel));
         let place = |number: usize, within: f32| (number as f32 + 0.5 + within) * (2.0 / side as f32) - 1.0;
         let (mut seen, mut all) = (Vec::with_capacity(side * side), Vec::with_capacity(side * side));
         for square in 0..side * side {
@@ -57,7 +59,7 @@ impl OpenPupil {
                 point.place_px.0 + within[2] * point.width_px - radius_px * through.0,
                 point.place_px.1 + within[3] * point.width_px - radius_px * through.1,
             );
-            let is_open = !Self::is_hidden(sight, (point, met), pixel, (from, through));
+            let is_open = !Self::is_hidden(Ray::new(sight, from, through, farthest_px), (point, met), before_px);
             seen.push(if is_open { weight } else { 0.0 });
             all.push(weight);
         }
@@ -67,20 +69,13 @@ impl OpenPupil {
         Self { side, parts: seen.iter().zip(&all).map(|(seen, all)| seen / all).collect(), radius_px }
     }
 
-    /// Whether a ray from a film point, through a point in the layer of a blur radius of 1 pixel, ends before it comes to a point.
-    fn is_hidden(
-        sight: &Sight,
-        (point, met): (&HiddenPoint, &[Met]),
-        pixel: (i64, i64),
-        (from, through): ((f32, f32), (f32, f32)),
-    ) -> bool {
-        let by_own = point.before.as_ref().is_some_and(|before| {
-            // Whether the surface that it lies behind is also where the ray passes its depth.
-            let radius_px = sight.radius_px_of(before.dioptres, pixel);
-            let surfaces = sight.coordinates_at((from.0 + radius_px * through.0, from.1 + radius_px * through.1));
-            surfaces.iter().any(|surface| (surface - before.coordinate).abs() <= 0.5)
-        });
-        by_own || !Ray::new(sight, from, through).arrives(point.layer, met)
+    /// Whether a ray through the pupil ends before it comes to a point past the layers that it may meet; `before_px` is the blur radius of the surface before that.
+    fn is_hidden(ray: Ray<'_>, (point, met): (&HiddenPoint, &[Met]), before_px: f32) -> bool {
+        // The surface that it lies behind may also be where the ray passes its depth.
+        let is_own = |before: &Before| {
+            ray.surfaces_at(before_px).iter().any(|surface| (surface - before.coordinate).abs() <= 0.5)
+        };
+        point.before.as_ref().is_some_and(is_own) || !ray.arrives(point.layer, met)
     }
 
     /// Returns the part of the light so many pixels below and to the right of the point that is seen.

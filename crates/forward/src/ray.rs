@@ -5,9 +5,9 @@ use crate::sight::{Met, Sight};
 /// A ray from a film point on its way from the nearest layer to the farthest.
 pub(crate) struct Ray<'a> {
     sight: &'a Sight,
-    from: (f32, f32),
-    /// Through the point so many pixels beside it in the layer of a blur radius of 1 pixel.
-    beside: (f32, f32),
+    /// The position among the samples of the scene where the blur radius is 0, and how far it goes from there in a pixel of blur radius.
+    position: [f32; 2],
+    per_px: [f32; 2],
     /// The layer passed last.
     last: Met,
     /// Among the first surface and what lies behind it.
@@ -15,23 +15,29 @@ pub(crate) struct Ray<'a> {
 }
 
 impl<'a> Ray<'a> {
-    pub(crate) fn new(sight: &'a Sight, from: (f32, f32), beside: (f32, f32)) -> Self {
+    /// Returns that through the point so many pixels beside the film point in the layer of a blur radius of 1 pixel. Between the film point and the widest of the layers
+    /// that it may meet the map of the film is taken for linear.
+    pub(crate) fn new(sight: &'a Sight, from: (f32, f32), beside: (f32, f32), widest_px: f32) -> Self {
+        let to = (from.0 + widest_px * beside.0, from.1 + widest_px * beside.1);
+        let (position, end) = (sight.position_at(from), sight.position_at(to));
+        let per_px = [0, 1].map(|axis| if widest_px == 0.0 { 0.0 } else { (end[axis] - position[axis]) / widest_px });
         let last = Met { layer: 0, radius_px: 0.0, is_of_first: false };
-        Self { sight, from, beside, last, paths: <[Path; 2]>::default() }
+        Self { sight, position, per_px, last, paths: <[Path; 2]>::default() }
     }
 
     /// Passes the next of the layers that are met; returns the coordinates of the surfaces there.
     #[inline]
     pub(crate) fn pass(&mut self, met: Met) -> [f32; 2] {
-        let surfaces = self.sight.coordinates_at(self.place_at(met.radius_px));
-        let (last, sight, from, beside) = (self.last, self.sight, self.from, self.beside);
-        for (of, (path, surface)) in self.paths.iter_mut().zip(surfaces).enumerate() {
+        let surfaces = self.surfaces_at(met.radius_px);
+        let mut paths = std::mem::take(&mut self.paths);
+        for (of, (path, surface)) in paths.iter_mut().zip(surfaces).enumerate() {
             // Between two layers the blur radius goes as the coordinate does.
             path.pass(met.layer, surface, |at| {
-                let radius_px = last.radius_px + (at - last.layer as f32) * (met.radius_px - last.radius_px);
-                sight.coordinates_at((from.0 + radius_px * beside.0, from.1 + radius_px * beside.1))[of]
+                let part = at - self.last.layer as f32;
+                self.surfaces_at(self.last.radius_px + part * (met.radius_px - self.last.radius_px))[of]
             });
         }
+        self.paths = paths;
         self.last = met;
         surfaces
     }
@@ -57,8 +63,10 @@ impl<'a> Ray<'a> {
         self.paths.iter().all(|path| layer < path.ends)
     }
 
-    fn place_at(&self, radius_px: f32) -> (f32, f32) {
-        (self.from.0 + radius_px * self.beside.0, self.from.1 + radius_px * self.beside.1)
+    /// Returns the coordinates of the surfaces where it passes a blur radius.
+    #[inline]
+    pub(crate) fn surfaces_at(&self, radius_px: f32) -> [f32; 2] {
+        self.sight.surfaces_at([0, 1].map(|axis| self.position[axis] + radius_px * self.per_px[axis]))
     }
 }
 

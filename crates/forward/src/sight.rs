@@ -8,7 +8,7 @@ use glam::DVec2;
 use rayon::prelude::*;
 
 use crate::{
-    Film,
+    Border, Film,
     blocks::BLOCK,
     layers::DEPTH_EDGE_PX,
     places::{SceneRaster, folded},
@@ -63,6 +63,11 @@ pub(crate) struct Met {
     pub(crate) is_of_first: bool,
 }
 
+/// Returns the blur radius of the widest of some layers, with its sign, pixels.
+pub(crate) fn widest_px(met: &[Met]) -> f32 {
+    met.iter().map(|met| met.radius_px).fold(0.0, |widest, px| if px.abs() > f32::abs(widest) { px } else { widest })
+}
+
 /// A surface before a point: its depth, and its layer coordinate.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Before {
@@ -104,7 +109,7 @@ impl Sight {
         let of_row = |row: usize| {
             cancel.check()?;
             let place = |column: usize| this.place_px((at.first_row + row as i64, at.first_column + column as i64));
-            Ok((0..at.columns).map(|column| this.coordinates_at(place(column))).collect())
+            Ok((0..at.columns).map(|column| this.surfaces_at(this.position_at(place(column)))).collect())
         };
         let seen = (0..at.rows).into_par_iter().map(of_row).collect::<Result<Vec<Vec<[f32; 2]>>, Cancelled>>()?;
         this.met = this.find_met(&seen);
@@ -145,22 +150,26 @@ impl Sight {
         self.near_edges[row as usize * self.at.columns + column as usize]
     }
 
-    /// Returns the layer coordinates of the first surface at a place, pixels from the film's middle, and of what lies behind it, NaN for nothing; beyond what is known, those at the
-    /// border.
+    /// Returns the row and column among the samples of the scene that a place looks at, pixels from the film's middle; NaN where nothing is seen.
     #[inline]
-    pub(crate) fn coordinates_at(&self, place_px: (f32, f32)) -> [f32; 2] {
-        let Some(sample) = self.sample_at(place_px) else { return [f32::NAN; 2] };
-        let second = self.scene.occluded.layer_coordinates().map_or(f32::NAN, |second| second.samples()[sample]);
-        [self.scene.coordinates.samples()[sample], second]
+    pub(crate) fn position_at(&self, (down, across): (f32, f32)) -> [f32; 2] {
+        self.looks.at((down - self.middle.0, across - self.middle.1))
     }
 
-    /// Returns the sample of the scene that is seen at a place, if any is.
+    /// Returns the layer coordinates of the first surface at a row and column of the scene, and of what lies behind it; NaN for nothing.
     #[inline]
-    fn sample_at(&self, (down, across): (f32, f32)) -> Option<usize> {
-        let [row, column] = self.looks.at((down - self.middle.0, across - self.middle.1));
-        let nearest = |position: f32, n: usize| (folded(f64::from(position), n, self.raster.border) + 0.5) as usize;
-        let is_seen = row.is_finite() && column.is_finite();
-        is_seen.then(|| nearest(row, self.raster.rows) * self.raster.columns + nearest(column, self.raster.columns))
+    pub(crate) fn surfaces_at(&self, [row, column]: [f32; 2]) -> [f32; 2] {
+        let SceneRaster { rows, columns, border, .. } = self.raster;
+        if !(row.is_finite() && column.is_finite()) {
+            return [f32::NAN; 2];
+        }
+        let nearest = |position: f32, n: usize| match border {
+            Border::Mirror => (folded(f64::from(position), n, border) + 0.5) as usize,
+            _ => ((position + 0.5).max(0.0) as usize).min(n - 1),
+        };
+        let sample = nearest(row, rows) * columns + nearest(column, columns);
+        let second = self.scene.occluded.layer_coordinates().map_or(f32::NAN, |second| second.samples()[sample]);
+        [self.scene.coordinates.samples()[sample], second]
     }
 
     /// Returns the layers that the rays of some pixels may meet, nearest first, with the blur radii in their middle.
@@ -258,12 +267,12 @@ impl Looks {
         }
     }
 
-    /// Returns the position among the samples that a place looks at, pixels from that of number 0; of the nearest beyond what is known.
+    /// Returns the position among the samples that a place looks at, pixels from that of number 0; beyond the blocks as in the last of them.
     #[inline]
     fn at(&self, (row, column): (f32, f32)) -> [f32; 2] {
         let split = |px: f32, first: i64, n: usize| {
-            let place = (px * (1.0 / BLOCK as f32) - first as f32).clamp(0.0, n as f32);
-            let below = (place as usize).min(n - 1);
+            let place = px * (1.0 / BLOCK as f32) - first as f32;
+            let below = (place.max(0.0) as usize).min(n - 1);
             (below, place - below as f32)
         };
         let (above, down) = split(row, self.first.0, self.blocks.0);

@@ -13,7 +13,7 @@ use crate::{
     node_kernels::{LayerKernels, NodeKernel},
     ray::Ray,
     rectangle::Rectangle,
-    sight::{Met, NearEdges, Sight},
+    sight::{Met, NearEdges, Sight, widest_px},
     tile::film_pixels,
     tiling::LayerTiles,
 };
@@ -225,9 +225,10 @@ impl Bundle {
     fn seen_from(&self, sight: &Sight, place: (f32, f32), met: &[Met], sums: &mut [[f32; 3]]) {
         sums.fill([0.0; 3]);
         let total: f32 = self.rays.iter().map(|(_, weight)| weight).sum();
+        let widest_px = widest_px(met);
         for ([down, across], weight) in &self.rays {
             let weight = weight / total;
-            let mut ray = Ray::new(sight, place, (*down, *across));
+            let mut ray = Ray::new(sight, place, (*down, *across), widest_px);
             for (met, sums) in met.iter().zip(sums.iter_mut()) {
                 let [first, second] = ray.pass(*met);
                 let share = weight * (tent(first, met.layer as f32) + tent(second, met.layer as f32));
