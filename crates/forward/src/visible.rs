@@ -194,12 +194,15 @@ impl BlockParts {
         let edges = edges
             .filter(|edges| edges.most_px > 0.0)
             .reduce(|a, b| NearEdges { least_px: a.least_px.min(b.least_px), most_px: a.most_px.max(b.most_px) })?;
-        if edges.most_px <= TELLS_APART_PX.0 {
-            return None;
-        }
         let least_px = edges.least_px;
         let step = (1_usize << ((least_px / POINTS_OF_RADIUS).max(1.0).log2() as usize)).min(BLOCK as usize);
         let met = sight.met_by(at);
+        // Of what is in focus, edge or layer, and of what nothing lies before, rays tell nothing.
+        let first = met.first()?.layer;
+        let is_told = |met: &Met| met.layer > first + 1 && told(met.radius_px) > 0.0;
+        if told(edges.most_px) <= 0.0 || !met.iter().any(is_told) {
+            return Some(Self { step: 1, by_layer: vec![] });
+        }
         let bundle = bundle(&met)?;
         let points = BLOCK as usize / step + 1;
         let mut by_layer: Vec<(u16, Vec<u16>)> =
