@@ -47,18 +47,19 @@ fn table(comparison: &MethodComparison) -> Result<String, std::fmt::Error> {
     for row in &comparison.rows {
         let band = row.edge_band.map_or_else(|| "–".to_owned(), |share| format!("{:.2}", 100.0 * share));
         let known = |share: f64| if share.is_nan() { "–".to_owned() } else { format!("{:.2}", 100.0 * share) };
+        let told = |change: f64| if change.is_nan() { "–".to_owned() } else { format!("{change:+.3}") };
         writeln!(
             text,
-            "{:>8.1}  {:>+6.2} ± {:<5}  {:>12.2}  {band:>12}  {:>8}  {:>+9.3}  {:>+8.3}  {:>+9.3}  {:>+9.3}",
+            "{:>8.1}  {:>+6.2} ± {:<5}  {:>12.2}  {band:>12}  {:>8}  {:>9}  {:>8}  {:>9}  {:>9}",
             row.wavelength_nm,
             100.0 * row.total,
             known(row.total_error),
             100.0 * row.off_edges,
             known(row.noise),
-            row.fit.right_px,
-            row.fit.down_px,
-            100.0 * row.fit.magnification,
-            row.fit.blur_px2
+            told(row.fit.right_px),
+            told(row.fit.down_px),
+            told(100.0 * row.fit.magnification),
+            told(row.fit.blur_px2)
         )?;
     }
     Ok(text)

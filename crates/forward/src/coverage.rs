@@ -49,11 +49,6 @@ impl Composite {
         if usize::from(open.layer) + 1 >= layer { open.before } else { open.part }
     }
 
-    /// Returns the part of a pixel's pupil that is open behind the layers so far.
-    pub(crate) fn open(&self, at: (usize, usize)) -> f32 {
-        self.pixels[at].part
-    }
-
     /// Lays pixels of a layer, counted from those of a film, behind the layers before.
     pub(crate) fn under(&mut self, film: &Rectangle, layer: usize, gathered: &Gathered) {
         let (Rectangle { columns, .. }, layer) = (gathered.at, layer as u16);

@@ -25,24 +25,20 @@ use crate::{
     rectangle::Rectangle,
     sampler::Sampler,
     scene_layers::SceneLayers,
-    sight::Sight,
+    sight::{Before, Sight},
     stopwatch::{Part, Stopwatch},
     surface::{LayerCoordinates, Surface},
     surroundings::{Surroundings, beside},
     tile::{TileGroup, film_pixels},
     tiling::{LayeredLens, Rule, Tiling, reach_px},
-    visible::{Before, Visible},
+    visible::Visible,
     work::Work,
 };
 
-/// Kernels that are kept when nothing else is asked for, bytes.
-pub(crate) const KEPT_BUDGET_BYTES: usize = 256 << 20;
+/// What kernels that are kept take, and bands in flight, when nothing else is asked for, bytes.
+pub(crate) const USUAL_BYTES: usize = 256 << 20;
 
-/// What bands in flight take when nothing else is asked for, bytes.
-const IN_FLIGHT_BYTES: usize = 256 << 20;
-
-/// Units of work of a kernel, and of a group of tiles in one band, about in proportion to their time.
-const KERNEL_UNITS: u64 = 1;
+/// Work on a group of tiles in one band over that of a kernel, about in proportion to their time.
 const GROUP_UNITS: u64 = 8;
 
 /// Lateral color and distortion move the edge of what is seen by less than this, over the reach of the film.
@@ -112,7 +108,7 @@ impl Imaging {
         let looked_up = few_of(&scene.kernel_bands).map(|band| (band, grid.centers_nm()[band]));
         let halos =
             Halos::of((lens, layers), (film, settings.widest_blur_px), &looked_up.collect::<Vec<_>>(), grid.len());
-        let mut kept = Kept { budget_bytes: KEPT_BUDGET_BYTES, ..Kept::default() };
+        let mut kept = Kept { budget_bytes: USUAL_BYTES, ..Kept::default() };
         kept.keep(middle, &kernels);
         Ok(Self {
             scene,
@@ -196,14 +192,14 @@ impl Imaging {
     pub(crate) fn stream_units(&self, first: usize) -> u64 {
         let n_bands = self.spec.grid.len().saturating_sub(first) as u64;
         let n_kernels = self.tiling.n_nodes() as u64 * self.scene.kernel_bands.len() as u64;
-        self.tiling.n_groups() as u64 * n_bands * GROUP_UNITS + n_kernels * KERNEL_UNITS
+        self.tiling.n_groups() as u64 * n_bands * GROUP_UNITS + n_kernels
     }
 
     /// How many bands are worked on at once: more than there are threads, so that none waits, where pictures are small.
     pub(crate) fn bands_at_once(&self) -> usize {
         let threads = rayon::current_num_threads();
         match self.in_flight_bytes {
-            None => (IN_FLIGHT_BYTES / self.band_bytes().max(1)).clamp(threads.min(4), 4 * threads),
+            None => (USUAL_BYTES / self.band_bytes().max(1)).clamp(threads.min(4), 4 * threads),
             Some(limit) => (limit / self.band_bytes().max(1)).clamp(1, 4 * threads),
         }
     }
@@ -270,9 +266,9 @@ impl Imaging {
             .occluded
             .layer_coordinates()
             .map(|behind| self.lamps_of(&lamps_behind, (behind, false), film_map));
-        let points: Vec<Point> = lamps.into_iter().chain(lamps_behind.unwrap_or_default()).collect();
-        let beside = self.points.iter().zip(light.points);
-        let beside: Vec<Point> = beside.filter_map(|(point, light)| point.as_ref()?.lit(*light, film_map)).collect();
+        let lamps: Vec<Point> = lamps.into_iter().chain(lamps_behind.unwrap_or_default()).collect();
+        let points = self.points.iter().zip(light.points);
+        let points: Vec<Point> = points.filter_map(|(point, light)| point.as_ref()?.lit(*light, film_map)).collect();
         let front = front.as_standard_layout();
         let occluded = occluded.as_ref().map(|samples| samples.as_standard_layout());
         let surface = |radiance, coordinates| Surface { radiance, coordinates };
@@ -284,16 +280,6 @@ impl Imaging {
         let sampler = Sampler { scene: self.raster, map: &map, blocks: &self.blocks, surfaces: &surfaces, with_alpha };
         let Film { rows, columns, .. } = self.spec.film;
         let mut picture = Composite::new((rows, columns), self.scene.hides);
-        let drawing = Drawing {
-            lens,
-            film: &self.spec.film,
-            wavelength_nm: self.spec.grid.centers_nm()[band],
-            visible: self.visible.as_ref(),
-            hides: self.scene.hides,
-        };
-        // What points bring: those of the scene, and those beside it.
-        let mut brought =
-            [points, beside].map(|points| (vec![0.0; if points.is_empty() { 0 } else { rows * columns }], points));
         for (layer, tiles) in self.tiling.layers.iter().enumerate() {
             let task = GatherTask {
                 film: &self.spec.film,
@@ -303,17 +289,18 @@ impl Imaging {
                 stopwatch: &self.stopwatch,
                 cancel,
             };
-            for (sums, points) in &mut brought {
-                cancel.check()?;
-                let of_layer: Vec<Point> = points.iter().filter(|point| point.layer == layer).copied().collect();
-                drawing.add(&of_layer, &picture, sums);
-            }
             self.lay(&task, &tiles.groups, &mut picture)?;
             work.advance(tiles.groups.len() as u64 * GROUP_UNITS);
         }
-        let [(of_scene, lamps), (beside, points)] = brought;
+        let drawing = Drawing {
+            lens,
+            film: &self.spec.film,
+            wavelength_nm: self.spec.grid.centers_nm()[band],
+            sight: self.visible.as_ref().map(Visible::sight),
+        };
         let mut picture = picture.finish();
-        picture.iter_mut().zip(of_scene).for_each(|(sum, light)| *sum += light);
+        picture.iter_mut().zip(drawing.drawn(&lamps, cancel)?).for_each(|(sum, light)| *sum += light);
+        let beside = drawing.drawn(&points, cancel)?;
         Ok(self.stopwatch.time(Part::Compositing, || {
             // What a pixel sees is spread before it is lit: an even scene stays even.
             let around = Surroundings { film: &self.spec.film, scene: &self.raster, map: &map };

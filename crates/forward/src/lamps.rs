@@ -14,7 +14,7 @@ pub(crate) struct Lamp {
     pub(crate) radiance: f32,
 }
 
-/// How many times as bright as the mean of its surroundings a lamp is: those that fill less than an eighth of them.
+/// How many times as bright as the mean of its surroundings a lamp is: those that fill less than an eighth of them. Up to twice that it is one in part, so that nothing jumps.
 const TIMES_AS_BRIGHT: f64 = 8.0;
 /// Side of the squares by which surroundings are judged, samples: they are a square and those beside it.
 const SQUARE: usize = 8;
@@ -68,14 +68,15 @@ pub(crate) fn without_lamps<'a>(
         squares.map(sums).fold(Sums::default(), |all, sums| all.with(&sums))
     };
 
-    // The squares with any, and what they have.
-    let mut found: BTreeMap<usize, Vec<(usize, usize)>> = BTreeMap::new();
+    // The squares with any, what they have, and how much of that is a lamp.
+    let mut found: BTreeMap<usize, Vec<((usize, usize), f64)>> = BTreeMap::new();
     for (square, sums) in squares.iter().enumerate() {
         let (row, column) = (square / across, square % across);
         let least = TIMES_AS_BRIGHT * around(row, column, &|square| squares[square]).mean();
         if f64::from(sums.most) > least && least > 0.0 {
-            let lamps = samples_of(row, column).filter(|&at| f64::from(plane[at]) > least && is_there(at.0, at.1));
-            found.insert(square, lamps.collect());
+            let samples = samples_of(row, column).filter(|&(row, column)| is_there(row, column));
+            let parts = samples.map(|at| (at, (f64::from(plane[at]) / least - 1.0).min(1.0)));
+            found.insert(square, parts.filter(|(_, part)| *part > 0.0).collect());
         }
     }
     found.retain(|_, lamps| !lamps.is_empty());
@@ -84,14 +85,21 @@ pub(crate) fn without_lamps<'a>(
     }
     let bright_of = |square: usize| {
         let lamps = found.get(&square).map_or(&[][..], Vec::as_slice);
-        Sums { n: lamps.len() as f64, sum: lamps.iter().map(|&at| f64::from(plane[at])).sum(), most: 0.0 }
+        let add = |sums: Sums, &(at, part): &(_, f64)| {
+            sums.with(&Sums { n: part, sum: part * f64::from(plane[at]), most: 0.0 })
+        };
+        lamps.iter().fold(Sums::default(), add)
     };
     let mut lamps: Vec<Lamp> = vec![];
     for (&square, of_square) in &found {
         let (row, column) = (square / across, square % across);
         let (all, bright) = (around(row, column, &|square| squares[square]), around(row, column, &bright_of));
         let level = Sums { n: all.n - bright.n, sum: all.sum - bright.sum, most: 0.0 }.mean().max(0.0) as f32;
-        lamps.extend(of_square.iter().map(|&at| Lamp { row: at.0, column: at.1, radiance: plane[at] - level }));
+        lamps.extend(of_square.iter().map(|&((row, column), part)| Lamp {
+            row,
+            column,
+            radiance: part as f32 * (plane[(row, column)] - level),
+        }));
     }
     if lamps.len() > MOST_LAMPS {
         lamps.sort_by(|a, b| b.radiance.total_cmp(&a.radiance).then((a.row, a.column).cmp(&(b.row, b.column))));
@@ -122,6 +130,25 @@ mod tests {
         let found: Vec<(usize, usize)> = lamps.iter().map(|lamp| (lamp.row, lamp.column)).collect();
         assert_eq!(found, lit);
         assert!(lamps.iter().all(|lamp| (lamp.radiance - 4998.0).abs() < 1e-2));
+    }
+
+    /// A sample that grows becomes a lamp bit by bit.
+    #[test]
+    fn lamps_begin_without_a_step() {
+        let radiance_of = |value: f32| {
+            let mut plane = Array2::from_elem((40, 40), 2.0);
+            plane[(20, 20)] = value;
+            split(&plane).1.first().map_or(0.0, |lamp| lamp.radiance)
+        };
+        // 8 times the mean of 576 samples is 16.2.
+        assert_eq!(radiance_of(16.0), 0.0);
+        let mut last = 0.0;
+        for value in 0..200 {
+            let radiance = radiance_of(16.0 + 0.1 * value as f32);
+            assert!(radiance - last <= 0.3, "{value}: {last}, {radiance}");
+            last = radiance;
+        }
+        assert!((last - 33.9).abs() < 1e-3, "{last}");
     }
 
     #[test]

@@ -36,6 +36,7 @@ mod places;
 mod plan;
 mod points;
 mod raster;
+mod ray;
 mod rectangle;
 mod render;
 mod sampler;

@@ -1,9 +1,8 @@
 //! What of its kernel a point that shines keeps past the edges of nearer surfaces.
 
 use crate::{
-    rectangle::Rectangle,
-    sight::{Met, Sight},
-    visible::Before,
+    ray::Ray,
+    sight::{Before, Met, Sight, widest_px},
 };
 
 /// A point, as the surfaces before it hide it.
@@ -29,20 +28,22 @@ pub(crate) struct OpenPupil {
     radius_px: f32,
 }
 
-/// Squares along the radius of a pupil: half a pixel of the blur wide, but no fewer and no more than so many.
+/// Squares along the radius of a pupil: half a pixel wide on the film and on the surfaces before the point, but no fewer and no more than so many.
 const SQUARES: (f32, f32) = (8.0, 32.0);
 
 impl OpenPupil {
-    /// Draws rays from a point through all of a pupil.
+    /// Draws rays from a point through all of a pupil, past the layers that they may meet.
     ///
     /// The ray through w, in radii of the pupil, meets the film at x = s − ρ w and passes layer i at q = s + (`ρ_i` − ρ) w, with ρ the blur radius of the point and s its
     /// place (docs/forward.md 5).
-    pub(crate) fn of(sight: &Sight, point: &HiddenPoint) -> Self {
+    pub(crate) fn of(sight: &Sight, met: &[Met], point: &HiddenPoint) -> Self {
         let pixel = sight.pixel_at(point.place_px);
         let radius_px = sight.radius_px_of(point.dioptres, pixel);
-        let around = Rectangle { first_row: pixel.0, first_column: pixel.1, rows: 1, columns: 1 };
-        let met = sight.met_by(&around.grown(radius_px.abs().ceil() as usize));
-        let side = 2 * (2.0 * radius_px.abs()).clamp(SQUARES.0, SQUARES.1).ceil() as usize;
+        let parallax_px = met.iter().filter(|met| met.layer < point.layer).map(|met| (met.radius_px - radius_px).abs());
+        let reach_px = parallax_px.fold(radius_px.abs(), f32::max);
+        let side = 2 * (2.0 * reach_px).clamp(SQUARES.0, SQUARES.1).ceil() as usize;
+        let farthest_px = widest_px(met);
+        let before_px = point.before.as_ref().map_or(0.0, |before| sight.radius_px_of(before.dioptres, pixel));
         let place = |number: usize, within: f32| (number as f32 + 0.5 + within) * (2.0 / side as f32) - 1.0;
         let (mut seen, mut all) = (Vec::with_capacity(side * side), Vec::with_capacity(side * side));
         for square in 0..side * side {
@@ -58,7 +59,7 @@ impl OpenPupil {
                 point.place_px.0 + within[2] * point.width_px - radius_px * through.0,
                 point.place_px.1 + within[3] * point.width_px - radius_px * through.1,
             );
-            let is_open = !Self::is_hidden(sight, (point, &met), pixel, (from, through));
+            let is_open = !Self::is_hidden(Ray::new(sight, from, through, farthest_px), (point, met), before_px);
             seen.push(if is_open { weight } else { 0.0 });
             all.push(weight);
         }
@@ -68,20 +69,13 @@ impl OpenPupil {
         Self { side, parts: seen.iter().zip(&all).map(|(seen, all)| seen / all).collect(), radius_px }
     }
 
-    /// Whether a ray from a film point, through a point in the layer of a blur radius of 1 pixel, ends before it comes to a point.
-    fn is_hidden(
-        sight: &Sight,
-        (point, met): (&HiddenPoint, &[Met]),
-        pixel: (i64, i64),
-        (from, through): ((f32, f32), (f32, f32)),
-    ) -> bool {
-        let by_own = point.before.as_ref().is_some_and(|before| {
-            // Whether the surface that it lies behind is also where the ray passes its depth.
-            let ratio = sight.radius_px_of(before.dioptres, pixel);
-            let (surface, _) = sight.coordinates_at((from.0 + ratio * through.0, from.1 + ratio * through.1));
-            surface <= before.coordinate + 0.5
-        });
-        by_own || !sight.reaches(point.layer, met, from, through)
+    /// Whether a ray through the pupil ends before it comes to a point past the layers that it may meet; `before_px` is the blur radius of the surface before that.
+    fn is_hidden(ray: Ray<'_>, (point, met): (&HiddenPoint, &[Met]), before_px: f32) -> bool {
+        // The surface that it lies behind may also be where the ray passes its depth.
+        let is_own = |before: &Before| {
+            ray.surfaces_at(before_px).iter().any(|surface| (surface - before.coordinate).abs() <= 0.5)
+        };
+        point.before.as_ref().is_some_and(is_own) || !ray.arrives(point.layer, met)
     }
 
     /// Returns the part of the light so many pixels below and to the right of the point that is seen.

@@ -4,20 +4,20 @@ use std::collections::BTreeMap;
 
 use dioptric_psf::{FilmMap, FilmQuery, Kernel, LensImage};
 use dioptric_scene::{PointBrightness, PointLight, PointPlace};
+use dioptric_spectrum::{Cancel, Cancelled};
 use glam::DVec2;
 use rayon::prelude::*;
 
 use crate::{
     Film, SceneGeometry,
-    coverage::Composite,
     lamps::Lamp,
     past_surfaces::{HiddenPoint, OpenPupil},
     places::SceneRaster,
     raster::{Level, Raster},
     rectangle::Rectangle,
+    sight::{Before, Sight},
     surface::LayerCoordinates,
     tile::film_pixels,
-    visible::{Before, Visible},
 };
 
 /// A point as a band shows it.
@@ -32,8 +32,6 @@ pub(crate) struct Point {
     width_mm: f64,
     /// Radiance times the area of film that sees it, in pixels.
     light: f64,
-    /// Whether it is a part of the first surface.
-    is_of_surface: bool,
     /// The first surface where it lies, if it lies behind that.
     before: Option<Before>,
 }
@@ -101,7 +99,7 @@ impl Beside {
         let light =
             f64::from(brightness) * self.tan2 * map.jacobian_mm(place_mm).determinant().abs() / (pitch_mm * pitch_mm);
         let Self { dioptres, layer, before, .. } = *self;
-        Some(Point { place_mm, dioptres, layer, width_mm: 0.0, light, is_of_surface: false, before })
+        Some(Point { place_mm, dioptres, layer, width_mm: 0.0, light, before })
     }
 }
 
@@ -127,15 +125,7 @@ impl Point {
         let place_mm = map.place_mm(DVec2::new(tan_x, tan_y))?;
         let area_mm2 = map.jacobian_mm(place_mm).determinant().abs() / raster.view.focal_px.powi(2);
         let light = f64::from(lamp.radiance) * area_mm2 / (pitch_mm * pitch_mm);
-        Some(Self {
-            place_mm,
-            dioptres,
-            layer,
-            width_mm: area_mm2.sqrt(),
-            light,
-            is_of_surface: before.is_none(),
-            before,
-        })
+        Some(Self { place_mm, dioptres, layer, width_mm: area_mm2.sqrt(), light, before })
     }
 }
 
@@ -144,15 +134,10 @@ pub(crate) struct Drawing<'a> {
     pub(crate) lens: &'a dyn LensImage,
     pub(crate) film: &'a Film,
     pub(crate) wavelength_nm: f64,
-    pub(crate) visible: Option<&'a Visible>,
-    /// Whether layers hide those behind them.
-    pub(crate) hides: bool,
+    /// What hides points; `None` where nothing does.
+    pub(crate) sight: Option<&'a Sight>,
 }
 
-/// The share of a surface before a point that must be laid to tell how much of the pupil it leaves; of less, it leaves none.
-const LEAST_LAID: f32 = 0.05;
-/// What a surface that spans ten layers leaves open of a pixel before the last of them: less is left by others.
-const OWN_SURFACE: f32 = 0.1;
 /// Points no farther apart than this share a kernel, pixels; of more than so many kernels, twice as far, and so on.
 const APART_PX: f64 = 16.0;
 const MOST_KERNELS: usize = 256;
@@ -165,14 +150,16 @@ const LEAST_CELL_PX: f64 = 0.125;
 const CELLS: f64 = 32.0;
 
 impl Drawing<'_> {
-    /// Adds what points of a layer bring to the pixels of the film, row by row: radiance. `picture` is what lies before the layer.
-    pub(crate) fn add(&self, points: &[Point], picture: &Composite, sums: &mut [f32]) {
+    /// Returns what points bring to the pixels of the film, row by row: radiance; nothing where there are none.
+    pub(crate) fn drawn(&self, points: &[Point], cancel: &Cancel) -> Result<Vec<f32>, Cancelled> {
         let film = film_pixels(self.film);
+        let mut sums = vec![0.0; if points.is_empty() { 0 } else { film.len() }];
         let groups = self.groups(points);
         // Some at once: each may be as large as the film.
         for groups in groups.chunks(AT_ONCE) {
+            cancel.check()?;
             let patches: Vec<(Rectangle, Vec<f32>)> =
-                groups.par_iter().filter_map(|group| self.patch(group, picture, &film)).collect();
+                groups.par_iter().filter_map(|group| self.patch(group, &film)).collect();
             for (at, light) in patches {
                 let lines = sums[at.offset_in(&film)..].chunks_mut(film.columns);
                 for (line, light) in lines.zip(light.chunks_exact(at.columns)) {
@@ -180,6 +167,7 @@ impl Drawing<'_> {
                 }
             }
         }
+        Ok(sums)
     }
 
     fn pitch_mm(&self) -> f64 {
@@ -208,7 +196,7 @@ impl Drawing<'_> {
     }
 
     /// Returns what points that share a kernel bring to the film, and where.
-    fn patch(&self, group: &[&Point], picture: &Composite, film: &Rectangle) -> Option<(Rectangle, Vec<f32>)> {
+    fn patch(&self, group: &[&Point], film: &Rectangle) -> Option<(Rectangle, Vec<f32>)> {
         let n = group.len() as f64;
         let place_mm = group.iter().map(|point| point.place_mm).sum::<DVec2>() / n;
         let dioptres = group.iter().map(|point| point.dioptres).sum::<f64>() / n;
@@ -235,10 +223,11 @@ impl Drawing<'_> {
         for point in group {
             let place = point.place_px(pitch_mm);
             let Some(reached) = whole.reached(place, &pixels).intersection(film) else { continue };
-            let visible =
-                self.visible.filter(|visible| self.hides && reached.pixels().any(|pixel| visible.has_edges(pixel)));
-            let parts = match visible {
-                Some(visible) => {
+            // Where nothing nearer lies in a bundle, it is seen by all of the pupil, or by none from behind a surface.
+            let hidden = self.sight.map(|sight| (sight, sight.met_by(&reached)));
+            let hidden = hidden.filter(|(_, met)| met.first().is_some_and(|met| met.layer + 1 < point.layer));
+            let parts = match hidden {
+                Some((sight, met)) => {
                     let hidden = HiddenPoint {
                         layer: point.layer,
                         dioptres,
@@ -247,16 +236,12 @@ impl Drawing<'_> {
                         width_px: width_px as f32,
                         unclear_px: unclear_px as f32,
                     };
-                    let pupil = OpenPupil::of(visible.sight(), &hidden);
+                    let pupil = OpenPupil::of(sight, &met, &hidden);
                     let seen = Sums::of(&kernel, (cell_px, wide), &|below, beside| pupil.part_at(below, beside));
                     seen.on_pixels(place, &pixels, &reached)
                 }
-                None => {
-                    let mut parts = whole.on_pixels(place, &pixels, &reached);
-                    let open = reached.pixels().map(|pixel| self.open_before(point, pixel, (picture, film)));
-                    parts.iter_mut().zip(open).for_each(|(part, open)| *part *= f64::from(open));
-                    parts
-                }
+                None if point.before.is_some() => continue,
+                None => whole.on_pixels(place, &pixels, &reached),
             };
             let lines = light[reached.offset_in(&at)..].chunks_mut(at.columns);
             for (sums, parts) in lines.zip(parts.chunks_exact(reached.columns)) {
@@ -264,24 +249,6 @@ impl Drawing<'_> {
             }
         }
         Some((at, light))
-    }
-
-    /// Returns the part of a pixel's pupil that nearer surfaces leave to a point, where no edge of them lies.
-    fn open_before(&self, point: &Point, pixel: (i64, i64), (picture, film): (&Composite, &Rectangle)) -> f32 {
-        if !self.hides {
-            return if point.before.is_some() { 0.0 } else { 1.0 };
-        }
-        let at = ((pixel.0 - film.first_row) as usize, (pixel.1 - film.first_column) as usize);
-        match point.before {
-            // Nearer parts of its own surface hide nothing of it.
-            None if point.is_of_surface => (picture.open_well_before(point.layer, at) / OWN_SURFACE).min(1.0),
-            None => picture.open_well_before(point.layer, at),
-            Some(before) => {
-                // Of the surface that it lies behind, a part may be in layers that are not laid yet.
-                let laid = (point.layer as f32 - before.coordinate).clamp(0.0, 1.0);
-                if laid > LEAST_LAID { (1.0 - (1.0 - picture.open(at)) / laid).max(0.0) } else { 0.0 }
-            }
-        }
     }
 }
 

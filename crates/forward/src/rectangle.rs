@@ -18,13 +18,6 @@ impl Rectangle {
         self.rows * self.columns
     }
 
-    /// Row and column of each, row by row.
-    pub(crate) fn pixels(&self) -> impl Iterator<Item = (i64, i64)> {
-        let (end_row, end_column) = self.end();
-        let columns = self.first_column..end_column;
-        (self.first_row..end_row).flat_map(move |row| columns.clone().map(move |column| (row, column)))
-    }
-
     /// Rows and columns of the pixels after the last ones.
     fn end(&self) -> (i64, i64) {
         (self.first_row + self.rows as i64, self.first_column + self.columns as i64)

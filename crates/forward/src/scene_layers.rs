@@ -33,8 +33,6 @@ pub(crate) struct SceneLayers {
     pub(crate) narrow_fraction: f64,
     /// Whether layers hide those behind them.
     pub(crate) hides: bool,
-    /// Samples along a pixel in the middle of the film.
-    pub(crate) samples_per_pixel: f64,
 }
 
 impl SceneLayers {
@@ -62,17 +60,7 @@ impl SceneLayers {
         let hides = settings.mode != BlurMode::Pointwise && layers.len() > 1;
         if !hides {
             let (occluded, mixed) = (OccludedSamples::Nothing, MixedSamples::default());
-            let samples_per_pixel = 1.0;
-            let this = Self {
-                layers,
-                kernel_bands,
-                coordinates,
-                occluded,
-                mixed,
-                narrow_fraction: 0.0,
-                hides,
-                samples_per_pixel,
-            };
+            let this = Self { layers, kernel_bands, coordinates, occluded, mixed, narrow_fraction: 0.0, hides };
             return Ok(Arc::new(this));
         }
         // How fine the scene is in the film's middle.
@@ -83,16 +71,7 @@ impl SceneLayers {
         let occluded = OccludedSamples::find(&distances, &layers, samples_per_pixel, cancel)?;
         let mixed = MixedSamples::find(&distances, &layers, cancel)?;
         let narrow_fraction = narrow.fraction(&distances.front, cancel)?;
-        Ok(Arc::new(Self {
-            layers,
-            kernel_bands,
-            coordinates,
-            occluded,
-            mixed,
-            narrow_fraction,
-            hides,
-            samples_per_pixel,
-        }))
+        Ok(Arc::new(Self { layers, kernel_bands, coordinates, occluded, mixed, narrow_fraction, hides }))
     }
 
     /// Rows and columns of the scene.

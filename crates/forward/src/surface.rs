@@ -1,7 +1,8 @@
 //! The surfaces of a scene, as samples that lie in layers of depth.
 
 use dioptric_spectrum::{Cancel, Cancelled};
-use ndarray::{Array2, Axis, parallel::prelude::*};
+use ndarray::Array2;
+use rayon::prelude::*;
 
 /// One surface of the scene: its layer coordinates, and its radiance in one band.
 #[derive(Clone, Copy)]
@@ -13,20 +14,22 @@ pub(crate) struct Surface<'a> {
 
 /// The layer coordinates of a surface.
 pub(crate) struct LayerCoordinates {
-    /// NaN where the surface has no sample.
-    samples: Array2<f32>,
+    /// Rows and columns.
+    size: (usize, usize),
+    /// Row by row; NaN where the surface has no sample.
+    samples: Vec<f32>,
     /// The layers that have weight in each square between four samples, first and last: most squares lie in few layers, so
     /// most of the work of a layer is to find that it has no part of a square.
-    ranges: Array2<(u16, u16)>,
+    ranges: Vec<(u16, u16)>,
     is_flat: bool,
 }
 
 impl LayerCoordinates {
-    /// Takes samples in standard layout.
+    /// Takes samples row by row.
     pub(crate) fn new(samples: Array2<f32>, cancel: &Cancel) -> Result<Self, Cancelled> {
         let (rows, columns) = samples.dim();
-        let mut ranges = Array2::from_elem((rows, columns), (u16::MAX, 0));
-        ranges.axis_iter_mut(Axis(0)).into_par_iter().enumerate().try_for_each(|(top, mut line)| {
+        let mut ranges = vec![(u16::MAX, 0); rows * columns];
+        ranges.par_chunks_mut(columns).enumerate().try_for_each(|(top, line)| {
             cancel.check()?;
             let bottom = (top + 1).min(rows - 1);
             for (left, (first, last)) in line.iter_mut().enumerate() {
@@ -40,12 +43,12 @@ impl LayerCoordinates {
             Ok(())
         })?;
         let is_flat = samples.iter().all(|coordinate| *coordinate == 0.0);
-        Ok(Self { samples, ranges, is_flat })
+        Ok(Self { size: (rows, columns), samples: samples.into_iter().collect(), ranges, is_flat })
     }
 
     /// Rows and columns.
     pub(crate) fn size(&self) -> (usize, usize) {
-        self.samples.dim()
+        self.size
     }
 
     /// Whether all samples lie in the first layer and no other.
@@ -55,12 +58,12 @@ impl LayerCoordinates {
 
     /// The coordinates row by row.
     pub(crate) fn samples(&self) -> &[f32] {
-        self.samples.as_slice().expect("made in standard layout")
+        &self.samples
     }
 
     /// The first and last layer with weight in each square that begins at a sample, row by row.
     pub(crate) fn ranges(&self) -> &[(u16, u16)] {
-        self.ranges.as_slice().expect("made in standard layout")
+        &self.ranges
     }
 
     /// The bytes of memory that they take.

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use crate::{
     BandRadiance, BlurMode, ForwardError, ImagingSpec, SceneGeometry, SceneRadiance, Sink,
-    imaging::{Imaging, KEPT_BUDGET_BYTES},
+    imaging::{Imaging, USUAL_BYTES},
     scene_layers::SceneLayers,
     work::{Progress, Watch, Work},
 };
@@ -45,7 +45,7 @@ impl Views {
         let of_part = |part: &Arc<dyn LensImage + Send>| {
             let mut imaging = imaging(part.as_ref())?;
             // Together they keep no more than one would.
-            imaging.keep_at_most(KEPT_BUDGET_BYTES / parts.len());
+            imaging.keep_at_most(USUAL_BYTES / parts.len());
             Ok(imaging)
         };
         let imagings = parts.iter().map(of_part).collect::<Result<_, ForwardError>>()?;

@@ -11,8 +11,9 @@ use crate::{
     coverage::Gathered,
     layers::tent,
     node_kernels::{LayerKernels, NodeKernel},
+    ray::Ray,
     rectangle::Rectangle,
-    sight::{Met, NearEdges, Ray, Sight},
+    sight::{Met, NearEdges, Sight, widest_px},
     tile::film_pixels,
     tiling::LayerTiles,
 };
@@ -31,24 +32,8 @@ pub(crate) struct Visible {
 struct BlockParts {
     /// Pixels from point to point.
     step: usize,
-    /// Of layers of which not all is seen everywhere: parts in 255ths, row by row.
-    by_layer: Vec<(u16, Vec<u8>)>,
-    met: Vec<Met>,
-}
-
-/// What is seen of a layer over a block.
-enum Parts<'a> {
-    All,
-    /// The layer has little there, which no ray met.
-    Unknown,
-    At(&'a [u8]),
-}
-
-/// A surface before a point: its depth, and its layer coordinate.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Before {
-    pub(crate) dioptres: f64,
-    pub(crate) coordinate: f32,
+    /// Of layers of which more or less is seen than of all that lies behind what is before them: the ratio over [`ONE`], row by row.
+    by_layer: Vec<(u16, Vec<u16>)>,
 }
 
 /// Blur radii between which rays begin to tell parts of the pupil apart, pixels: what a point in focus becomes is aberrations and pixels.
@@ -57,15 +42,15 @@ const TELLS_APART_PX: (f32, f32) = (1.0, 3.0);
 const ALONG_RADIUS: usize = 5;
 /// Points over the blur radius of a near side.
 const POINTS_OF_RADIUS: f32 = 6.0;
-/// A part of the pupil that counts as all or nothing of it.
-const NEGLIGIBLE_PART: f32 = 1e-3;
+/// What stands for 1 among ratios.
+const ONE: f32 = 1024.0;
 /// Part of the rays that must meet a layer to tell what is seen of it; of less, all rays tell.
 const FEW_RAYS: f32 = 0.02;
 
 impl Visible {
     /// Draws rays, by the kernels of the layers, from the pixels of a film.
     pub(crate) fn through(
-        mut sight: Sight,
+        sight: Sight,
         (tiles, kernels): (&[LayerTiles], &[LayerKernels]),
         film: &Film,
         cancel: &Cancel,
@@ -86,13 +71,12 @@ impl Visible {
         });
         let parts: Vec<Option<((i64, i64), BlockParts)>> = parts.collect::<Result<_, Cancelled>>()?;
         let blocks = parts.into_iter().flatten().collect();
-        sight.forget_second();
         Ok(Self { sight, blocks })
     }
 
     pub(crate) fn size_bytes(&self) -> usize {
-        let parts = self.blocks.values().flat_map(|block| &block.by_layer).map(|(_, parts)| parts.len());
-        self.sight.size_bytes() + parts.sum::<usize>()
+        let ratios = self.blocks.values().flat_map(|block| &block.by_layer).map(|(_, ratios)| ratios.len());
+        self.sight.size_bytes() + size_of::<u16>() * ratios.sum::<usize>()
     }
 
     /// Takes from what pixels gather of a layer what they do not see of it, `open` being the part of their pupils that layers well before it leave.
@@ -108,27 +92,18 @@ impl Visible {
                     column = end;
                     continue;
                 };
-                let parts = block.of_layer(layer);
+                let ratios = block.of_layer(layer);
                 let told_of_layer = told(self.sight.radius_px(layer, pixel));
                 for column in column..end {
                     let (index, pixel) = (row * columns + column, (pixel.0, first_column + column as i64));
-                    if gathered.alpha[index] <= 0.0 {
-                        continue;
-                    }
-                    let open = open(row, column);
                     let most_px = self.sight.near_edges(pixel).most_px;
-                    if open >= 1.0 - NEGLIGIBLE_PART || most_px <= 0.0 {
+                    if gathered.alpha[index] <= 0.0 || most_px <= 0.0 {
                         continue;
                     }
                     // In focus, layer or edge, all of the pupil sees the same.
                     let told = told_of_layer.min(told(most_px)).clamp(0.0, 1.0);
-                    let told = if open <= NEGLIGIBLE_PART { 0.0 } else { told };
-                    let by_rays = match parts {
-                        Parts::All => 1.0,
-                        Parts::Unknown => open,
-                        Parts::At(parts) => block.part(parts, pixel),
-                    };
-                    let part = open + told * (by_rays - open);
+                    let ratio = ratios.map_or(1.0, |ratios| block.ratio(ratios, pixel));
+                    let part = (open(row, column) * (1.0 + told * (ratio - 1.0))).min(1.0);
                     gathered.light[index] *= part;
                     gathered.alpha[index] *= part;
                 }
@@ -140,11 +115,6 @@ impl Visible {
     /// The depth picture as rays meet it.
     pub(crate) fn sight(&self) -> &Sight {
         &self.sight
-    }
-
-    /// Whether edges of depth lie in the bundle of a pixel.
-    pub(crate) fn has_edges(&self, pixel: (i64, i64)) -> bool {
-        self.sight.near_edges(pixel).most_px > 0.0
     }
 }
 
@@ -162,7 +132,7 @@ impl Bundle {
     /// Returns that of the middle of a rectangle of pixels, by the kernel of the widest of the first surface's layers that it meets and that is gathered there.
     fn of(met: &[Met], at: &Rectangle, (tiles, kernels): (&[LayerTiles], &[LayerKernels])) -> Option<Self> {
         let mut firsts: Vec<&Met> = met.iter().filter(|met| met.is_of_first).collect();
-        firsts.sort_by(|a, b| b.ratio.abs().total_cmp(&a.ratio.abs()));
+        firsts.sort_by(|a, b| b.radius_px.abs().total_cmp(&a.radius_px.abs()));
         let middle = (at.first_row + at.rows as i64 / 2, at.first_column + at.columns as i64 / 2);
         // Where nothing of a layer is in reach it has no tile.
         let with_tile = |met: &&Met| tiles[met.layer].at(middle).map(|(tile, level)| (**met, tile, level));
@@ -170,7 +140,7 @@ impl Bundle {
         let corners = tile.corners().map(|node| kernels[widest.layer].at((node, level)));
         let kernel = NodeKernel::sum_of(&corners.each_ref().map(|corner| (corner, 0.25)));
         let step_px = level.step_px() as f32;
-        let side = ((widest.ratio.abs() / step_px) as usize / ALONG_RADIUS).max(1);
+        let side = ((widest.radius_px.abs() / step_px) as usize / ALONG_RADIUS).max(1);
         let Rectangle { first_row, first_column, rows, columns } = kernel.at;
         let n_across = columns.div_ceil(side);
         // Of each square of samples the light, and where it comes from.
@@ -183,7 +153,7 @@ impl Bundle {
             square[2] += light * (first_column + column as i64) as f32;
         }
         // A film point x gathers the sample at x − d.
-        let scale = -step_px / widest.ratio;
+        let scale = -step_px / widest.radius_px;
         let lit = squares.into_iter().enumerate().filter(|(_, [light, ..])| *light > 1e-5);
         let rays = lit.map(|(square, [light, down, across])| {
             // Not in rows and columns, which an edge along them would hide all at once (Roberts's R2 sequence).
@@ -198,26 +168,23 @@ impl Bundle {
 }
 
 impl BlockParts {
-    /// Returns what is seen of a layer.
-    fn of_layer(&self, layer: usize) -> Parts<'_> {
-        match self.by_layer.binary_search_by_key(&(layer as u16), |(layer, _)| *layer) {
-            Ok(found) => Parts::At(&self.by_layer[found].1),
-            Err(_) if self.met.iter().any(|met| met.layer == layer) => Parts::All,
-            Err(_) => Parts::Unknown,
-        }
+    /// Returns the ratios of a layer, if they are not all 1.
+    fn of_layer(&self, layer: usize) -> Option<&[u16]> {
+        let found = self.by_layer.binary_search_by_key(&(layer as u16), |(layer, _)| *layer);
+        found.ok().map(|found| self.by_layer[found].1.as_slice())
     }
 
-    /// Returns the part at a pixel, between points.
-    fn part(&self, parts: &[u8], (row, column): (i64, i64)) -> f32 {
+    /// Returns the ratio at a pixel, between points.
+    fn ratio(&self, ratios: &[u16], (row, column): (i64, i64)) -> f32 {
         let (step, points) = (self.step, BLOCK as usize / self.step + 1);
         let split = |pixel: i64| {
             let within = pixel.rem_euclid(BLOCK) as usize;
             (within / step, (within % step) as f32 / step as f32)
         };
         let ((row, down), (column, across)) = (split(row), split(column));
-        let at = |row: usize, column: usize| f32::from(parts[row * points + column]);
+        let at = |row: usize, column: usize| f32::from(ratios[row * points + column]);
         let along = |row: usize| at(row, column) + across * (at(row, column + 1) - at(row, column));
-        (along(row) + down * (along(row + 1) - along(row))) / 255.0
+        (along(row) + down * (along(row + 1) - along(row))) / ONE
     }
 
     /// Draws the bundles of points over a block that pass edges out of focus; `None` where no bundle passes an edge.
@@ -227,27 +194,32 @@ impl BlockParts {
         let edges = edges
             .filter(|edges| edges.most_px > 0.0)
             .reduce(|a, b| NearEdges { least_px: a.least_px.min(b.least_px), most_px: a.most_px.max(b.most_px) })?;
-        if edges.most_px <= TELLS_APART_PX.0 {
-            return Some(Self { step: 1, by_layer: vec![], met: vec![] });
-        }
         let least_px = edges.least_px;
         let step = (1_usize << ((least_px / POINTS_OF_RADIUS).max(1.0).log2() as usize)).min(BLOCK as usize);
         let met = sight.met_by(at);
+        // Of what is in focus, edge or layer, and of what nothing lies before, rays tell nothing.
+        let first = met.first()?.layer;
+        let is_told = |met: &Met| met.layer > first + 1 && told(met.radius_px) > 0.0;
+        if told(edges.most_px) <= 0.0 || !met.iter().any(is_told) {
+            return Some(Self { step: 1, by_layer: vec![] });
+        }
         let bundle = bundle(&met)?;
         let points = BLOCK as usize / step + 1;
-        let mut by_layer: Vec<(u16, Vec<u8>)> =
+        let mut by_layer: Vec<(u16, Vec<u16>)> =
             met.iter().map(|met| (met.layer as u16, Vec::with_capacity(points * points))).collect();
         let mut sums = vec![[0.0; 3]; met.len()];
         let corner = (at.first_row.div_euclid(BLOCK) * BLOCK, at.first_column.div_euclid(BLOCK) * BLOCK);
         for (row, column) in (0..points).flat_map(|row| (0..points).map(move |column| (row, column))) {
             let pixel = (corner.0 + (row * step) as i64, corner.1 + (column * step) as i64);
             bundle.seen_from(sight, sight.place_px(pixel), &met, &mut sums);
-            for ((_, parts), [seen, all, open]) in by_layer.iter_mut().zip(&sums) {
-                parts.push((255.0 * (seen + FEW_RAYS * open) / (all + FEW_RAYS)).round().min(255.0) as u8);
+            for ((_, ratios), [seen, all, open]) in by_layer.iter_mut().zip(&sums) {
+                // Of what is open the share that sees it, over that of all that would.
+                let of_open = if *open > 0.0 { seen / open } else { 0.0 };
+                ratios.push((ONE * (of_open + FEW_RAYS) / (all + FEW_RAYS)).round() as u16);
             }
         }
-        by_layer.retain(|(_, parts)| parts.iter().any(|part| *part < 255));
-        Some(Self { step, by_layer, met })
+        by_layer.retain(|(_, ratios)| ratios.iter().any(|ratio| f32::from(*ratio) != ONE));
+        Some(Self { step, by_layer })
     }
 }
 
@@ -256,15 +228,15 @@ impl Bundle {
     fn seen_from(&self, sight: &Sight, place: (f32, f32), met: &[Met], sums: &mut [[f32; 3]]) {
         sums.fill([0.0; 3]);
         let total: f32 = self.rays.iter().map(|(_, weight)| weight).sum();
+        let widest_px = widest_px(met);
         for ([down, across], weight) in &self.rays {
             let weight = weight / total;
-            let mut ray = Ray::default();
-            for (&Met { layer, ratio, .. }, sums) in met.iter().zip(sums.iter_mut()) {
-                let (first, second) = sight.coordinates_at((place.0 + ratio * down, place.1 + ratio * across));
-                ray.pass(layer, first);
-                let share = weight * (tent(first, layer as f32) + tent(second, layer as f32));
+            let mut ray = Ray::new(sight, place, (*down, *across), widest_px);
+            for (met, sums) in met.iter().zip(sums.iter_mut()) {
+                let [first, second] = ray.pass(*met);
+                let share = weight * (tent(first, met.layer as f32) + tent(second, met.layer as f32));
                 sums[1] += share;
-                if ray.reaches(layer) {
+                if ray.reaches(met.layer) {
                     sums[0] += share;
                     sums[2] += weight;
                 }

@@ -3,7 +3,8 @@
 use ndarray::Array2;
 use serde::Serialize;
 
-/// Changes that turn one picture into another, each with one standard error from the noise of the pixels.
+/// Changes that turn one picture into another, each with one standard error from the noise of the pixels; NaN where the picture does not tell a change from
+/// those before it: gain, right, down, blur, magnification.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Fit {
     /// Brighter by this share.
@@ -45,7 +46,7 @@ pub(super) fn fit(
             let (by_x, by_y) = (0.5 * (at(0, 1) - at(0, -1)), 0.5 * (at(1, 0) - at(-1, 0)));
             let laplacian = at(0, 1) + at(0, -1) + at(1, 0) + at(-1, 0) - 4.0 * at(0, 0);
             let (x, y) = (column as f64 + 0.5 - 0.5 * columns as f64, row as f64 + 0.5 - 0.5 * rows as f64);
-            let changes = [at(0, 0), -by_x, -by_y, -(x * by_x + y * by_y), 0.5 * laplacian];
+            let changes = [at(0, 0), -by_x, -by_y, 0.5 * laplacian, -(x * by_x + y * by_y)];
             // The noise of a pixel, smoothed so that a weight does not follow the pixel's own value.
             let variance = (-2..=2_isize)
                 .flat_map(|down| (-2..=2_isize).map(move |right| (down, right)))
@@ -62,11 +63,15 @@ pub(super) fn fit(
             }
         }
     }
-    let Some(inverse) = inverted(normal) else { return Fit::default() };
-    let solution: [f64; N] = std::array::from_fn(|i| (0..N).map(|j| inverse[i][j] * right_side[j]).sum());
-    let [gain, right_px, down_px, magnification, blur_px2] = solution;
-    let errors = std::array::from_fn(|i| inverse[i][i].max(0.0).sqrt());
-    Fit { gain, right_px, down_px, magnification, blur_px2, errors }
+    let [gain, right_px, down_px, blur_px2, magnification] = solved(normal, right_side);
+    Fit {
+        gain: gain.0,
+        right_px: right_px.0,
+        down_px: down_px.0,
+        magnification: magnification.0,
+        blur_px2: blur_px2.0,
+        errors: [gain, right_px, down_px, magnification, blur_px2].map(|(_, error)| error),
+    }
 }
 
 /// Returns a picture smoothed by the binomial kernel of five samples, each way.
@@ -82,30 +87,48 @@ fn smoothed(picture: &Array2<f64>) -> Array2<f64> {
     })
 }
 
-/// Returns the inverse of a positive definite matrix by Gauss and Jordan, or `None` where it is singular.
-fn inverted(matrix: [[f64; N]; N]) -> Option<[[f64; N]; N]> {
-    // Scaled to a unit diagonal, so that pivots can be judged.
+/// The least part of a change, in squares, that is not made by those before it: of less, it is not told from them. Along one straight edge a
+/// move down is one to the right, and an enlargement about the middle is a blur.
+const LEAST_OF_ITS_OWN: f64 = 0.1;
+
+/// Returns the solution of normal equations and its standard errors, by Cholesky's factors; both are NaN of what those before it make up.
+fn solved(matrix: [[f64; N]; N], right_side: [f64; N]) -> [(f64, f64); N] {
+    // Scaled to a unit diagonal, so that what is left of each can be judged.
     let scale: [f64; N] = std::array::from_fn(|i| matrix[i][i].sqrt());
-    if scale.iter().any(|s| !(*s > 0.0 && s.is_finite())) {
-        return None;
-    }
-    let mut left: [[f64; N]; N] = std::array::from_fn(|i| std::array::from_fn(|j| matrix[i][j] / scale[i] / scale[j]));
-    let mut right: [[f64; N]; N] = std::array::from_fn(|i| std::array::from_fn(|j| f64::from(u8::from(i == j))));
-    for pivot in 0..N {
-        let by = left[pivot][pivot];
-        if by.abs() < 1e-10 {
-            return None;
-        }
-        (left[pivot], right[pivot]) = (left[pivot].map(|v| v / by), right[pivot].map(|v| v / by));
-        for row in (0..N).filter(|row| *row != pivot) {
-            let factor = left[row][pivot];
-            for column in 0..N {
-                left[row][column] -= factor * left[pivot][column];
-                right[row][column] -= factor * right[pivot][column];
+    let mut factor = [[0.0; N]; N];
+    let mut is_told = [false; N];
+    for i in 0..N {
+        let dot = |j: usize, factor: &[[f64; N]; N]| (0..i).map(|k| factor[j][k] * factor[i][k]).sum::<f64>();
+        let own = 1.0 - dot(i, &factor);
+        is_told[i] = scale[i] > 0.0 && scale[i].is_finite() && own >= LEAST_OF_ITS_OWN;
+        if is_told[i] {
+            factor[i][i] = own.sqrt();
+            for j in i + 1..N {
+                let part = matrix[j][i] / (scale[i] * scale[j]);
+                factor[j][i] = if part.is_finite() { (part - dot(j, &factor)) / factor[i][i] } else { 0.0 };
             }
+        } else {
+            factor[i] = [0.0; N];
         }
     }
-    Some(std::array::from_fn(|i| std::array::from_fn(|j| right[i][j] / scale[i] / scale[j])))
+    let told: Vec<usize> = (0..N).filter(|&i| is_told[i]).collect();
+    let solution_of = |mut values: [f64; N]| {
+        for &i in &told {
+            let sum: f64 = told.iter().filter(|&&k| k < i).map(|&k| factor[i][k] * values[k]).sum();
+            values[i] = (values[i] - sum) / factor[i][i];
+        }
+        for &i in told.iter().rev() {
+            let sum: f64 = told.iter().filter(|&&k| k > i).map(|&k| factor[k][i] * values[k]).sum();
+            values[i] = (values[i] - sum) / factor[i][i];
+        }
+        values
+    };
+    let solution = solution_of(std::array::from_fn(|i| right_side[i] / scale[i]));
+    std::array::from_fn(|i| {
+        let unit = std::array::from_fn(|j| f64::from(u8::from(i == j)));
+        let told = |value: f64| if is_told[i] { value / scale[i] } else { f64::NAN };
+        (told(solution[i]), told(solution_of(unit)[i].max(0.0).sqrt()))
+    })
 }
 
 #[cfg(test)]
@@ -143,10 +166,29 @@ mod tests {
         }
     }
 
+    /// Along one edge through the middle a move and an enlargement are as well another move and a blur.
+    #[test]
+    fn an_edge_tells_what_it_can() {
+        let edge = |shift_px: f64, width_px: f64| {
+            Array2::from_shape_fn((60, 80), |(row, column)| {
+                let beside = column as f64 - 39.5 - 0.1 * (row as f64 - 29.5) - shift_px;
+                (2.0 + (beside / width_px).tanh()) as f32
+            })
+        };
+        let (error, all) = (Array2::from_elem((60, 80), 0.01_f32), Array2::from_elem((60, 80), false));
+        // Wider than what it is smoothed by, so that the change is a small one.
+        let found = fit(&edge(0.1, 3.1), (&edge(0.0, 3.0), &error), &all);
+        // The variance of this edge's slope is π²/12 of its width's square.
+        let blur_px2 = std::f64::consts::PI.powi(2) / 12.0 * (3.1_f64.powi(2) - 9.0);
+        assert!((found.right_px - 0.1).abs() < 0.01 && (found.blur_px2 / blur_px2 - 1.0).abs() < 0.2, "{found:?}");
+        assert!(found.down_px.is_nan() && found.magnification.is_nan() && found.errors[3].is_nan(), "{found:?}");
+    }
+
     #[test]
     fn equal_pictures_need_no_change() {
         let (plain, error) = (waves((0.0, 0.0), 0.0, 0.0, 0.0), Array2::from_elem((60, 80), 0.01_f32));
         let found = fit(&plain, (&plain, &error), &Array2::from_elem((60, 80), false));
-        assert_eq!([found.gain, found.right_px, found.magnification, found.blur_px2], [0.0; 4]);
+        let changes = [found.gain, found.right_px, found.down_px, found.magnification, found.blur_px2];
+        assert_eq!(changes, [0.0; 5]);
     }
 }
