@@ -14,6 +14,9 @@ pub(crate) struct Lamp {
     pub(crate) radiance: f32,
 }
 
+/// The row and the column of a sample, and how much of its light is a lamp, 0–1.
+type LampSample = ((usize, usize), f64);
+
 /// How many times as bright as the mean of its surroundings a lamp is: those that fill less than an eighth of them. Up to twice that it is one in part, so that nothing jumps.
 const TIMES_AS_BRIGHT: f64 = 8.0;
 /// Side of the squares by which surroundings are judged, samples: they are a square and those beside it.
@@ -69,7 +72,7 @@ pub(crate) fn without_lamps<'a>(
     };
 
     // The squares with any, what they have, and how much of that is a lamp.
-    let mut found: BTreeMap<usize, Vec<((usize, usize), f64)>> = BTreeMap::new();
+    let mut found: BTreeMap<usize, Vec<LampSample>> = BTreeMap::new();
     for (square, sums) in squares.iter().enumerate() {
         let (row, column) = (square / across, square % across);
         let least = TIMES_AS_BRIGHT * around(row, column, &|square| squares[square]).mean();
@@ -85,7 +88,7 @@ pub(crate) fn without_lamps<'a>(
     }
     let bright_of = |square: usize| {
         let lamps = found.get(&square).map_or(&[][..], Vec::as_slice);
-        let add = |sums: Sums, &(at, part): &(_, f64)| {
+        let add = |sums: Sums, &(at, part): &LampSample| {
             sums.with(&Sums { n: part, sum: part * f64::from(plane[at]), most: 0.0 })
         };
         lamps.iter().fold(Sums::default(), add)

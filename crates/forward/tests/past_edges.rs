@@ -1,5 +1,9 @@
 //! What is seen past the edges of near surfaces, held to pictures integrated over the pupil.
-#![expect(clippy::unwrap_used, reason = "a helper of tests fails by panicking")]
+#![expect(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    reason = "a helper of tests fails by panicking and shows its numbers"
+)]
 
 use dioptric_forward::{BlurMode, DiscLens, Film, OccludedLayer, Settings, Source, render};
 use dioptric_scene::View;
@@ -255,9 +259,12 @@ fn drawn(n: usize) -> impl FnMut() -> f64 {
     }
 }
 
-fn planes(fine: f64, planes: &[(f64, &dyn Fn(usize, usize) -> Option<f64>)]) -> Planes {
+/// A blur radius with its sign, pixels, and the radiance of each sample that is there.
+type OfPlane<'a> = (f64, &'a dyn Fn(usize, usize) -> Option<f64>);
+
+fn planes(fine: f64, planes: &[OfPlane<'_>]) -> Planes {
     let n = (1.3 * SIDE as f64 * fine) as usize;
-    let plane = |&(blur_px, of): &(f64, &dyn Fn(usize, usize) -> Option<f64>)| Plane {
+    let plane = |&(blur_px, of): &OfPlane<'_>| Plane {
         blur_px,
         is_there: Array2::from_shape_fn((n, n), |(row, column)| of(row, column).is_some()),
         radiance: Array2::from_shape_fn((n, n), |(row, column)| of(row, column).unwrap_or(0.0)),
@@ -306,7 +313,7 @@ fn lamps_behind_foliage_are_cut_leaf_by_leaf() {
         ("on either side", 3.0, None, -1.5),
         ("leaves of two depths", 7.7, Some(3.3), -2.6),
     ] {
-        let all: Vec<(f64, &dyn Fn(usize, usize) -> Option<f64>)> = match far_px {
+        let all: Vec<OfPlane<'_>> = match far_px {
             Some(far_px) => vec![(near_px, &near), (far_px, &far), (wall_px, &wall)],
             None => vec![(near_px, &near), (wall_px, &wall)],
         };

@@ -7,7 +7,7 @@ use crate::OpticsError;
 /// What a coating reflects, by wavelength and by the angle of incidence in the medium of lower index, air as a rule.
 ///
 /// Between wavelengths it is interpolated along straight lines, between angles by monotone cubics. Before the first angle it is as there.
-/// Beyond the last it rises to 1 at 90° as the reflectance of surfaces does, R + (1 − R) (1 − cos θ / cos θ_last)⁵ (Schlick, *An
+/// Beyond the last it rises to 1 at 90° as the reflectance of surfaces does, `R + (1 − R) (1 − cos θ / cos θ_last)⁵` (Schlick, *An
 /// Inexpensive BRDF Model for Physically-based Rendering*, 1994).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
