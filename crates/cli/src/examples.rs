@@ -59,6 +59,10 @@ const EXAMPLES: &[(&str, &[&str])] = &[
     ("sweep index", &["dioptric sweep index plan.ron"]),
     ("sweep pack", &["dioptric sweep pack plan.ron --webdataset pictures.tar --items-per-tar 1000"]),
     (
+        "sweep prune",
+        &["dioptric sweep prune plan.ron --dry-run", "dioptric sweep prune plan.ron other.ron --store shared.store"],
+    ),
+    (
         "measure mtf",
         &["dioptric measure mtf edge.png --region 20,20,120,120 --out edge/", "dioptric measure mtf chart.png --all"],
     ),
