@@ -320,7 +320,7 @@ pub(super) fn lens_from_lens_text(text: &str, name: &str) -> Result<LensFile, Te
         surfaces.push(surface.with_rim_that_fits(&mut notes));
     }
     if n_coated > 0 {
-        notes.push(format!("the coatings of {n_coated} surfaces are named but not stated: the usual ones are taken, or those of --coating"));
+        notes.push(format!("{n_coated} surfaces state that they are coated, not with what: the usual coating is taken, or that of --coating"));
     }
     if stop.is_none() {
         notes.push("no surface is the stop: the first is it".to_owned());

@@ -140,7 +140,14 @@ fn what_a_bench_file_has_wrong_is_said_with_its_line() {
     let of_lens = |text: &str| LensFile::from_bytes(Path::new("a.lens"), text.as_bytes(), &ReadOptions::default());
     let text = "name: A\nfocal_length: 50\nsurfaces:\n 50 5 1.5 60 20 1\n stop 1 1 0 15 0\n -50 45 1 0 20 0\n";
     let file = of_lens(text).unwrap();
-    assert!(file.notes.iter().any(|note| note.contains("the coatings of 1 surfaces are left out")), "{:?}", file.notes);
+    assert!(
+        file.notes
+            .iter()
+            .any(|note| note
+                .contains("1 surfaces state that they are coated, not with what: the usual coating is taken")),
+        "{:?}",
+        file.notes
+    );
     assert_eq!(
         (file.lens.stop(), file.film_distance_mm, file.lens.interfaces()[0].surface.semi_aperture_mm),
         (1, Some(45.0), 10.0)
