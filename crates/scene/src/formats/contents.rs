@@ -16,6 +16,7 @@ use super::{
     reading::{FileQuantity, Frame, Panorama, Place, light_unit},
     stated::short,
     unusable::unreadable,
+    wavelength_unit::PLAUSIBLE_NM,
 };
 use crate::{SceneError, SceneLight};
 
@@ -184,10 +185,6 @@ pub(super) fn is_of(path: &Path, endings: &[&str]) -> bool {
     path.extension().is_some_and(|own| endings.iter().any(|ending| own.eq_ignore_ascii_case(ending)))
 }
 
-/// Numbers beyond are no wavelengths in nm, but micrometres, or bands that are counted.
-const SHORTEST_NM: f64 = 10.0;
-const LONGEST_NM: f64 = 1e6;
-
 /// A cube of plain numbers, and what its file says of them.
 pub(super) struct Cube {
     /// The planes of the bands, in the order of the file.
@@ -237,7 +234,7 @@ impl Cube {
             let reason = format!("{} bands, but {} wavelengths", planes.len(), wavelengths_nm.len());
             return Err(unreadable(path, reason));
         }
-        if let Some(nm) = wavelengths_nm.iter().find(|nm| !(SHORTEST_NM..=LONGEST_NM).contains(*nm)) {
+        if let Some(nm) = wavelengths_nm.iter().find(|nm| !PLAUSIBLE_NM.contains(*nm)) {
             let reason = format!("a band lies at {nm} nm: expected wavelengths in nm, or --scene-wavelengths-nm");
             return Err(unreadable(path, reason));
         }

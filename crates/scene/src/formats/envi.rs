@@ -26,6 +26,8 @@ use crate::{SceneError, resample::resampling_weights};
 
 /// A text header longer than this is none.
 const LIMIT_HEADER_BYTES: u64 = 64 << 20;
+/// Bands of a cube and of its references that lie no farther apart are the same, nm.
+const SAME_BAND_NM: f64 = 0.1;
 /// Endings of the file of numbers beside `NAME.hdr`; none at all as well.
 const DATA_ENDINGS: [&str; 9] = ["", "raw", "img", "dat", "bsq", "bil", "bip", "bin", "cube"];
 
@@ -352,7 +354,18 @@ impl EnviFile {
     fn check_reference(&self, reference: &Self) -> Result<(), SceneError> {
         let (own, found) = (&self.header, &reference.header);
         if (found.bands, found.columns) == (own.bands, own.columns) {
-            return Ok(());
+            let mut bands = self.wavelengths_nm.iter().zip(&reference.wavelengths_nm);
+            let other = bands.find(|(own, found)| (*own - *found).abs() > SAME_BAND_NM);
+            return match other {
+                None => Ok(()),
+                Some((own, found)) => {
+                    let of = self.header_path.display();
+                    let reason = format!(
+                        "a band at {found} nm where {of} has {own} nm: expected the bands of that, in its order"
+                    );
+                    Err(unreadable(&reference.header_path, reason))
+                }
+            };
         }
         let reason = format!(
             "{} columns in {} bands: expected {} in {}, as in {}",
@@ -425,6 +438,15 @@ impl EnviFile {
         found.sort();
         let Some((first, others)) = found.split_first() else { return Ok(None) };
         let mut reference = Self::open(first, None, Some(&self.wavelengths_nm))?;
+        // What a reference holds is a perfect white, or darkness, whatever else its header makes of its numbers.
+        let header = &reference.header;
+        let left = [
+            ("reflectance scale factor", header.reflectance_scale.is_some()),
+            ("data units", header.data_units.as_deref().is_some_and(|unit| !unit.is_empty())),
+        ];
+        let left: Vec<String> =
+            left.into_iter().filter(|(_, is_there)| *is_there).map(|(key, _)| key.to_owned()).collect();
+        reference.notes.extend(note_of(first, "key", &left));
         let others: Vec<String> = others.iter().map(|path| name_of(path)).collect();
         reference.notes.extend(note_of(&self.header_path, "reference", &others));
         Ok(Some(reference))

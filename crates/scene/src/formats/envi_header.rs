@@ -2,7 +2,10 @@
 
 use std::path::Path;
 
-use super::stated::note_of;
+use super::{
+    stated::note_of,
+    wavelength_unit::{PLAUSIBLE_NM, UNITS, in_nm},
+};
 use crate::SceneError;
 
 /// How the samples of a cube follow each other.
@@ -381,14 +384,6 @@ impl Entries<'_> {
             Ok(Some(numbers.iter().map(|number| number * factor).collect()))
         };
         match unit.as_deref() {
-            Some("nm" | "nanometers" | "nanometer" | "nanometres" | "nanometre") => plain(1.0),
-            Some(
-                "um" | "µm" | "μm" | "micrometers" | "micrometer" | "micrometres" | "micrometre" | "microns" | "micron",
-            ) => plain(1000.0),
-            Some("mm" | "millimeters" | "millimetres") => plain(1e6),
-            Some("m" | "meters" | "metres") => plain(1e9),
-            Some("angstroms" | "angstrom" | "å") => plain(0.1),
-            Some("wavenumber" | "cm-1") => Ok(Some(numbers.iter().map(|number| 1e7 / number).collect())),
             Some("index") => Ok(None),
             None | Some("unknown" | "") => {
                 let are_counted =
@@ -404,7 +399,16 @@ impl Entries<'_> {
                               the header, or --scene-wavelengths-nm";
                 Err(self.wrong("wavelength", reason.to_owned()))
             }
-            Some(other) => Err(self.wrong("wavelength units", format!("'{}', expected nm or µm", shown(other)))),
+            Some(other) => match in_nm(other, &numbers) {
+                Some(all) => match all.iter().zip(&numbers).find(|(nm, _)| !PLAUSIBLE_NM.contains(*nm)) {
+                    Some((_, number)) => {
+                        let reason = format!("{number} in {} is no wavelength of light", shown(other));
+                        Err(self.wrong("wavelength units", reason))
+                    }
+                    None => Ok(Some(all)),
+                },
+                None => Err(self.wrong("wavelength units", format!("'{}', expected {UNITS}", shown(other)))),
+            },
         }
     }
 }

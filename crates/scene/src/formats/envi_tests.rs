@@ -128,6 +128,27 @@ fn white_is_reported_by_the_caller_the_header_or_references() {
     write(folder.path(), "dark_reference_1", &text, &[1; 29]);
     let (image, notes) = read_with(&path, &ReadOptions::default()).unwrap();
     assert_eq!((image, notes[0].as_str()), (referred, "a.hdr: its key 'tint' is not used"));
+    // Bands are those of the cube in its order; what a reference's numbers are besides is named.
+    for (bands, words) in [("500, 600", "a band at 500 nm where"), ("610, 510", "a band at 610 nm where")] {
+        write(folder.path(), "white_reference_1", &text.replace("600, 500", bands), &[201; 29]);
+        let message = open(&path).unwrap_err().to_string();
+        assert!(message.contains("white_reference_1.hdr") && message.contains(words), "{message}");
+    }
+    write(folder.path(), "white_reference_1", &format!("{text}reflectance scale factor = 50\n"), &[201; 29]);
+    let (_, notes) = read_with(&path, &ReadOptions::default()).unwrap();
+    assert!(notes.iter().any(|note| note.contains("its key 'reflectance scale factor' is not used")), "{notes:?}");
+    for (unit, factor) in [("Micrometers", 1e-3), ("Angstroms", 10.0), ("eV", 0.0)] {
+        let stated = match factor {
+            0.0 => "2.06640331, 2.47968397".to_owned(),
+            factor => format!("{}, {}", 600.0 * factor, 500.0 * factor),
+        };
+        let other = text.replace("units = nm", &format!("units = {unit}")).replace("600, 500", &stated);
+        let own = write(folder.path(), "d", &format!("{other}reflectance scale factor = 100\n"), &bytes);
+        let found = open(&own).unwrap().grid().centers_nm().to_vec();
+        assert!((found[0] - 500.0).abs() < 1e-5 && (found[1] - 600.0).abs() < 1e-5, "{unit}: {found:?}");
+    }
+    let far = write(folder.path(), "e", &text.replace("units = nm", "units = um"), &bytes);
+    assert!(open(&far).unwrap_err().to_string().contains("600 in um is no wavelength of light"));
     let units = write(folder.path(), "c", &format!("{text}data units = W/m^2/sr/nm\n"), &bytes);
     assert_eq!(open(&units).unwrap().quantity(), Quantity::Radiance);
 }

@@ -69,6 +69,7 @@ mod tiff_page;
 mod understood;
 mod unmeasured;
 mod unusable;
+mod wavelength_unit;
 #[cfg(test)]
 mod word_tests;
 

@@ -17,6 +17,7 @@ use super::{
         reading::{FileQuantity, FileReading},
         stated::{name_of, note_of},
         unusable::unreadable,
+        wavelength_unit::{UNITS, in_nm},
     },
     container::{Content, MatArray, MatFile, WHOLE},
     elements::Listed,
@@ -168,7 +169,7 @@ fn cube_of(path: &Path, file: &MatFile, name: &str, reading: &FileReading) -> Re
     let array = file.array(name)?.ok_or_else(|| format!("it has no variable '{name}'"))?;
     let numbers = array.numbers().map_err(|what| format!("its '{name}' is {what}, expected numbers"))?;
     let packing = Packing::of(file.attributes_of(name));
-    let waves = waves_of(file, name, &array.sides)?;
+    let waves = waves_of(file, name, &array.sides, reading.wavelengths_nm.is_some())?;
     // What is known by name gives way to what is told.
     let known = KNOWN
         .iter()
@@ -236,19 +237,27 @@ impl UnitOf {
     }
 }
 
-/// Returns the name of the list of wavelengths beside a cube of these sides, and the list, nm.
-fn waves_of(file: &MatFile, cube: &str, sides: &[usize]) -> Result<Option<(String, Vec<f64>)>, String> {
+/// Returns the name of the list of wavelengths beside a cube of these sides, and the list, nm. One in an unknown unit is an error, unless
+/// wavelengths are told.
+fn waves_of(file: &MatFile, cube: &str, sides: &[usize], is_told: bool) -> Result<Option<(String, Vec<f64>)>, String> {
     for list in WAVES {
         let Some(own) = file.listed.iter().find(|own| last_part(&own.name) == list && own.name != cube) else {
             continue;
         };
         let numbers = file.array(&own.name)?.and_then(|array| array.list()).filter(|list| !list.is_empty());
         let Some(mut numbers) = numbers else { continue };
-        let unit = Packing::of(file.attributes_of(&own.name)).unit.unwrap_or_default().to_lowercase();
-        if ["um", "µm", "μm", "micrometer", "micrometers", "micrometre", "micrometres", "microns"]
-            .contains(&unit.as_str())
-        {
-            numbers.iter_mut().for_each(|nm| *nm *= 1000.0);
+        if let Some(unit) = Packing::of(file.attributes_of(&own.name)).unit.filter(|_| sides.contains(&numbers.len())) {
+            numbers = match in_nm(&unit, &numbers) {
+                Some(numbers) => numbers,
+                None if is_told => continue,
+                None => {
+                    let unit: String = unit.chars().take(40).collect();
+                    return Err(format!(
+                        "its '{}' are in '{unit}': expected {UNITS}, or --scene-wavelengths-nm",
+                        own.name
+                    ));
+                }
+            };
         }
         // A list that counts bands, or of another length, is none of wavelengths.
         let is_bands = sides.contains(&numbers.len()) && numbers.iter().all(|nm| *nm >= 100.0);
