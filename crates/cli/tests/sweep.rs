@@ -217,7 +217,7 @@ fn a_killed_sweep_goes_on_to_the_same_store() {
             .current_dir(folder.path())
             .spawn()
             .unwrap();
-        sleep(whole.mul_f64(0.05 + 0.25 * (f64::from(n) * 0.618_034).fract()).min(Duration::from_secs(3)));
+        sleep(whole.mul_f64(0.1 + 0.5 * (f64::from(n) * 0.618_034).fract()).min(Duration::from_secs(3)));
         run.kill().unwrap();
         run.wait().unwrap();
         seen.push(n_there());
