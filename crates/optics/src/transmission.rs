@@ -227,12 +227,14 @@ impl Series {
 
     /// Returns the first so many coefficients of the series, by the values at as many nodes.
     fn coefficients([from, to]: [f64; 2], n: usize, values_at: &impl Fn(f64) -> [f64; 4]) -> [Vec<f64>; 4] {
-        let angle = |j: usize| std::f64::consts::PI * (j as f64 + 0.5) / n as f64;
+        // Of multiples of half the angle between nodes: all that the series need.
+        let cosines: Vec<f64> = (0..4 * n).map(|k| (std::f64::consts::PI * k as f64 / (2 * n) as f64).cos()).collect();
+        let cos = |i: usize, j: usize| cosines[i * (2 * j + 1) % (4 * n)];
         let values: Vec<[f64; 4]> =
-            (0..n).map(|j| values_at(0.5 * (from + to) + 0.5 * (to - from) * angle(j).cos())).collect();
+            (0..n).map(|j| values_at(0.5 * (from + to) + 0.5 * (to - from) * cos(1, j))).collect();
         std::array::from_fn(|k| {
             let coefficient = |i: usize| {
-                let sum: f64 = (0..n).map(|j| values[j][k] * (i as f64 * angle(j)).cos()).sum();
+                let sum: f64 = (0..n).map(|j| values[j][k] * cos(i, j)).sum();
                 sum * if i == 0 { 1.0 } else { 2.0 } / n as f64
             };
             (0..n).map(coefficient).collect()
