@@ -5,6 +5,7 @@ use dioptric_psf::{LensImageModel, PointImage};
 use dioptric_spectrum::WavelengthGrid;
 use image::{Rgb, RgbImage, imageops};
 use ndarray::Array2;
+use rayon::prelude::*;
 
 use crate::png::enlarged;
 use dioptric_pipeline::{REFERENCE_WAVELENGTH_NM, display::LinearRgb, display::SpectrumToRgb};
@@ -48,21 +49,22 @@ impl PsfMosaic {
         let tiles_um: Vec<f64> = plan.dioptres.iter().map(widest).collect();
         let white = vec![1.0; plan.grid.len()];
         let to_rgb = SpectrumToRgb::with_white(&plan.grid, &white);
-        let mut tiles = Vec::new();
-        for (&dioptres, tile_um) in plan.dioptres.iter().zip(&tiles_um) {
+        let tile = |(dioptres, tile_um, field_tan): (f64, f64, DVec2)| {
             let pitch_um = tile_um / plan.tile_px as f64;
-            for &field_tan in &plan.field_tans {
-                let mut light = LinearRgb::black(plan.tile_px, plan.tile_px);
-                let image = |nm: f64| model.point(field_tan, dioptres, nm);
-                let reference = image(REFERENCE_WAVELENGTH_NM);
-                for (band, &wavelength_nm) in plan.grid.centers_nm().iter().enumerate() {
-                    let Some(image) = image(wavelength_nm) else { continue };
-                    let lateral_um = lateral_color_um(&image, reference.as_ref());
-                    light.add(&window(&image, lateral_um, pitch_um, plan.tile_px), to_rgb.of_band(band));
-                }
-                tiles.push(light.to_srgb(light.level_at(1.0).max(f64::MIN_POSITIVE)));
+            let mut light = LinearRgb::black(plan.tile_px, plan.tile_px);
+            let image = |nm: f64| model.point(field_tan, dioptres, nm);
+            let reference = image(REFERENCE_WAVELENGTH_NM);
+            for (band, &wavelength_nm) in plan.grid.centers_nm().iter().enumerate() {
+                let Some(image) = image(wavelength_nm) else { continue };
+                let lateral_um = lateral_color_um(&image, reference.as_ref());
+                light.add(&window(&image, lateral_um, pitch_um, plan.tile_px), to_rgb.of_band(band));
             }
-        }
+            light.to_srgb(light.level_at(1.0).max(f64::MIN_POSITIVE))
+        };
+        let rows = plan.dioptres.iter().zip(&tiles_um);
+        let places =
+            rows.flat_map(|(&dioptres, &tile_um)| plan.field_tans.iter().map(move |&tan| (dioptres, tile_um, tan)));
+        let tiles = places.collect::<Vec<_>>().into_par_iter().map(tile).collect();
         Self {
             fields_deg: plan.field_tans.iter().map(|tan| tan.length().atan().to_degrees()).collect(),
             depths_m: plan.dioptres.iter().map(|d| 1.0 / d).collect(),
