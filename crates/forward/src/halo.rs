@@ -149,7 +149,9 @@ impl Halos {
         (surroundings, radiance, points): (&Surroundings<'_>, &[f32], &[Point]),
     ) -> Array2<f32> {
         match self.of_bands.get(band) {
-            Some(Some(halo)) => surroundings.with(&picture, (radiance, points), |wide| halo.applied(wide)),
+            Some(Some(halo)) => {
+                surroundings.with(&picture, (radiance, points), |wide, beside| halo.applied(wide, beside))
+            }
             _ => picture,
         }
     }
@@ -181,8 +183,10 @@ impl Halo {
     /// Takes from each pixel of a picture what its halo takes to others, and adds that to them.
     ///
     /// With T the halo of a point, E + T ⊗ E − E (T ⊗ 1): the sum of the picture is kept, and an even one stays even, for beyond its edges it counts as even.
-    fn applied(&self, mut picture: Array2<f32>) -> Array2<f32> {
-        let (brought, landing) = (self.of(&picture), self.of_ones(picture.dim()));
+    ///
+    /// What lies less than `beside` pixels from its edges is not wanted.
+    fn applied(&self, mut picture: Array2<f32>, beside: usize) -> Array2<f32> {
+        let (brought, landing) = (self.of(&picture), self.of_ones(picture.dim(), beside));
         let columns = picture.ncols();
         for (row, mut line) in picture.rows_mut().into_iter().enumerate() {
             let came = self.on_film(&brought, row, columns);
@@ -195,20 +199,28 @@ impl Halo {
         picture
     }
 
-    /// Returns how much of the halo of each pixel lands on a film of so many rows and columns, on pixels as [`of`](Self::of) has them.
-    fn of_ones(&self, (rows, columns): (usize, usize)) -> Array2<f32> {
-        match self.n_doublings {
-            0 => on_rasters(&Array2::ones((rows, columns)), &self.rasters),
-            n => {
-                // The means of ones over wide pixels are products.
-                let part_on_film = |n: usize, i: usize| -> f32 {
-                    let pixels = WEIGHTS.iter().enumerate();
-                    pixels.filter(|(k, _)| (3..n + 3).contains(&(2 * i + k))).map(|(_, weight)| weight).sum()
-                };
-                let mean = |(row, column)| part_on_film(rows, row) * part_on_film(columns, column);
-                self.by_doublings(&Array2::from_shape_fn((n_halved(rows), n_halved(columns)), mean), n - 1)
+    /// Returns how much of the halo of each pixel lands on a picture of so many rows and columns, on pixels as [`of`](Self::of) has them: right where pixels lie
+    /// `beside` its edges or more.
+    fn of_ones(&self, (rows, columns): (usize, usize), beside: usize) -> Array2<f32> {
+        // Ones on ever wider pixels are products of lines.
+        let mut lines = vec![[vec![1.0; rows], vec![1.0; columns]]];
+        for doublings in 1..self.n_doublings + self.rasters.len() {
+            lines.push([0, 1].map(|way| halved_line(&lines[doublings - 1][way])));
+        }
+        // What lands through rasters that reach no edge is all of it: their parts, and the splines to them.
+        let reaches_edge = |raster: usize| (REACH + 3) << (self.n_doublings + raster) > beside;
+        let outer = (0..self.rasters.len()).find(|raster| reaches_edge(*raster)).unwrap_or(self.rasters.len() - 1);
+        let [down, across] = &lines[self.n_doublings + outer];
+        let ones = Array2::from_shape_fn((down.len(), across.len()), |(row, column)| down[row] * across[column]);
+        let mut landing = on_rasters(&ones, &self.rasters[outer..]);
+        for doublings in (self.n_doublings.min(1)..self.n_doublings + outer).rev() {
+            let [down, across] = &lines[doublings];
+            landing = doubled(&landing, (down.len(), across.len()));
+            if let Some(raster) = doublings.checked_sub(self.n_doublings) {
+                landing += self.rasters[raster].total();
             }
         }
+        landing
     }
 
     /// Returns what halos bring to each pixel of a picture, on its own or on pixels twice as wide: see [`on_film`](Self::on_film).
@@ -285,6 +297,15 @@ impl RasterPart {
         Self(std::array::from_fn(|down| std::array::from_fn(|right| sharp(right, down) as f32)))
     }
 
+    /// What lands of a pixel's part, near and far.
+    fn total(&self) -> f32 {
+        let times = |pixels: usize| if pixels == 0 { 1.0 } else { 2.0 };
+        let line = |energies: &[f32; REACH + 1]| -> f32 {
+            energies.iter().enumerate().map(|(right, energy)| times(right) * energy).sum()
+        };
+        self.0.iter().enumerate().map(|(down, energies)| times(down) * line(energies)).sum()
+    }
+
     /// Returns what it brings to each pixel of a picture.
     fn of(&self, picture: &Array2<f32>) -> Array2<f32> {
         let (rows, columns) = picture.dim();
@@ -350,6 +371,15 @@ fn halved(picture: &Array2<f32>) -> Array2<f32> {
     means
 }
 
+/// Returns the means of a line, as [`halved`] has them.
+fn halved_line(line: &[f32]) -> Vec<f32> {
+    let mean = |i: usize| {
+        let pixels = WEIGHTS.iter().enumerate();
+        pixels.filter_map(|(k, weight)| Some(weight * line.get((2 * i + k).checked_sub(3)?)?)).sum()
+    };
+    (0..n_halved(line.len())).map(mean).collect()
+}
+
 const WEIGHTS: [f32; 4] = [0.125, 0.375, 0.375, 0.125];
 
 /// Returns a plane on pixels half as wide, by quadratic splines: ¾ of the wider pixel and ¼ of the next, each way.
@@ -383,12 +413,28 @@ mod tests {
     fn even_pictures_stay_even_and_sums_are_kept() {
         for (half_px, size) in [(0.5, (33, 70)), (2.5, (64, 48)), (5.5, (101, 90)), (23.5, (40, 61)), (200.5, (7, 1))] {
             let halo = halo(half_px, 0.02, size);
-            for light in halo.applied(Array2::from_elem(size, 3.0)) {
+            for light in halo.applied(Array2::from_elem(size, 3.0), 0) {
                 assert!((light - 3.0).abs() < 1e-6, "{half_px}: {light}");
             }
             let uneven = Array2::from_shape_fn(size, |(row, column)| ((row * 7 + column * 13) % 11) as f32);
-            let (before, after) = (uneven.sum(), halo.applied(uneven).sum());
+            let (before, after) = (uneven.sum(), halo.applied(uneven, 0).sum());
             assert!((after / before - 1.0).abs() < 1e-5, "{half_px}: {before} {after}");
+        }
+    }
+
+    /// Beside the edges by more than rasters reach, what lands is found without them.
+    #[test]
+    fn what_lands_is_all_where_no_edge_is_near() {
+        for half_px in [0.5, 2.5, 5.5, 23.5] {
+            let halo = halo(half_px, 0.02, (300, 260));
+            let (beside, whole) = (100, halo.of_ones((300, 260), 0));
+            for ((row, column), landing) in halo.of_ones((300, 260), beside).indexed_iter() {
+                let wide = if halo.n_doublings == 0 { 1 } else { 2 };
+                let is_inner = |at: usize, n: usize| (beside + 4..n - beside - 4).contains(&(wide * at));
+                if is_inner(row, 300) && is_inner(column, 260) {
+                    assert!((landing - whole[(row, column)]).abs() < 2e-6, "{half_px} {row} {column}: {landing}");
+                }
+            }
         }
     }
 
@@ -402,7 +448,7 @@ mod tests {
             for at in [(400, 400), (403, 398), (397, 401)] {
                 let mut point = Array2::zeros((n, n));
                 point[at] = 1.0;
-                let picture = halo.applied(point);
+                let picture = halo.applied(point, 0);
                 let from_point = |row: usize, column: usize| {
                     DVec2::new(column as f64 - at.1 as f64, row as f64 - at.0 as f64).length()
                 };

@@ -43,6 +43,7 @@ impl OpenPupil {
         let reach_px = parallax_px.fold(radius_px.abs(), f32::max);
         let side = 2 * (2.0 * reach_px).clamp(SQUARES.0, SQUARES.1).ceil() as usize;
         let farthest_px = widest_px(met);
+        let surfaces = sight.surfaces();
         let before_px = point.before.as_ref().map_or(0.0, |before| sight.radius_px_of(before.dioptres, pixel));
         let place = |number: usize, within: f32| (number as f32 + 0.5 + within) * (2.0 / side as f32) - 1.0;
         let (mut seen, mut all) = (Vec::with_capacity(side * side), Vec::with_capacity(side * side));
@@ -59,7 +60,9 @@ impl OpenPupil {
                 point.place_px.0 + within[2] * point.width_px - radius_px * through.0,
                 point.place_px.1 + within[3] * point.width_px - radius_px * through.1,
             );
-            let is_open = !Self::is_hidden(Ray::new(sight, from, through, farthest_px), (point, met), before_px);
+            let position = sight.position_at(from);
+            let ray = Ray::new(surfaces, position, sight.per_px(from, position, through, farthest_px));
+            let is_open = !Self::is_hidden(ray, (point, met), before_px);
             seen.push(if is_open { weight } else { 0.0 });
             all.push(weight);
         }

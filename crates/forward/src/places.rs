@@ -10,7 +10,7 @@ use crate::Border;
 pub(crate) const UNSEEN: u32 = u32::MAX;
 
 /// Points from one at which the map is looked up to the next; between them positions follow cubics.
-const APART: usize = 8;
+pub(crate) const APART: usize = 8;
 
 /// The samples of a scene, the directions that they are seen in, and what lies beyond its edges.
 #[derive(Clone, Copy, Debug)]

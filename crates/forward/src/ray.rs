@@ -1,10 +1,10 @@
 //! Rays from the film through the pupil, layer by layer, and where they end.
 
-use crate::sight::{Met, Sight};
+use crate::sight::{Met, Surfaces};
 
 /// A ray from a film point on its way from the nearest layer to the farthest.
 pub(crate) struct Ray<'a> {
-    sight: &'a Sight,
+    surfaces: Surfaces<'a>,
     /// The position among the samples of the scene where the blur radius is 0, and how far it goes from there in a pixel of blur radius.
     position: [f32; 2],
     per_px: [f32; 2],
@@ -15,14 +15,11 @@ pub(crate) struct Ray<'a> {
 }
 
 impl<'a> Ray<'a> {
-    /// Returns that through the point so many pixels beside the film point in the layer of a blur radius of 1 pixel. Between the film point and the widest of the layers
-    /// that it may meet the map of the film is taken for linear.
-    pub(crate) fn new(sight: &'a Sight, from: (f32, f32), beside: (f32, f32), widest_px: f32) -> Self {
-        let to = (from.0 + widest_px * beside.0, from.1 + widest_px * beside.1);
-        let (position, end) = (sight.position_at(from), sight.position_at(to));
-        let per_px = [0, 1].map(|axis| if widest_px == 0.0 { 0.0 } else { (end[axis] - position[axis]) / widest_px });
+    /// Returns that from a position among the samples of the scene in focus, which goes so far from there in a pixel of blur radius.
+    #[inline]
+    pub(crate) fn new(surfaces: Surfaces<'a>, position: [f32; 2], per_px: [f32; 2]) -> Self {
         let last = Met { layer: 0, radius_px: 0.0, is_of_first: false };
-        Self { sight, position, per_px, last, paths: <[Path; 2]>::default() }
+        Self { surfaces, position, per_px, last, paths: <[Path; 2]>::default() }
     }
 
     /// Passes the next of the layers that are met; returns the coordinates of the surfaces there.
@@ -66,7 +63,7 @@ impl<'a> Ray<'a> {
     /// Returns the coordinates of the surfaces where it passes a blur radius.
     #[inline]
     pub(crate) fn surfaces_at(&self, radius_px: f32) -> [f32; 2] {
-        self.sight.surfaces_at([0, 1].map(|axis| self.position[axis] + radius_px * self.per_px[axis]))
+        self.surfaces.at([0, 1].map(|axis| self.position[axis] + radius_px * self.per_px[axis]))
     }
 }
 

@@ -15,6 +15,7 @@ use crate::{
     raster::{Level, Raster},
     rectangle::Rectangle,
     scene_layers::SceneLayers,
+    surface::LayerCoordinates,
     tile::film_pixels,
 };
 
@@ -106,10 +107,11 @@ impl Sight {
             blur,
             middle: (pixels.down_px(0) as f32, pixels.across_px(0) as f32),
         };
+        let surfaces = this.surfaces();
         let of_row = |row: usize| {
             cancel.check()?;
             let place = |column: usize| this.place_px((at.first_row + row as i64, at.first_column + column as i64));
-            Ok((0..at.columns).map(|column| this.surfaces_at(this.position_at(place(column)))).collect())
+            Ok((0..at.columns).map(|column| surfaces.at(this.position_at(place(column)))).collect())
         };
         let seen = (0..at.rows).into_par_iter().map(of_row).collect::<Result<Vec<Vec<[f32; 2]>>, Cancelled>>()?;
         this.met = this.find_met(&seen);
@@ -156,20 +158,19 @@ impl Sight {
         self.looks.at((down - self.middle.0, across - self.middle.1))
     }
 
-    /// Returns the layer coordinates of the first surface at a row and column of the scene, and of what lies behind it; NaN for nothing.
+    /// Returns how far among the samples a ray from a place goes in a pixel of blur radius, that passes so many pixels beside the place in the layer of a blur
+    /// radius of 1 pixel. Between the place and the widest of the layers that it may meet the map of the film is taken for linear.
     #[inline]
-    pub(crate) fn surfaces_at(&self, [row, column]: [f32; 2]) -> [f32; 2] {
+    pub(crate) fn per_px(&self, from: (f32, f32), position: [f32; 2], beside: (f32, f32), widest_px: f32) -> [f32; 2] {
+        let end = self.position_at((from.0 + widest_px * beside.0, from.1 + widest_px * beside.1));
+        [0, 1].map(|axis| if widest_px == 0.0 { 0.0 } else { (end[axis] - position[axis]) / widest_px })
+    }
+
+    /// Returns the surfaces of the scene.
+    pub(crate) fn surfaces(&self) -> Surfaces<'_> {
         let SceneRaster { rows, columns, border, .. } = self.raster;
-        if !(row.is_finite() && column.is_finite()) {
-            return [f32::NAN; 2];
-        }
-        let nearest = |position: f32, n: usize| match border {
-            Border::Mirror => (folded(f64::from(position), n, border) + 0.5) as usize,
-            _ => ((position + 0.5).max(0.0) as usize).min(n - 1),
-        };
-        let sample = nearest(row, rows) * columns + nearest(column, columns);
-        let second = self.scene.occluded.layer_coordinates().map_or(f32::NAN, |second| second.samples()[sample]);
-        [self.scene.coordinates.samples()[sample], second]
+        let second = self.scene.occluded.layer_coordinates().map(LayerCoordinates::samples);
+        Surfaces { first: self.scene.coordinates.samples(), second, rows, columns, border }
     }
 
     /// Returns the layers that the rays of some pixels may meet, nearest first, with the blur radii in their middle.
@@ -247,6 +248,32 @@ impl Sight {
         spread(&mut reach, columns);
         reach.reverse();
         reach.into_iter().map(|reach| reach.edges).collect()
+    }
+}
+
+/// The first surface of a scene and what lies behind it: layer coordinates, sample by sample.
+#[derive(Clone, Copy)]
+pub(crate) struct Surfaces<'a> {
+    first: &'a [f32],
+    second: Option<&'a [f32]>,
+    rows: usize,
+    columns: usize,
+    border: Border,
+}
+
+impl Surfaces<'_> {
+    /// Returns the layer coordinates of the first surface at a row and column of the scene, and of what lies behind it; NaN for nothing.
+    #[inline]
+    pub(crate) fn at(&self, [row, column]: [f32; 2]) -> [f32; 2] {
+        if !(row.is_finite() && column.is_finite()) {
+            return [f32::NAN; 2];
+        }
+        let nearest = |position: f32, n: usize| match self.border {
+            Border::Mirror => (folded(f64::from(position), n, self.border) + 0.5) as usize,
+            _ => ((position + 0.5).max(0.0) as usize).min(n - 1),
+        };
+        let sample = nearest(row, self.rows) * self.columns + nearest(column, self.columns);
+        [self.first[sample], self.second.map_or(f32::NAN, |second| second[sample])]
     }
 }
 

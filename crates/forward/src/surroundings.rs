@@ -5,7 +5,7 @@ use ndarray::{Array2, s};
 
 use crate::{
     Film,
-    places::{Places, SceneRaster, UNSEEN},
+    places::{APART, Places, SceneRaster, UNSEEN},
     points::Point,
     raster::{Level, Raster},
     tile::film_pixels,
@@ -33,12 +33,13 @@ pub(crate) struct Surroundings<'a> {
 }
 
 impl Surroundings<'_> {
-    /// Returns a picture changed by what is done to it with its surroundings: what chief rays see of the radiance of a surface, row by row, if any, and points.
+    /// Returns a picture changed by what is done to it with its surroundings: what chief rays see of the radiance of a surface, row by row, if any, and points. `change` is also
+    /// told how many pixels lie beside the picture.
     pub(crate) fn with(
         &self,
         picture: &Array2<f32>,
         (radiance, points): (&[f32], &[Point]),
-        change: impl FnOnce(Array2<f32>) -> Array2<f32>,
+        change: impl FnOnce(Array2<f32>, usize) -> Array2<f32>,
     ) -> Array2<f32> {
         let m = beside(self.film);
         let (rows, columns) = picture.dim();
@@ -50,15 +51,21 @@ impl Surroundings<'_> {
             let (across, down) = self.scene.steps();
             let step_mm = pixels.x_mm(1.0) - pixels.x_mm(0.0);
             let mut places = Places::default();
+            // The film has its own picture; what lies to the right of it is looked up from a point on that is as one from the left is.
+            let after = (m + columns) / APART * APART;
             for (row, line) in wide.chunks_exact_mut(wide_columns).enumerate() {
                 let y_mm = pixels.y_mm((first_row + row as i64) as f64);
-                places.find(self.scene, self.map, wide_columns, (pixels.x_mm(first_column as f64), step_mm, y_mm));
-                for (k, value) in line.iter_mut().enumerate().filter(|(k, _)| places.first[*k] != UNSEEN) {
-                    let first = places.first[k] as usize;
-                    let nearest = first
-                        + if places.across[k] >= 0.5 { across } else { 0 }
-                        + if places.down[k] >= 0.5 { down } else { 0 };
-                    *value = radiance[nearest] * places.light[k];
+                let is_beside = (m..m + rows).contains(&row);
+                for part in if is_beside { [0..m, after..wide_columns] } else { [0..wide_columns, 0..0] } {
+                    let first_mm = pixels.x_mm((first_column + part.start as i64) as f64);
+                    places.find(self.scene, self.map, part.len(), (first_mm, step_mm, y_mm));
+                    for (k, value) in line[part].iter_mut().enumerate().filter(|(k, _)| places.first[*k] != UNSEEN) {
+                        let first = places.first[k] as usize;
+                        let nearest = first
+                            + if places.across[k] >= 0.5 { across } else { 0 }
+                            + if places.down[k] >= 0.5 { down } else { 0 };
+                        *value = radiance[nearest] * places.light[k];
+                    }
                 }
             }
         }
@@ -75,6 +82,6 @@ impl Surroundings<'_> {
             own.iter_mut().zip(line).for_each(|(own, value)| *own = *value);
         }
         let wide = Array2::from_shape_vec((wide_rows, wide_columns), wide).expect("a value for each pixel");
-        change(wide).slice(s![m..m + rows, m..m + columns]).to_owned()
+        change(wide, m).slice(s![m..m + rows, m..m + columns]).to_owned()
     }
 }

@@ -229,9 +229,10 @@ impl Bundle {
         sums.fill([0.0; 3]);
         let total: f32 = self.rays.iter().map(|(_, weight)| weight).sum();
         let widest_px = widest_px(met);
+        let (surfaces, position) = (sight.surfaces(), sight.position_at(place));
         for ([down, across], weight) in &self.rays {
             let weight = weight / total;
-            let mut ray = Ray::new(sight, place, (*down, *across), widest_px);
+            let mut ray = Ray::new(surfaces, position, sight.per_px(place, position, (*down, *across), widest_px));
             for (met, sums) in met.iter().zip(sums.iter_mut()) {
                 let [first, second] = ray.pass(*met);
                 let share = weight * (tent(first, met.layer as f32) + tent(second, met.layer as f32));
