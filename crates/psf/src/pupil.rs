@@ -172,11 +172,7 @@ impl Outline {
     fn refined(mut self, clearances: Clearances<'_>, tolerance: f64) -> Option<Self> {
         let n = self.rho.len();
         let center = self.center;
-        let azimuths: Vec<f64> = (0..n).map(|i| self.azimuth(i)).collect();
-        let at_radii = |rho: &[f64]| -> Vec<f64> {
-            let places: Vec<DVec2> = (0..n).map(|i| polar(center, rho[i], azimuths[i])).collect();
-            clearances(&places)
-        };
+        let directions: Vec<DVec2> = (0..n).map(|i| DVec2::from_angle(self.azimuth(i))).collect();
         let at_center = clearances(&[center])[0];
         if at_center <= 0.0 {
             return None;
@@ -185,16 +181,16 @@ impl Outline {
         let mut outside = vec![(f64::INFINITY, f64::NAN); n];
         let mut previous = inside.clone();
         let mut here = self.rho.clone();
+        let mut open: Vec<usize> = (0..n).collect();
         for _ in 0..60 {
-            let values = at_radii(&here);
-            let mut is_done = true;
-            for i in 0..n {
-                let (r, f) = (here[i], values[i]);
+            let places: Vec<DVec2> = open.iter().map(|&i| center + directions[i] * here[i]).collect();
+            let mut values = clearances(&places).into_iter();
+            open.retain(|&i| {
+                let (r, f) = (here[i], values.next().unwrap_or(f64::NAN));
                 if f.abs() <= tolerance || outside[i].0 - inside[i].0 <= tolerance {
                     self.rho[i] = if f >= -tolerance { r } else { inside[i].0 };
-                    continue;
+                    return false;
                 }
-                is_done = false;
                 if f > 0.0 {
                     inside[i] = (r, f);
                 } else {
@@ -202,8 +198,9 @@ impl Outline {
                 }
                 here[i] = next_guess(previous[i], (r, f), inside[i].0, outside[i].0);
                 previous[i] = (r, f);
-            }
-            if is_done {
+                true
+            });
+            if open.is_empty() {
                 return self.rho.iter().all(|r| *r > 0.0).then_some(self);
             }
         }
