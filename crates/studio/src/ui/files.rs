@@ -16,7 +16,7 @@ use dioptric_report::write_run;
 use egui::Ui;
 
 use super::{
-    Studio, UNSAVED_IS_BACK,
+    OPEN_ELSEWHERE, Studio, UNSAVED_IS_BACK,
     dialog::{FileDialog, Outcome, Purpose},
     finish::Waiting,
     panels::{self, Wanted},
@@ -80,6 +80,8 @@ impl Studio {
         if let Some(left) = left {
             self.session.change(left.document.camera, None);
             self.note = Some(UNSAVED_IS_BACK.to_owned());
+        } else if self.autosave.as_ref().is_some_and(|autosave| autosave.is_open_elsewhere(path)) {
+            self.note = Some(OPEN_ELSEWHERE.to_owned());
         }
         self.submit();
         Ok(())

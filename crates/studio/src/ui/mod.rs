@@ -465,15 +465,21 @@ fn opened(camera: Option<&Path>, autosave: Option<&Autosave>) -> Opened {
                 autosave.remember(path);
             }
             let left = autosave.and_then(|autosave| autosave.left_of(path)).filter(Left::is_unsaved);
+            let is_elsewhere = autosave.is_some_and(|autosave| autosave.is_open_elsewhere(path));
             let note = left.map(|left| {
                 session.change(left.document.camera, None);
                 UNSAVED_IS_BACK.to_owned()
             });
+            let note = note.or(is_elsewhere.then(|| OPEN_ELSEWHERE.to_owned()));
             Opened { session, note, view: None }
         }
         Err(error) => fallback(Some(error.to_string())),
     }
 }
+
+/// What is told where two windows have one file open.
+const OPEN_ELSEWHERE: &str =
+    "another window has this file open: each keeps its own changes, and whoever saves last has the file";
 
 /// What is told where changes that were never saved are back.
 const UNSAVED_IS_BACK: &str = "changes that were not saved are back; Undo goes to the camera of the file";
