@@ -34,7 +34,7 @@ pub use palette::line as line_color;
 pub use psf::{MtfRow, PolychromaticPsf, PsfRequest, PsfRow, PsfSampling, PsfSet, ThroughFocus, psf_csv};
 pub use run::{
     ChannelStatistics, DisparityData, DngReport, DualPixelData, FilmData, IrradianceData, LossRow, MOST_ERROR_PX,
-    PixelOpticsData, PixelOpticsRow, PixelPlace, Run, RunCharts, RunOptics, RunPlaces, RunReport, RunTimes, SceneData,
-    SensorStatistics, pixel_optics_rows,
+    PixelOpticsData, PixelOpticsRow, PixelPlace, ReflectionData, Run, RunCharts, RunOptics, RunPlaces, RunReport,
+    RunTimes, SceneData, SensorStatistics, pixel_optics_rows,
 };
 pub use sensor_table::{SensorRow, built_in_sensors};

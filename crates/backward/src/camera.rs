@@ -200,6 +200,11 @@ impl Camera {
             Self::Lens(lens) => lens.rays(samples, nodes, out),
         }
     }
+
+    /// Makes rays of a sample of some pixels that surfaces of the lens reflect; returns whether there are any.
+    pub(crate) fn ghost_rays(&self, samples: &[PixelSample], nodes: &[usize; PACKET], out: &mut CameraRays) -> bool {
+        if let Self::Lens(lens) = self { lens.ghost_rays(samples, nodes, out) } else { false }
+    }
 }
 
 impl CameraRays {

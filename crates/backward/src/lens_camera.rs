@@ -5,6 +5,8 @@
 //! for parallel planes cos⁴θ A/z². L is the radiance along the ray that leaves the lens, 0 where the lens blocks it;
 //! along a ray L/n² stays the same, less what surfaces and glass take.
 
+mod ghosts;
+
 use dioptric_diffraction::{AngularSpread, Hurb, StopEdge};
 use dioptric_optics::{
     ExitPupilBounds, Lens, PupilReach, RayBatch, RayBatchF32, RayLightF32, ReversedLens, StopPoint, Vignetting,
@@ -63,6 +65,8 @@ pub struct LensCamera {
     micro_array: Option<PlacedMicroArray>,
     origin_z_mm: f64,
     projection_center_z_mm: f64,
+    /// What light takes that surfaces reflect twice, where it is followed.
+    ghosts: Option<ghosts::Ghosts>,
 }
 
 impl LensCamera {
@@ -106,7 +110,8 @@ impl LensCamera {
             LensOrigin::EntrancePupil => projection_center_z_mm,
             LensOrigin::FirstVertex => 0.0,
         };
-        Ok(Self { settings, bands: bands.clone(), lenses, bounds, micro_array, origin_z_mm, projection_center_z_mm })
+        let bands = bands.clone();
+        Ok(Self { settings, bands, lenses, bounds, micro_array, origin_z_mm, projection_center_z_mm, ghosts: None })
     }
 
     /// Returns the camera with larger bounds of its exit pupil: the same picture, with more rays lost.

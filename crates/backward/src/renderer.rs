@@ -202,7 +202,7 @@ impl<'a> Renderer<'a> {
         let RenderSettings { samples_per_pass, seed, .. } = self.settings;
         let (n_bands, n_pixels, grid) = (self.film.n_bands, tile.pixels.len(), self.camera.pixels());
         let (mut sums, mut counts) = (vec![0.0; n_bands * n_pixels], vec![0_u32; n_bands]);
-        let mut rays = CameraRays::default();
+        let (mut rays, mut ghosts) = (CameraRays::default(), CameraRays::default());
         let rotation = mix(tile.number ^ mix(seed as u32)) as usize % n_bands;
         for sample in 0..samples_per_pass {
             // Make the rays of the whole tile for eight wavelengths.
@@ -214,14 +214,21 @@ impl<'a> Renderer<'a> {
             let in_order = self.n_passes as usize % n_bands * samples_per_pass as usize + sample as usize;
             let nodes = self.packets.nodes_of(rotation + in_order);
             self.camera.rays(&samples, &nodes, &mut rays);
+            let has_ghosts = self.camera.ghost_rays(&samples, &nodes, &mut ghosts);
             // Find the light along each, and add it to its band.
             for (i, PixelSample { random, .. }) in samples.iter().enumerate() {
                 cancel.check()?;
                 let share = f64::from(random.pair(WAVELENGTH_PAIR)[0]);
                 let wavelengths_nm = nodes.map(|node| self.packets.wavelength_nm(node, share) as f32);
                 let radiance = self.packet_radiance(&rays, (i, n_pixels), &wavelengths_nm, random);
-                for (node, value) in nodes.iter().zip(radiance) {
-                    sums[i * n_bands + Packets::band_of(*node)] += f64::from(value);
+                let mut add = |radiance: [f32; PACKET]| {
+                    for (node, value) in nodes.iter().zip(radiance) {
+                        sums[i * n_bands + Packets::band_of(*node)] += f64::from(value);
+                    }
+                };
+                add(radiance);
+                if has_ghosts {
+                    add(self.packet_radiance(&ghosts, (i, n_pixels), &wavelengths_nm, random));
                 }
             }
             nodes.iter().for_each(|&node| counts[Packets::band_of(node)] += 1);

@@ -203,7 +203,7 @@ fn spot_table(analysis: &LensAnalysis) -> String {
         "radius µm",
         "σx µm",
         "σy µm",
-        "passes",
+        "rays",
         "rms waves",
         "Strehl",
     ];
@@ -219,7 +219,7 @@ fn spot_table(analysis: &LensAnalysis) -> String {
             cell(spot.radius_um, 3),
             cell(spot.sigma_x_um, 3),
             cell(spot.sigma_y_um, 3),
-            format!("{:.4}", spot.transmission),
+            format!("{:.4}", spot.ray_share),
             cell(wavefront.map(|w| w.rms_waves), 4),
             cell(wavefront.and_then(|w| w.strehl), 4),
         ]);

@@ -4,7 +4,9 @@ use std::{any::TypeId, ffi::OsString, path::PathBuf};
 
 use clap::{Arg, Args, CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
-use dioptric_pipeline::{BlurSpec, BorderSpec, Crop, DualPixelSpec, ExrSamples, FilterSpec, PipelineError};
+use dioptric_pipeline::{
+    BlurSpec, BorderSpec, Crop, DualPixelSpec, ExrSamples, FilterSpec, LensReflections, PipelineError,
+};
 
 pub(crate) use crate::common::Common;
 use crate::{
@@ -252,6 +254,10 @@ pub(crate) struct RunArgs {
     /// Strength γ of ray bending, in place of that of its kind
     #[arg(long, value_name = "G", help_heading = heading::SIMULATION)]
     pub(crate) gamma: Option<f64>,
+    /// Light that surfaces of the lens reflect: 'off', it is left out; 'ghosts', what two of them reflect, once each, falls on the film
+    /// [default: off]
+    #[arg(long, value_name = "KIND", help_heading = heading::SIMULATION)]
+    pub(crate) lens_reflections: Option<LensReflections>,
     /// Of older command lines, ignored: point spreads are no longer sampled
     #[arg(long, value_name = "KIND", hide = true)]
     pub(crate) bank: Option<String>,

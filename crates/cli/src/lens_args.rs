@@ -388,6 +388,10 @@ pub(crate) struct LensGhostsArgs {
     /// Rays over the rim of the first surface
     #[arg(long, value_name = "N", default_value_t = 20_000)]
     pub(crate) n_rays: usize,
+    /// Also writes a picture of all ghosts of the source on that film, without its image (.png): of one field; at 420 to 680 nm unless
+    /// wavelengths are given
+    #[arg(long, short, value_name = "F.png")]
+    pub(crate) out: Option<PathBuf>,
 }
 
 /// Something to do with glasses.

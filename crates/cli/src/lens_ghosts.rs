@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use dioptric_analysis::{FilmPlace, FilmUse, GhostTable, GhostTableRequest};
-use dioptric_pipeline::parse_numbers;
+use dioptric_pipeline::{parse_numbers, write_seen_png};
 
 use crate::{
     args::Common,
@@ -14,6 +14,10 @@ use crate::{
 
 /// Rows of a field that are printed; JSON has all.
 const MOST_ROWS: usize = 12;
+/// Wavelengths of a picture where none are asked for, nm, and its columns.
+const PICTURE_NM: [f64; 14] =
+    [420.0, 440.0, 460.0, 480.0, 500.0, 520.0, 540.0, 560.0, 580.0, 600.0, 620.0, 640.0, 660.0, 680.0];
+const PICTURE_COLUMNS: usize = 900;
 /// Fields where neither the command nor the lens's file names some, degrees.
 const USUAL_FIELDS_DEG: [f64; 3] = [0.0, 5.0, 10.0];
 
@@ -45,6 +49,15 @@ pub(crate) fn run(arguments: &LensGhostsArgs, common: &Common) -> anyhow::Result
     let FilmPlace { distance_mm: film_distance_mm, origin } = arguments.film.of(&used).place(&used.lens, of)?;
     remark(common.quiet, &format!("film {film_distance_mm:.4} mm behind the last vertex: {origin}"));
     let film_mm = film_size(&arguments.film_size_mm)?;
+    if let Some(out) = &arguments.out {
+        let is_png = out.as_os_str() == "-" || out.extension().is_some_and(|kind| kind.eq_ignore_ascii_case("png"));
+        anyhow::ensure!(is_png, "{}: ghosts are pictured as .png", out.display());
+        let n = fields_deg.len();
+        anyhow::ensure!(
+            n == 1,
+            "--out pictures the ghosts of one source, found {n} fields: expected one, as --fields-deg 10"
+        );
+    }
     let request = GhostTableRequest {
         fields_deg,
         wavelengths_nm,
@@ -54,6 +67,15 @@ pub(crate) fn run(arguments: &LensGhostsArgs, common: &Common) -> anyhow::Result
         n_rays: arguments.n_rays,
     };
     let table = request.compute(&used.lens)?;
+    if let Some(out) = &arguments.out {
+        let wavelengths_nm = match arguments.bands.nm()? {
+            Some(list) => list,
+            None => PICTURE_NM.to_vec(),
+        };
+        let picture = GhostTableRequest { wavelengths_nm, ..request }.picture(&used.lens, PICTURE_COLUMNS)?;
+        write_seen_png(&picture, 1, out)?;
+        remark(common.quiet, &format!("{}: brightest per cent white", out.display()));
+    }
     if common.json { print_json(&table) } else { print(&in_words(&table)?) }
 }
 

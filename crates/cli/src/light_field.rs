@@ -40,7 +40,9 @@ pub(crate) fn run(arguments: &LightFieldArgs, common: &Common) -> anyhow::Result
     let depths_m = if arguments.refocus_m.is_empty() { series(&field, &search) } else { arguments.refocus_m.clone() };
     let report = write_light_field(&field, &estimate, &depths_m, staged.path())?;
     if arguments.irradiance.is_none() && camera_has_array(&kept) {
-        kept.irradiance(&clock, &cancel)?.write_exr(&staged.path().join(IRRADIANCE_FILE), ExrSamples::Single)?;
+        let white = kept.white_of(&clock, &cancel)?;
+        let irradiance = kept.irradiance(&clock, &cancel)?;
+        irradiance.write_exr_under(&white, &staged.path().join(IRRADIANCE_FILE), ExrSamples::Single)?;
     }
     staged.commit()?;
     drop(clock);

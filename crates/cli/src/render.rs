@@ -9,10 +9,10 @@ use std::{
 use anyhow::{Context, bail};
 use dioptric_analysis::{Run, RunReport};
 use dioptric_pipeline::{
-    Camera, Crop, FilmSpec, KeptCamera, LensReadOptions, LensSpec, LightPaths, PipelineError, Progress, RenderEffort,
-    RenderMethod, Rendering, RenderingSummary, SceneSource, SceneSpec, SensorSpec, Silent, Stage, Staged, StopSpec,
-    WavelengthSpec, WorldRender, WorldSpec, WorldView, parse_white, with_exposure_s, world_camera, write_json,
-    write_scene, write_seen_png,
+    Camera, Crop, FilmSpec, KeptCamera, LensReadOptions, LensReflections, LensSpec, LightPaths, PipelineError,
+    Progress, RenderEffort, RenderMethod, Rendering, RenderingSummary, SceneSource, SceneSpec, SensorSpec, Silent,
+    Stage, Staged, StopSpec, WavelengthSpec, WorldRender, WorldSpec, WorldView, parse_white, with_exposure_s,
+    world_camera, write_json, write_scene, write_seen_png,
 };
 use dioptric_report::write_run;
 use dioptric_spectrum::{Cancel, WavelengthGrid};
@@ -79,6 +79,11 @@ pub(crate) fn run(arguments: &RenderArgs, common: &Common) -> anyhow::Result<()>
         let grid = camera.wavelengths.grid()?.map_or_else(|| WavelengthGrid::uniform(400.0, 700.0, 10.0), Ok)?;
         let (first_nm, last_nm) = grid.range_nm();
         tell(&world.note_on_bands(first_nm, last_nm).into_iter().collect::<Vec<_>>(), common);
+        if arguments.lens_reflections == Some(LensReflections::Ghosts) {
+            bail!(
+                "--lens-reflections ghosts is of a lens, expected --lens or --camera: the camera of the world's file has none"
+            );
+        }
         let render = WorldRender::of_own_camera(world.clone(), &own, &spec, grid)?;
         let render = cropped(render, arguments)?;
         return render_without_sensor(arguments, common, (&render, &clock, &cancel), &|rendering| {
@@ -189,6 +194,7 @@ fn change_lens(camera: &mut Camera, arguments: &RenderArgs) -> anyhow::Result<()
     if let Some(kind) = arguments.diffraction {
         camera.diffraction = kind.into();
     }
+    camera.lens_reflections = arguments.lens_reflections.unwrap_or(camera.lens_reflections);
     Ok(())
 }
 

@@ -3,7 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand, ValueEnum};
-use dioptric_pipeline::{Crop, Diffraction, PipelineError, WorldLamp, WorldSky, WorldView, parse_numbers};
+use dioptric_pipeline::{
+    Crop, Diffraction, LensReflections, PipelineError, WorldLamp, WorldSky, WorldView, parse_numbers,
+};
 
 use crate::lens_args::{BandArgs, FilmArgs, LensStateArgs};
 
@@ -62,6 +64,10 @@ pub(crate) struct RenderArgs {
     /// Diffraction at the stop [default: the camera's]
     #[arg(long, value_name = "KIND", value_enum, help_heading = "Simulation")]
     pub(crate) diffraction: Option<RayDiffraction>,
+    /// Light that surfaces of the lens reflect: 'off', it is left out; 'ghosts', what two of them reflect, once each, falls on the film
+    /// [default: the camera's]
+    #[arg(long, value_name = "KIND", help_heading = "Simulation")]
+    pub(crate) lens_reflections: Option<LensReflections>,
     #[command(flatten)]
     pub(crate) bands: BandArgs,
     /// Sensor, a file or the name of a built-in one

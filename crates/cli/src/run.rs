@@ -251,6 +251,7 @@ fn change_lens(camera: &mut Camera, arguments: &RunArgs) -> anyhow::Result<()> {
     if arguments.bank.is_some() || arguments.bank_error.is_some() {
         camera.bank = RetiredBank::STATED;
     }
+    camera.lens_reflections = arguments.lens_reflections.unwrap_or(camera.lens_reflections);
     camera.blur = arguments.blur.unwrap_or(camera.blur);
     camera.border = arguments.border.unwrap_or(camera.border);
     Ok(())
@@ -352,7 +353,7 @@ pub(crate) fn parse_size(text: &str) -> anyhow::Result<(usize, usize)> {
 
 pub(crate) fn summary(report: &RunReport, total_s: f64, out: &Path) -> String {
     format!(
-        "{}: {}{} × {} pixels of {} µm on {}, {} bands, {} ms, {:.1} s\n{}\n",
+        "{}: {}{} × {} pixels of {} µm on {}, {} bands{}, {} ms, {:.1} s\n{}\n",
         report.camera.name,
         report.lens.t_number.map_or_else(String::new, |t| format!("T/{:.2}, ", t.abs())),
         report.film.columns,
@@ -360,6 +361,7 @@ pub(crate) fn summary(report: &RunReport, total_s: f64, out: &Path) -> String {
         number(report.film.pitch_um),
         report.sensor.sensor,
         report.irradiance.wavelengths_nm.len(),
+        report.irradiance.reflections.in_words().map_or_else(String::new, |words| format!(", {words}")),
         milliseconds(report.sensor.exposure_time_s),
         total_s,
         out.join("report.html").display(),

@@ -136,6 +136,11 @@ impl Imaging {
             + self.kept().size_bytes
     }
 
+    /// The points beside the scene; none for one where no film point looks.
+    pub(crate) fn points_beside(&self) -> &[Option<Beside>] {
+        &self.points
+    }
+
     /// The points that lie behind the first surface, and those where no film point looks.
     pub(crate) fn points_unseen(&self) -> (usize, usize) {
         let behind = self.points.iter().flatten().filter(|point| point.is_behind()).count();

@@ -9,6 +9,7 @@ use ndarray::Array2;
 use crate::{
     BandKernels, BandRadiance, ForwardError, ImagingSpec, SceneGeometry, SceneRadiance, Sink,
     imaging::Imaging,
+    points::Beside,
     stopwatch::{Clock, ImagingTimes, Stopwatch},
     views::{Framed, Views},
     work::{Watch, Work},
@@ -67,6 +68,11 @@ impl ImagingPlan {
     /// focus, [`BlurMode::Views`](crate::BlurMode::Views) tells them apart.
     pub fn narrow_fraction(&self) -> f64 {
         self.views.first().scene.narrow_fraction
+    }
+
+    /// The points beside the scene, as they lie before the lens.
+    pub(crate) fn points_beside(&self) -> &[Option<Beside>] {
+        self.views.first().points_beside()
     }
 
     /// How many of the points beside the scene lie behind its first surface, and how many where no point of the film looks.

@@ -85,6 +85,11 @@ impl Beside {
         scene.points.iter().map(of).collect()
     }
 
+    /// Returns its direction in tangents, its depth in dioptres, and the area in tangents times radiance of a point of brightness 1.
+    pub(crate) fn seen_at(&self) -> (DVec2, f64, f64) {
+        (self.field_tan, self.dioptres, self.tan2)
+    }
+
     /// Whether it lies behind the first surface.
     pub(crate) fn is_behind(&self) -> bool {
         self.before.is_some()

@@ -1,5 +1,8 @@
 //! Ghosts: light that surfaces of a lens reflect twice on its way to the film.
 
+mod beams;
+mod from_film;
+
 use glam::DVec2;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -10,6 +13,11 @@ use crate::{
     reversed::mirrored,
     trace::{GhostTree, LightPass, Real, SideLight, Step},
     transmission::{EXACT_TERMS, GHOST_TERMS},
+};
+
+pub use self::{
+    beams::{GhostBeam, GhostBeams},
+    from_film::{FilmGhosts, GhostRay},
 };
 
 /// Rays that one task sends through the tree of all pairs.
@@ -26,6 +34,9 @@ pub struct GhostRequest {
     pub film_distance_mm: f64,
     /// About how many rays fall on the rim of the first surface.
     pub n_rays: usize,
+    /// z of the plane in which they are spread over the circle of that rim, mm: [that of the rim itself](MonoLens::front_rim_z_mm) has all light that the
+    /// surface gets; in others, as the vertex plane, slanted light passes beside the circle.
+    pub rim_z_mm: f64,
     /// Half the width and half the height of the film, mm, of which the light on it is counted; `None` for a film without ends.
     pub film_half_mm: Option<DVec2>,
 }
@@ -33,7 +44,7 @@ pub struct GhostRequest {
 /// Light that reaches the film one way.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct GhostLight {
-    /// Over the light that falls on the circle of the first surface's rim, in the plane of its vertex.
+    /// Over the light that falls on the circle of the first surface's rim.
     pub power: f64,
     /// The same of what falls within the ends of the film.
     pub power_on_film: f64,
@@ -125,6 +136,26 @@ impl MonoLens {
     /// When the lens is tilted or decentered or has mirrors, gratings or an ideal lens, or the film is not behind it.
     pub fn ghosts(&self, request: &GhostRequest) -> Result<Ghosts, OpticsError> {
         let film_distance_mm = request.film_distance_mm;
+        self.check_ghosts(film_distance_mm)?;
+        let reflects = |i: &usize| {
+            self.losses.as_ref().is_some_and(|losses| losses.surfaces()[*i].back::<f64>(false, EXACT_TERMS).is_some())
+        };
+        let reflecting: Vec<usize> = (0..self.n_surfaces()).filter(reflects).collect();
+        // Many rays make up for the last digits of each.
+        Ok(match request.n_rays > MOST_DOUBLE {
+            true => self.traced::<f32>(&self.ghost_tree(film_distance_mm, false, GHOST_TERMS), request, &reflecting),
+            false => self.traced::<f64>(&self.ghost_tree(film_distance_mm, false, EXACT_TERMS), request, &reflecting),
+        })
+    }
+
+    /// z of the plane of the first surface's rim, mm.
+    pub fn front_rim_z_mm(&self) -> f64 {
+        let sag_mm = self.front().sag_at_mm(0.0, self.semi_aperture_mm(0));
+        if sag_mm.is_finite() { sag_mm } else { 0.0 }
+    }
+
+    /// Checks that ghosts can be followed to a film so far behind the last vertex.
+    fn check_ghosts(&self, film_distance_mm: f64) -> Result<(), OpticsError> {
         let refuse = |reason: &str| {
             let reason = format!("{}: ghosts are followed {reason}", self.name());
             Err(OpticsError::Coating { reason })
@@ -132,21 +163,18 @@ impl MonoLens {
         if self.placements().is_some() {
             return refuse("through centered lenses without mirrors and gratings alone");
         }
-        if !(film_distance_mm.is_finite()) {
+        if !self.has_plain_film() {
+            return refuse("to flat films alone");
+        }
+        if !film_distance_mm.is_finite() {
             return refuse("to a film at a finite distance alone");
         }
-        let reflects = |i: &usize| {
-            self.losses.as_ref().is_some_and(|losses| losses.surfaces()[*i].back::<f64>(false, EXACT_TERMS).is_some())
-        };
-        let reflecting: Vec<usize> = (0..self.n_surfaces()).filter(reflects).collect();
-        // Many rays make up for the last digits of each.
-        Ok(match request.n_rays > MOST_DOUBLE {
-            true => self.traced::<f32>(&self.ghost_tree(film_distance_mm, GHOST_TERMS), request, &reflecting),
-            false => self.traced::<f64>(&self.ghost_tree(film_distance_mm, EXACT_TERMS), request, &reflecting),
-        })
+        Ok(())
     }
 
-    fn ghost_tree<T: Real>(&self, film_mm: f64, least_terms: [f64; 4]) -> GhostTree<T> {
+    /// Returns the tree of all pairs for light that comes from the scene or, with `is_from_film`, from the film, which then goes to a plane so
+    /// far before the first vertex.
+    fn ghost_tree<T: Real>(&self, film_mm: f64, is_from_film: bool, least_terms: [f64; 4]) -> GhostTree<T> {
         let steps = self.steps_for(f64::NEG_INFINITY);
         let backward: Vec<Step> = steps.iter().map(mirrored).collect();
         let n = steps.len();
@@ -168,6 +196,12 @@ impl MonoLens {
             };
             (0..n).map(side).collect()
         };
+        if is_from_film {
+            let [steps, backward] =
+                [&steps[..], &backward].map(|steps| steps.iter().rev().cloned().collect::<Vec<_>>());
+            let [lit, lit_back] = [true, false].map(|is_from_behind| sides(is_from_behind).into_iter().rev().collect());
+            return GhostTree::new([&backward, &steps], [lit, lit_back], film_mm);
+        }
         GhostTree::new([&steps, &backward], [sides(false), sides(true)], film_mm)
     }
 
@@ -178,7 +212,7 @@ impl MonoLens {
         let weight = |target: &DVec2| match request.point {
             ObjectPoint::Infinite(_) => 1.0,
             ObjectPoint::Finite(place) => {
-                let way = target.extend(0.0) - place;
+                let way = target.extend(request.rim_z_mm) - place;
                 way.z.abs() / way.length().powi(3)
             }
         };
@@ -189,8 +223,8 @@ impl MonoLens {
         let half_mm = request.film_half_mm.unwrap_or(DVec2::INFINITY);
         let of_chunk = |(targets, weights): (&[DVec2], &[f64])| {
             let mut sums = vec![Sums::default(); 1 + n * n];
-            T::with_slices(&self.rays_towards(&request.point, targets, 0.0, 0.0), |rays| {
-                tree.trace(&rays, &mut |pair, start, [x, y], shares| {
+            T::with_slices(&self.rays_towards(&request.point, targets, request.rim_z_mm, 0.0), |rays| {
+                tree.trace(&rays, &mut |pair, start, [x, y, ..], shares| {
                     let here = &mut sums[at(pair)];
                     for (i, share) in shares.iter().enumerate().filter(|(_, share)| **share > 0.0) {
                         let power = share * weights[start + i];

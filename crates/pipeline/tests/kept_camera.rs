@@ -2,8 +2,9 @@
 #![expect(clippy::unwrap_used, reason = "a helper of tests fails by panicking")]
 
 use dioptric_pipeline::{
-    BlurSpec, Camera, Capture, Diffraction, ExrSamples, FilmSpec, FocusSpec, Given, KeptCamera, PaintReach,
-    PipelineError, Quality, SceneSource, SensorSpec, Silent, StageCounts, StopSpec, WavelengthSpec, with_exposure_s,
+    BlurSpec, Camera, Capture, Diffraction, ExrSamples, FilmSpec, FocusSpec, Given, KeptCamera, LensReflections,
+    PaintReach, PipelineError, Quality, SceneSource, SensorSpec, Silent, StageCounts, StopSpec, WavelengthSpec,
+    with_exposure_s,
 };
 use dioptric_scene::{ExrParts, write_spectral_exr};
 use dioptric_sensor::WhiteBalance;
@@ -86,6 +87,7 @@ fn focus_diffraction_and_blur_start_at_film_bank_and_plan() {
     check(|camera| camera.focus = FocusSpec::DistanceMm(2000.0), [0, 0, 1, 1, 1, 1, 1, 1, 1]);
     check(|camera| camera.diffraction = Diffraction::None, [0, 0, 0, 1, 1, 1, 1, 1, 1]);
     check(|camera| camera.blur = BlurSpec::Pointwise, [0, 0, 0, 0, 1, 1, 1, 1, 1]);
+    check(|camera| camera.lens_reflections = LensReflections::Ghosts, [0, 0, 0, 0, 0, 1, 1, 1, 1]);
 }
 
 #[test]

@@ -142,6 +142,8 @@ impl Camera {
     ///     Layers of depth; each sample on its own, as in the paper; layers through N parts of the pupil.
     /// border : {"hold", "mirror", "black"}
     ///     What the lens sees beyond the ends of the scene: the samples at its border, the scene mirrored, or nothing.
+    /// lens_reflections : {"off", "ghosts"}
+    ///     Light that surfaces of the lens reflect: left out, or what two of them reflect falls on the film.
     /// scene : Scene or path
     /// fov_deg, depth_m, width_mm, distance_mm, fill_depth, hidden, points, white_level, quantity, unit, scale, scene_wavelengths_nm, variable,
     /// axes, no_data, depth, depth_unit, depth_kind, depth_variable, view, panorama
@@ -183,7 +185,7 @@ impl Camera {
     /// name : str
     #[pyo3(signature = (**changes), text_signature = "($self, *, name=None, lens=None, f_number=None, stop_mm=None, coating=None, blades=None, blade_rotation_deg=None, blade_curvature=None, focus_mm=None, film_mm=None, tilt_deg=None, \
 swing_deg=None, rise_mm=None, shift_mm=None, sensor=None, film=None, crop=None, pixels=None, pixel_um=None, \
-dual_pixel=None, filters=None, diffraction=None, gamma=None, blur=None, border=None, bank=None, bank_error=None, \
+dual_pixel=None, filters=None, diffraction=None, gamma=None, blur=None, border=None, lens_reflections=None, bank=None, bank_error=None, \
 scene=None, fov_deg=None, depth_m=None, width_mm=None, distance_mm=None, fill_depth=None, hidden=None, points=None, \
 white_level=None, quantity=None, unit=None, scale=None, scene_wavelengths_nm=None, variable=None, axes=None, \
 no_data=None, depth=None, depth_unit=None, depth_kind=None, depth_variable=None, view=None, panorama=None, illuminant=None, \

@@ -60,6 +60,7 @@ const ALL: &[&str] = &[
     "gamma",
     "blur",
     "border",
+    "lens_reflections",
     "bank",
     "bank_error",
     "scene",
@@ -334,6 +335,11 @@ fn set_imaging(camera: &mut Camera, key: &str, value: &Bound<'_, PyAny>) -> PyRe
             let found = word(key, value)?;
             let expected = "'hold', 'mirror' or 'black'";
             camera.border = found.parse().map_err(|_| wrong(key, format!("'{found}'"), expected))?;
+        }
+        "lens_reflections" => {
+            let found = word(key, value)?;
+            camera.lens_reflections =
+                found.parse().map_err(|_| wrong(key, format!("'{found}'"), "'off' or 'ghosts'"))?;
         }
         // Of older programs; the report notes it.
         "bank" | "bank_error" => camera.bank = RetiredBank::STATED,

@@ -304,7 +304,7 @@ impl Bench {
             radius_um: um(spot.radius_about_chief_mm()),
             sigma_x_um: um(sigma_x_mm),
             sigma_y_um: um(sigma_y_mm),
-            transmission: spot.transmission(),
+            ray_share: spot.ray_share(),
             wavefront: wavefront.map(|wavefront| WavefrontRow {
                 rms_waves: wavefront.rms_waves(),
                 peak_to_valley_waves: wavefront.peak_to_valley_waves(),

@@ -2,11 +2,13 @@
 
 use std::f64::consts::TAU;
 
+use dioptric_forward::{Film, GhostFilm, GhostSources};
 use dioptric_optics::{
     Ghost, GhostLight, GhostRequest, Lens, MonoLens, ObjectPoint,
     glam::{DVec2, DVec3},
 };
 use dioptric_pipeline::PipelineError;
+use dioptric_spectrum::{Cancel, Quantity, SpectralImage, WavelengthGrid};
 use serde::Serialize;
 
 /// What the ghosts of a lens are wanted for.
@@ -144,6 +146,33 @@ impl GhostTableRequest {
         Ok(GhostTable { lens: lens.name().to_owned(), film_distance_mm, film_mm, distance_mm, n_rays, fields, pairs })
     }
 
+    /// Returns a picture of all ghosts of the source, whose image is left out: spectral irradiance on a film of so many columns, W m⁻² nm⁻¹, for a far
+    /// source that brings 1 W m⁻² nm⁻¹ to a surface facing it, or a near one of 1 W sr⁻¹ nm⁻¹.
+    ///
+    /// # Errors
+    /// As [`compute`](Self::compute), and when there is more than one field.
+    pub fn picture(&self, lens: &Lens, columns: usize) -> Result<SpectralImage, PipelineError> {
+        self.check()?;
+        let [field_deg] = self.fields_deg[..] else {
+            let (origin, found) = ("the picture of ghosts".to_owned(), format!("{} fields", self.fields_deg.len()));
+            return Err(PipelineError::Value { origin, key: "fields_deg", found, expected: "one".to_owned() });
+        };
+        let grid = WavelengthGrid::new(self.wavelengths_nm.clone())?;
+        let [width_mm, height_mm] = self.film_mm;
+        let rows = ((columns as f64 * height_mm / width_mm).round() as usize).max(1);
+        let film = Film::centered(rows, columns, 1e3 * width_mm / columns as f64);
+        let tan = field_deg.to_radians().tan();
+        let mut planes = Vec::new();
+        for (band, &wavelength_nm) in self.wavelengths_nm.iter().enumerate() {
+            let lens = lens.at(wavelength_nm)?;
+            let depth_m = 1e-3 * (self.distance_mm + lens.projection_center_z_mm());
+            let source = GhostSources::of_point(DVec2::new(0.0, tan), depth_m, grid.len(), self.n_rays);
+            let on = GhostFilm { lens: &lens, film_distance_mm: self.film_distance_mm, film };
+            planes.push(source.irradiance(band, &on, &Cancel::new())?);
+        }
+        Ok(SpectralImage::new(Quantity::Irradiance, grid, planes)?.with_pitch_um(film.pitch_um))
+    }
+
     fn check(&self) -> Result<(), PipelineError> {
         let wrong = |key: &'static str, found: String, expected: &str| {
             let (origin, expected) = ("the ghosts".to_owned(), expected.to_owned());
@@ -177,6 +206,7 @@ impl GhostTableRequest {
             point,
             film_distance_mm: self.film_distance_mm,
             n_rays: self.n_rays,
+            rim_z_mm: mono.front_rim_z_mm(),
             film_half_mm: Some(0.5 * DVec2::from_array(self.film_mm)),
         })?;
         let row = |ghost: &Ghost| {

@@ -183,8 +183,8 @@ pub struct SpotRow {
     pub sigma_x_um: Option<f64>,
     /// Root mean square along y, µm.
     pub sigma_y_um: Option<f64>,
-    /// The share of the rays through the stop that rims let pass.
-    pub transmission: f64,
+    /// The share of the rays through the stop that rims let pass, whatever light they lose at surfaces and in glass.
+    pub ray_share: f64,
     /// The wavefront, about the film point for which it is best.
     pub wavefront: Option<WavefrontRow>,
     /// The true pupil.

@@ -7,7 +7,8 @@ mod pixel_optics;
 mod statistics;
 
 use dioptric_pipeline::{
-    AberrationSummary, Camera, Capture, FilmPart, PipelineError, SceneSource, display::LEAST_DARK_FRACTION, number,
+    AberrationSummary, Camera, Capture, FilmPart, LensReflections, PipelineError, SceneSource,
+    display::LEAST_DARK_FRACTION, number,
 };
 use dioptric_psf::{Diffraction, LensImageModel};
 use dioptric_scene::{Pattern, SceneLight};
@@ -135,6 +136,37 @@ pub struct IrradianceData {
     pub max_w_m2_nm: Vec<f64>,
     /// Mean illuminance, lux.
     pub mean_lux: f64,
+    /// The light that surfaces of the lens reflect.
+    pub reflections: ReflectionData,
+}
+
+/// The light that surfaces of the lens reflect to the film.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct ReflectionData {
+    /// What became of it.
+    pub lens_reflections: LensReflections,
+    /// The share of all light on the film that it is, of all bands together; null where it is left out, or rays from the film brought it.
+    pub share: Option<f64>,
+    /// About what two surfaces reflect to the film over what the lens images there: for far points of equal brightness in three fields. Null where
+    /// ghosts of the lens are not followed.
+    pub veil: Option<f64>,
+}
+
+impl ReflectionData {
+    /// Returns it in a few words; nothing where nothing is reflected, or it is not known.
+    pub fn in_words(&self) -> Option<String> {
+        let percent = |share: f64| format!("{:.2} %", 100.0 * share);
+        match (self.lens_reflections, self.share, self.veil) {
+            (LensReflections::Ghosts, Some(share), _) => Some(format!("ghosts {} of the light", percent(share))),
+            (LensReflections::Ghosts, None, Some(veil)) => {
+                Some(format!("ghosts, about {} of the light", percent(veil)))
+            }
+            (LensReflections::Off, _, Some(veil)) if veil > 0.0 => {
+                Some(format!("ghosts left out, about {} of the light", percent(veil)))
+            }
+            _ => None,
+        }
+    }
 }
 
 /// The report on the lens before its film: the same for all runs that share lens, film, scene and model, whatever is
@@ -143,6 +175,7 @@ pub struct IrradianceData {
 pub struct RunOptics {
     lens: LensData,
     losses: Vec<LossRow>,
+    veil: Option<f64>,
 }
 
 impl RunOptics {
@@ -156,6 +189,7 @@ impl RunOptics {
         Ok(Self {
             lens: statistics::lens_data(run.capture, places.corner_tan())?,
             losses: statistics::losses(run.capture, &fields)?,
+            veil: run.capture.veil(),
         })
     }
 }
@@ -273,6 +307,11 @@ impl RunReport {
                 mean_w_m2_nm: capture.irradiance.summary.mean.clone(),
                 max_w_m2_nm: capture.irradiance.summary.max.clone(),
                 mean_lux: capture.irradiance.summary.mean_lux,
+                reflections: ReflectionData {
+                    lens_reflections: capture.camera.lens_reflections,
+                    share: capture.irradiance.summary.ghost_share,
+                    veil: optics.veil,
+                },
             },
             sensor: SensorStatistics::new(&capture.frame_parts())?,
             losses: optics.losses,

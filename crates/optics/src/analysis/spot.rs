@@ -38,7 +38,7 @@ impl SpotDiagram {
     }
 
     /// The share of the rays that arrive.
-    pub fn transmission(&self) -> f64 {
+    pub fn ray_share(&self) -> f64 {
         self.points_mm.len() as f64 / self.fates.len() as f64
     }
 
@@ -98,7 +98,7 @@ mod tests {
         // Rays at the very rim: rounding would decide their fate.
         let sampling = sampling(&lens, 6, Vignetting::Off);
         let focused = SpotDiagram::trace(&lens, &point, 50.0, &sampling);
-        assert!(focused.rms_mm().unwrap() < 1e-12 && focused.transmission() == 1.0);
+        assert!(focused.rms_mm().unwrap() < 1e-12 && focused.ray_share() == 1.0);
         assert!(focused.chief_mm.unwrap().distance(DVec2::new(-10.0, 5.0)) < 1e-12);
         let spread = SpotDiagram::trace(&lens, &point, 51.0, &sampling);
         // Similar triangles: the pupil's radius of 5 mm shrinks by 1 in 50.
@@ -119,10 +119,10 @@ mod tests {
             SpotDiagram::trace(&lens, &point, 36.0, &sampling(&lens, 8, rims))
         };
         let (clipped, whole) = (spot(0.3, Vignetting::On), spot(0.3, Vignetting::Off));
-        assert!(clipped.transmission() < 0.8 && clipped.transmission() > 0.2);
-        assert!(whole.transmission() > clipped.transmission() && whole.chief_mm == clipped.chief_mm);
+        assert!(clipped.ray_share() < 0.8 && clipped.ray_share() > 0.2);
+        assert!(whole.ray_share() > clipped.ray_share() && whole.chief_mm == clipped.chief_mm);
         assert_eq!(clipped.fates.iter().filter(|f| f.is_in_flight()).count(), clipped.points_mm.len());
         let dark = spot(1.2, Vignetting::On);
-        assert!(dark.centroid_mm().is_none() && dark.rms_mm().is_none() && dark.transmission() == 0.0);
+        assert!(dark.centroid_mm().is_none() && dark.rms_mm().is_none() && dark.ray_share() == 0.0);
     }
 }

@@ -91,12 +91,12 @@ impl<T: Real> GhostTree<T> {
     }
 
     /// Sends rays through the lens. `note` sees what reaches the film: the pair of surfaces that light comes back from, the first of them
-    /// the one that it meets first, or none of light that goes straight on; the number of the first ray; places on the film, mm, and the
-    /// shares of the light, 0 of rays that end.
+    /// the one that it meets first, or none of light that goes straight on; the number of the first ray; x and y on the film, mm, and the
+    /// directions there; and the shares of the light, 0 of rays that end.
     pub(crate) fn trace(
         &self,
         rays: &RaySlices<'_, T>,
-        note: &mut impl FnMut(Option<[usize; 2]>, usize, [&[T]; 2], &[f64]),
+        note: &mut impl FnMut(Option<[usize; 2]>, usize, [&[T]; 5], &[f64]),
     ) {
         let n = self.forward.len();
         // Where the light is before each surface and behind the last, and room for what is on its way back and forward again.
@@ -146,7 +146,7 @@ impl<T: Real> GhostTree<T> {
         pair: Option<[usize; 2]>,
         start: usize,
         lit: &mut Lit<T>,
-        note: &mut impl FnMut(Option<[usize; 2]>, usize, [&[T]; 2], &[f64]),
+        note: &mut impl FnMut(Option<[usize; 2]>, usize, [&[T]; 5], &[f64]),
     ) {
         if !lit.is_any_alive() {
             return;
@@ -157,7 +157,7 @@ impl<T: Real> GhostTree<T> {
             for (i, share) in shares.iter_mut().enumerate().filter(|(i, _)| block.alive[*i] != T::NO) {
                 *share = lane.share(i);
             }
-            note(pair, start + k * LANES, [&block.x, &block.y], &shares);
+            note(pair, start + k * LANES, [&block.x, &block.y, &block.l, &block.m, &block.n], &shares);
         }
     }
 }

@@ -20,7 +20,8 @@ fn lens(rows: &[[f64; 3]], semi_aperture_mm: f64) -> Lens {
 
 fn request(field_rad: f64, film_distance_mm: f64, n_rays: usize) -> GhostRequest {
     let point = ObjectPoint::Infinite(DVec3::new(0.0, field_rad.sin(), field_rad.cos()));
-    GhostRequest { point, film_distance_mm, n_rays, film_half_mm: None }
+    // As the tracers that it is compared with have it.
+    GhostRequest { point, film_distance_mm, n_rays, rim_z_mm: 0.0, film_half_mm: None }
 }
 
 /// A stop of this radius right before a lens of wide rims.

@@ -12,6 +12,7 @@ mod lens;
 mod light_field;
 mod movements;
 mod photodiodes;
+mod reflections;
 mod scene;
 mod sensor_options;
 mod video;
@@ -41,6 +42,7 @@ pub use lens::{CoatingSpec, LensReadOptions, REFERENCE_WAVELENGTH_NM, nearest_to
 pub use light_field::LightFieldSpec;
 pub use movements::Movements;
 pub use photodiodes::Photodiodes;
+pub use reflections::LensReflections;
 pub(crate) use scene::bands_or_own;
 pub use scene::{FlatSize, SceneSource, SceneSpec};
 pub use sensor_options::SensorOptions;
@@ -91,6 +93,9 @@ pub struct Camera {
     #[serde(default, skip_serializing)]
     #[cfg_attr(feature = "schema", schemars(skip))]
     pub bank: RetiredBank,
+    /// What becomes of the light that surfaces of the lens reflect.
+    #[serde(default)]
+    pub lens_reflections: LensReflections,
     /// How the point-spread functions are laid over the scene.
     #[serde(default)]
     pub blur: BlurSpec,

@@ -9,6 +9,7 @@ use super::{
     electrons::{self, PixelRates},
     film::FilmPlace,
     frames::FrameSet,
+    ghosts,
     irradiance::Irradiance,
     lens::ResolvedLens,
     lens_tables::LensAberrations,
@@ -55,6 +56,12 @@ impl Capture {
     /// The bands.
     pub fn grid(&self) -> &WavelengthGrid {
         self.irradiance.grid()
+    }
+
+    /// Returns about what two surfaces of the lens reflect to the film over what it images there, for far points of equal brightness in three
+    /// fields; none where ghosts of the lens are not followed.
+    pub fn veil(&self) -> Option<f64> {
+        ghosts::veil(&self.lens.reference, &self.place)
     }
 
     /// What is white on the film.

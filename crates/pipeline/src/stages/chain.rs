@@ -15,6 +15,7 @@ use super::{
     electrons::{self, PixelRates},
     film::{self, FilmPlace, Outline},
     frames::{self, FrameSet, MovedLight},
+    ghosts::Ghosts,
     irradiance::{self, Irradiance, Keeping},
     lens::{self, ResolvedLens, check_glasses},
     lens_tables::{LensAberrations, TableParts},
@@ -32,7 +33,7 @@ use super::{
     unseen_points::UnseenPoints,
     world,
 };
-use crate::{BlurSpec, DualPixelSpec, PaintingFolder, PipelineError, Progress, Stage};
+use crate::{BlurSpec, DualPixelSpec, LensReflections, PaintingFolder, PipelineError, Progress, Stage};
 
 /// The stages in their order, each asking for the ones it needs.
 #[derive(Clone, Copy)]
@@ -205,7 +206,16 @@ impl Chain<'_> {
             Some((_, number)) => folder.map(|folder| folder.of_photodiode(number)),
         };
         let keeping = Keeping { memory_bytes, folder: folder.as_ref() };
-        let irradiance = irradiance::image(&plan, scene, &place, keeping, &self.watch)?;
+        let ghosts = match inputs.reflections {
+            LensReflections::Off => None,
+            LensReflections::Ghosts => {
+                let quality = inputs.plan.bank.film.geometry.quality;
+                let n_photodiodes = inputs.plan.photodiode.map_or(1, |(spec, _)| spec.photodiodes.names().len());
+                let behind = (self.lens(&inputs.plan.bank.film.lens)?, place.clone());
+                Some(Ghosts::of(&plan, scene, behind, (quality, n_photodiodes))?)
+            }
+        };
+        let irradiance = irradiance::image((&plan, ghosts.as_ref()), scene, &place, keeping, &self.watch)?;
         let is_layered = inputs.plan.blur == BlurSpec::Layered;
         let narrow = if is_layered { NarrowSurfaces::of(&plan, scene) } else { None };
         let points = UnseenPoints::of(&plan, scene);
@@ -249,14 +259,15 @@ impl Chain<'_> {
             Ok(irradiance.without_seen())
         };
         let photodiodes = (0..n).map(irradiance).collect::<Result<Vec<_>, PipelineError>>()?;
-        let (narrow, points) = (photodiodes[0].summary.narrow_surfaces, photodiodes[0].summary.unseen_points);
+        let first = &photodiodes[0].summary;
+        let (narrow, points, ghosts) = (first.narrow_surfaces, first.unseen_points, first.ghost_share);
         let memory_bytes = match self.budget {
             Some(budget) => budget.left_beside_film(&place, photodiodes[0].grid().len(), self.kept.imaging_bytes()),
             None => u64::MAX,
         };
         let memory_bytes = memory_bytes.min(self.memory_bytes);
         let irradiance = Irradiance::of_photodiodes(photodiodes, memory_bytes)?;
-        Ok(irradiance.with_narrow_surfaces(narrow).with_unseen_points(points))
+        Ok(irradiance.with_narrow_surfaces(narrow).with_unseen_points(points).with_ghost_share(ghosts))
     }
 
     pub(super) fn electrons(&self, inputs: &ElectronInputs) -> Result<Arc<PixelRates>, PipelineError> {

@@ -17,6 +17,7 @@ use super::{
     Watch,
     band_store::{BandFolder, BandStore, read_plane, read_rows, write_plane},
     film::FilmPlace,
+    ghosts::Ghosts,
     narrow_surfaces::NarrowSurfaces,
     spec::FileStamp,
     unseen_points::UnseenPoints,
@@ -88,6 +89,9 @@ pub struct IrradianceSummary {
     pub narrow_surfaces: Option<NarrowSurfaces>,
     /// Of points beside the scene those that no pixel sees.
     pub unseen_points: Option<UnseenPoints>,
+    /// The share of the light that two surfaces of the lens reflected, where it was followed through the blur of a scene: of all bands that were
+    /// imaged together.
+    pub ghost_share: Option<f64>,
 }
 
 impl IrradianceSummary {
@@ -304,13 +308,22 @@ impl Irradiance {
         self.summary.brighten(factor);
     }
 
-    /// Returns it with the surfaces that are narrower than the pupil.
+    /// Returns it with the share of the light that surfaces reflected.
+    #[must_use]
+    pub(super) fn with_ghost_share(mut self, share: Option<f64>) -> Self {
+        self.summary.ghost_share = share;
+        self
+    }
+
+    /// Returns it with the points that no pixel sees.
     #[must_use]
     pub(super) fn with_unseen_points(mut self, points: Option<UnseenPoints>) -> Self {
         self.summary.unseen_points = points;
         self
     }
 
+    /// Returns it with the surfaces that are narrower than the pupil.
+    #[must_use]
     pub(super) fn with_narrow_surfaces(mut self, narrow: Option<NarrowSurfaces>) -> Self {
         self.summary.narrow_surfaces = narrow;
         self
@@ -403,9 +416,9 @@ pub(super) struct Keeping<'a> {
     pub(super) folder: Option<&'a BandFolder>,
 }
 
-/// Images the scene, but for bands that an earlier run left.
+/// Images the scene, but for bands that an earlier run left, and adds what surfaces of the lens reflect, where that is wanted.
 pub(super) fn image(
-    plan: &ImagingPlan,
+    (plan, ghosts): (&ImagingPlan, Option<&Ghosts>),
     scene: &Scene,
     place: &FilmPlace,
     keeping: Keeping<'_>,
@@ -430,7 +443,12 @@ pub(super) fn image(
     }
     let source = Source::of_scene(scene)?;
     let (progress, earlier) = (|fraction| watch.progress.at(Stage::Irradiance, fraction), plan.times());
-    plan.stream_from(first, &source.light(), &progress, watch.cancel, &mut |band, plane| {
+    let [mut reflected, mut all] = [0.0; 2];
+    let streamed = plan.stream_from(first, &source.light(), &progress, watch.cancel, &mut |band, mut plane| {
+        if let Some(ghosts) = ghosts {
+            reflected += ghosts.add((band, grid.centers_nm()[band]), &mut plane, watch.cancel)?;
+            all += plane.iter().map(|value| f64::from(*value)).sum::<f64>() / plane.len() as f64;
+        }
         summing.add(band, &plane);
         if let Some(store) = &mut store {
             store.append(&plane)?;
@@ -442,7 +460,10 @@ pub(super) fn image(
             cube.index_axis_mut(Axis(0), band).assign(&plane);
         }
         Ok(())
-    })?;
+    });
+    watch.cancel.check()?;
+    streamed?;
+    summing.summary.ghost_share = (all > 0.0).then(|| reflected / all);
     let times = plan.times().since(&earlier);
     if times != ImagingTimes::default() {
         watch.progress.imaged(&times);
@@ -480,6 +501,7 @@ impl Summing {
             factor: 1.0,
             narrow_surfaces: None,
             unseen_points: None,
+            ghost_share: None,
         };
         Self { to_rgb: SpectrumToRgb::shown(grid), luminous, summary }
     }
@@ -547,7 +569,7 @@ mod tests {
         let geometry = Source::of_scene(&scene).unwrap().geometry();
         let plan = ImagingPlan::new(std::sync::Arc::new(lens), &geometry, spec, &|_| {}, &cancel).unwrap();
         let keeping = Keeping { memory_bytes, folder };
-        image(&plan, &scene, &place, keeping, &Watch { progress: &Silent, cancel: &cancel }).unwrap()
+        image((&plan, None), &scene, &place, keeping, &Watch { progress: &Silent, cancel: &cancel }).unwrap()
     }
 
     #[test]

@@ -23,6 +23,7 @@ use super::{
     results::{KeptResults, StageCounts},
     scene::ResolvedScene,
     spec::{FilmInputs, IrradianceInputs, PictureInputs, Raster},
+    white_of::WhiteOf,
 };
 use crate::{Camera, PaintingFolder, PipelineError, Progress, Quality, SceneSource, Stage};
 
@@ -281,6 +282,18 @@ impl KeptCamera {
         }
         let scene = chain.scene(&inputs.scene)?;
         Ok(self.kept.depth.put(inputs.scene.geometry, scene.scene.require_depth()?.clone()))
+    }
+
+    /// Returns what is white on the film: what the irradiance there is developed by.
+    ///
+    /// # Errors
+    /// As [`capture`](Self::capture).
+    pub fn white_of(&self, progress: &dyn Progress, cancel: &Cancel) -> Result<WhiteOf, PipelineError> {
+        let inputs = self.irradiance_inputs()?;
+        let chain = self.chain(progress, cancel);
+        let (lens, scene) = (chain.lens(&inputs.plan.bank.film.lens)?, chain.summary(&inputs.scene)?);
+        let light = scene.light.as_ref().map(|light| light.illuminant.clone());
+        Ok(WhiteOf { light, lens: lens.transmittance().cloned() })
     }
 
     /// Returns the irradiance on the film.

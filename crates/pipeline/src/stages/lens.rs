@@ -40,7 +40,7 @@ impl ResolvedLens {
 
     /// Returns what of the light on the axis gets through, at the wavelengths at which the lens is known; `None` where it loses none, or
     /// no light comes along the axis.
-    fn transmittance(&self) -> Option<&Layer> {
+    pub(super) fn transmittance(&self) -> Option<&Layer> {
         let tabulate = || {
             if self.lens.is_lossless() {
                 return None;

@@ -26,6 +26,7 @@ mod electrons;
 mod film;
 mod film_reach;
 mod frames;
+mod ghosts;
 mod given;
 mod irradiance;
 mod kept;

@@ -33,6 +33,8 @@ struct Kept {
     narrow_surfaces: Option<NarrowSurfaces>,
     #[serde(default)]
     unseen_points: Option<UnseenPoints>,
+    #[serde(default)]
+    ghost_share: Option<f64>,
 }
 
 /// What the stages behind the imaging of a scene need of it beside the irradiance, so that another process takes the picture again
@@ -44,6 +46,8 @@ pub struct Imaged {
     place: FilmPlace,
     narrow_surfaces: Option<NarrowSurfaces>,
     unseen_points: Option<UnseenPoints>,
+    #[serde(default)]
+    ghost_share: Option<f64>,
 }
 
 impl Imaged {
@@ -54,6 +58,7 @@ impl Imaged {
             place: (*capture.place).clone(),
             narrow_surfaces: capture.irradiance.summary.narrow_surfaces,
             unseen_points: capture.irradiance.summary.unseen_points,
+            ghost_share: capture.irradiance.summary.ghost_share,
         }
     }
 
@@ -79,7 +84,8 @@ impl Imaged {
             1 => parts.swap_remove(0),
             _ => Irradiance::of_photodiodes(parts, u64::MAX)?,
         };
-        Ok(irradiance.with_narrow_surfaces(self.narrow_surfaces).with_unseen_points(self.unseen_points))
+        let irradiance = irradiance.with_narrow_surfaces(self.narrow_surfaces).with_unseen_points(self.unseen_points);
+        Ok(irradiance.with_ghost_share(self.ghost_share))
     }
 }
 
@@ -112,6 +118,7 @@ impl KeptCamera {
             place: (*capture.place).clone(),
             narrow_surfaces: capture.irradiance.summary.narrow_surfaces,
             unseen_points: capture.irradiance.summary.unseen_points,
+            ghost_share: capture.irradiance.summary.ghost_share,
         };
         let text = ron::ser::to_string_pretty(&kept, ron::ser::PrettyConfig::new())
             .map_err(|e| PipelineError::Write { path: folder.join(RESUME_FILE), reason: e.to_string() })?;
@@ -179,6 +186,7 @@ impl KeptCamera {
             }
         };
         let irradiance = irradiance.with_narrow_surfaces(kept.narrow_surfaces).with_unseen_points(kept.unseen_points);
+        let irradiance = irradiance.with_ghost_share(kept.ghost_share);
         if kept.camera.outputs.exr_samples == ExrSamples::Half {
             notes.push(format!("{IRRADIANCE_FILE} has half floats: its samples are those of the run to .05 %"));
         }

@@ -22,8 +22,8 @@ use super::{
 };
 use crate::{
     BlurSpec, BorderSpec, Camera, Crop, Diffraction, DualPixelSpec, FilmSpec, FilterSpec, FlatSize, FocusSpec,
-    FramesSpec, LensReadOptions, LensSpec, LightFieldSpec, Movements, PipelineError, Quality, RenderEffort,
-    SceneSource, SceneSpec, StopSpec, WavelengthSpec, WorldLamp, WorldSky, WorldSpec,
+    FramesSpec, LensReadOptions, LensReflections, LensSpec, LightFieldSpec, Movements, PipelineError, Quality,
+    RenderEffort, SceneSource, SceneSpec, StopSpec, WavelengthSpec, WorldLamp, WorldSky, WorldSpec,
 };
 
 /// A file as it was when it was looked at, so that a change of it is seen.
@@ -164,6 +164,8 @@ pub(crate) struct PlanInputs {
 pub(crate) struct IrradianceInputs {
     pub(crate) plan: PlanInputs,
     pub(crate) scene: SceneInputs,
+    /// What becomes of the light that surfaces of the lens reflect.
+    pub(crate) reflections: LensReflections,
     pub(crate) micro_array: Option<MicroArray>,
     /// The photodiodes whose irradiances it is the sum of; none for whole pixels.
     pub(crate) dual_pixel: Option<DualPixelSpec>,
@@ -369,7 +371,8 @@ impl IrradianceInputs {
         };
         let plan = PlanInputs { bank, blur: camera.blur, border: camera.border, photodiode: None };
         let mean_lux = camera.scene.mean_lux;
-        Self { plan, scene, micro_array, dual_pixel: camera.dual_pixel, mean_lux, effort }
+        let reflections = camera.lens_reflections;
+        Self { plan, scene, reflections, micro_array, dual_pixel: camera.dual_pixel, mean_lux, effort }
     }
 }
 

@@ -24,8 +24,8 @@ use super::{
     world_view::{horizontal_fov_deg, placement, world_camera},
 };
 use crate::{
-    Diffraction, PaintingFolder, PipelineError, Progress, Quality, RenderEffort, RenderMethod, SceneSource, Stage,
-    WorldLamp, WorldSky, WorldSpec, gathered::GatheredPicture, still_life,
+    Diffraction, LensReflections, PaintingFolder, PipelineError, Progress, Quality, RenderEffort, RenderMethod,
+    SceneSource, Stage, WorldLamp, WorldSky, WorldSpec, gathered::GatheredPicture, still_life,
 };
 
 /// Samples of a pass: as many as spread well, and few enough for a first picture soon.
@@ -265,8 +265,16 @@ impl WorldRender {
             diffraction: inputs.plan.bank.diffraction.hurb(),
             micro_array: inputs.micro_array,
         };
-        let identity = format!("{} {:?} {settings:?}", fingerprint(&world, spec), lens.lens);
-        let camera = Camera::Lens(Box::new(LensCamera::new(&lens.lens, &bands, settings)?));
+        let mut identity = format!("{} {:?} {settings:?}", fingerprint(&world, spec), lens.lens);
+        let camera = LensCamera::new(&lens.lens, &bands, settings)?;
+        let camera = match inputs.reflections {
+            LensReflections::Off => camera,
+            LensReflections::Ghosts => {
+                identity += " with ghosts";
+                camera.with_ghosts()?
+            }
+        };
+        let camera = Camera::Lens(Box::new(camera));
         let (paths, seed) = (spec.paths, spec.seed);
         let whole = Self { world, camera, bands, paths, seed, samples_per_pass: SAMPLES_PER_PASS, identity };
         match place.part {

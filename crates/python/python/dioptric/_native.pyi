@@ -120,6 +120,7 @@ class Camera:
         gamma: float | None = ...,
         blur: str | None = ...,
         border: str | None = ...,
+        lens_reflections: Literal["off", "ghosts"] | None = ...,
         bank: Any = ...,
         bank_error: Any = ...,
         scene: Scene | _Path | None = ...,

@@ -128,6 +128,10 @@ fn glance(report: &RunReport) -> String {
                 |share| format!("T-number: {:.1} % of the light gets through", 100.0 * share),
             ),
         ),
+        (
+            report.irradiance.reflections.in_words().unwrap_or_else(|| "–".to_owned()),
+            "light that surfaces of the lens reflect to the film".to_owned(),
+        ),
         (distance, "in focus, from the first vertex".to_owned()),
         (format!("{} × {}", film.columns, film.rows), format!("pixels of {:.2} µm", film.pitch_um)),
         (

@@ -190,6 +190,10 @@ impl Telling {
             self.text("border", &camera.border.to_string());
             self.made.border = camera.border;
         }
+        if camera.lens_reflections != self.made.lens_reflections {
+            self.text("lens_reflections", &camera.lens_reflections.to_string());
+            self.made.lens_reflections = camera.lens_reflections;
+        }
     }
 
     fn sensor(&mut self, camera: &Camera) {

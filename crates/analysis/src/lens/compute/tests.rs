@@ -23,7 +23,7 @@ fn every_part_is_there_and_agrees_with_the_others() {
     assert_eq!((analysis.reference_nm, analysis.film_distance_mm), (550.0, analysis.focus.axis_film_mm.unwrap()));
     let on_axis = &analysis.spots[1];
     // Vignetting end no ray of the axis, and its spot is round.
-    assert_eq!(on_axis.transmission, 1.0);
+    assert_eq!(on_axis.ray_share, 1.0);
     assert!((on_axis.sigma_x_um.unwrap() / on_axis.sigma_y_um.unwrap() - 1.0).abs() < 1e-9);
     let oblique = &analysis.spots[4];
     assert!(oblique.height_mm.unwrap() > 8.5 && oblique.height_mm.unwrap() < 9.2);

@@ -1,6 +1,8 @@
 //! How the picture is computed: diffraction, blur, sampling, bands; and what is written of it.
 
-use dioptric_pipeline::{BlurSpec, BorderSpec, Camera, Diffraction, ExrSamples, FrameFile, Outputs, WavelengthSpec};
+use dioptric_pipeline::{
+    BlurSpec, BorderSpec, Camera, Diffraction, ExrSamples, FrameFile, LensReflections, Outputs, WavelengthSpec,
+};
 use egui::Ui;
 
 use super::{
@@ -25,6 +27,9 @@ pub(super) fn show(ui: &mut Ui, camera: &mut Camera, desk: &Desk<'_>) {
         let words = "Factor on HURB's spread: 1 as in the paper, 1.414 in later programs";
         NumberField::even("gamma", "×", 1e-3..=100.0, 0.1..=3.0, words).show(ui, gamma);
     }
+    let kinds = [(LensReflections::Off, "left out"), (LensReflections::Ghosts, "ghosts")];
+    let words = "Light that surfaces of the lens reflect: ghosts are what two of them reflect";
+    variant(ui, "reflections", words, &mut camera.lens_reflections, &kinds);
     let blurs = [
         (BlurSpec::Layered, "layers of depth"),
         (BlurSpec::Views(16), "layers, from parts of the pupil"),

@@ -1,0 +1,109 @@
+//! Light that surfaces of a lens reflect, met from the film, against a closed form.
+#![expect(clippy::unwrap_used, reason = "a helper of tests fails by panicking")]
+
+use std::f64::consts::{FRAC_PI_2, PI};
+
+use dioptric_backward::{
+    BandSampling, Bands, Camera, LensCamera, LensCameraSettings, LensOrigin, LightPaths, PixelGrid, Placement,
+    RenderSettings, Renderer,
+};
+use dioptric_optics::{Coating, CoordinateBreak, Film, Glass, Interface, Lens, Surface, glam::DVec2};
+use dioptric_spectrum::{Cancel, WavelengthGrid};
+use dioptric_world::{Light, SpectralCurve, WorldBuilder};
+
+const NM: f64 = 550.0;
+const INDEX: f64 = 1.6;
+const THICKNESS_MM: f64 = 2.0;
+const RIM_MM: f64 = 12.0;
+const FILM_MM: f64 = 9.0;
+
+/// A bare plate.
+fn plate() -> Lens {
+    let interface = |medium_after, thickness_after_mm| Interface {
+        surface: Surface::plane(RIM_MM),
+        medium_after,
+        thickness_after_mm,
+    };
+    let surfaces = vec![interface(Glass::Constant { index: INDEX }, THICKNESS_MM), interface(Glass::Air, 0.0)];
+    Lens::new("plate", "a test", surfaces, 0).unwrap().with_light_loss(Some(Coating::Bare)).unwrap()
+}
+
+fn camera(lens: &Lens, bands: &Bands) -> LensCamera {
+    let settings = LensCameraSettings {
+        film_distance_mm: FILM_MM,
+        film_size_mm: DVec2::splat(1e-3),
+        pixels: PixelGrid::new(8, 8),
+        placement: Placement::IDENTITY,
+        origin: LensOrigin::EntrancePupil,
+        diffraction: None,
+        micro_array: None,
+    };
+    LensCamera::new(lens, bands, settings).unwrap()
+}
+
+/// The mean over the film under a sky of radiance 1, and its standard error.
+fn irradiance(camera: LensCamera, bands: &Bands) -> (f64, f64) {
+    let mut builder = WorldBuilder::new();
+    builder.add_light(Light::Sky { radiance: SpectralCurve::constant(1.0) });
+    let (world, camera) = (builder.build().unwrap(), Camera::Lens(Box::new(camera)));
+    let settings =
+        RenderSettings { bands: bands.clone(), paths: LightPaths::Full, samples_per_pass: 256, seed: 1, clamp: None };
+    let mut renderer = Renderer::new(&world, &camera, settings).unwrap();
+    for _ in 0..8 {
+        renderer.pass(&Cancel::new(), &|_| {}).unwrap();
+    }
+    let found = renderer.rendering();
+    let n = found.picture.planes()[0].len() as f64;
+    let mean = found.picture.planes()[0].iter().map(|v| f64::from(*v)).sum::<f64>() / n;
+    let error = found.standard_error.planes()[0].iter().map(|v| f64::from(*v).powi(2)).sum::<f64>().sqrt() / n;
+    (mean, error)
+}
+
+/// Of an even sky a plate sends ∫ T R² T cos θ dΩ to the film by two reflections, as far as its rims let light through.
+#[test]
+fn a_plates_ghosts_of_the_sky_are_those_of_fresnel() {
+    let bands = Bands { grid: WavelengthGrid::new(vec![NM]).unwrap(), sampling: BandSampling::Center };
+    let lens = plate();
+    let (direct, _) = irradiance(camera(&lens, &bands), &bands);
+    let (with_ghosts, error) = irradiance(camera(&lens, &bands).with_ghosts().unwrap(), &bands);
+    // n_reflections 0 and 2, of rays that cross the plate once or three times.
+    let expected = |n_reflections: i32| {
+        let n = 20_000;
+        let term = |i: usize| {
+            let angle = FRAC_PI_2 * (i as f64 + 0.5) / f64::from(n);
+            let inside = (angle.sin() / INDEX).asin();
+            let reached_mm = FILM_MM * angle.tan() + f64::from(1 + n_reflections) * THICKNESS_MM * inside.tan();
+            if reached_mm > RIM_MM {
+                return 0.0;
+            }
+            let before = Film::new(1.0, &[], INDEX.into(), NM).shares(angle.cos());
+            let behind = Film::new(INDEX, &[], 1.0.into(), NM).shares(inside.cos());
+            let s = before.t_s * behind.r_s.powi(n_reflections) * behind.t_s;
+            let p = before.t_p * behind.r_p.powi(n_reflections) * behind.t_p;
+            0.5 * (s + p) * 2.0 * PI * angle.sin() * angle.cos() * FRAC_PI_2 / f64::from(n)
+        };
+        (0..n as usize).map(term).sum::<f64>()
+    };
+    assert!((direct / expected(0) - 1.0).abs() < 0.01, "{direct} {}", expected(0));
+    // The same random numbers: what the difference has of noise is that of the ghosts alone, less than that of the sum.
+    let ghosts = with_ghosts - direct;
+    assert!(error < 0.05 * expected(2), "{error}");
+    assert!((ghosts / expected(2) - 1.0).abs() < 0.02, "{ghosts} {} {error}", expected(2));
+}
+
+#[test]
+fn lenses_without_losses_have_no_ghosts_and_tilted_ones_are_refused() {
+    let bands = Bands { grid: WavelengthGrid::new(vec![NM]).unwrap(), sampling: BandSampling::Center };
+    let lossless = plate().with_light_loss(None).unwrap();
+    assert!(!camera(&lossless, &bands).with_ghosts().unwrap().has_ghosts());
+    let tilt = CoordinateBreak {
+        surfaces: (0, 1),
+        pivot_mm: 0.0,
+        decenter_mm: [0.0; 3],
+        tilt_deg: [2.0, 0.0, 0.0],
+        tilt_first: false,
+    };
+    let tilted = plate().with_moves(vec![tilt]).unwrap();
+    let message = camera(&tilted, &bands).with_ghosts().unwrap_err().to_string();
+    assert!(message.contains("centered lenses without mirrors"), "{message}");
+}

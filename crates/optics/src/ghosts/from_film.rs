@@ -1,0 +1,103 @@
+//! Ghosts met from the film: where light comes from that two surfaces reflect on its way to a place of the film.
+
+use glam::{DVec2, DVec3};
+
+use crate::{
+    MonoLens, OpticsError, RayBatchF32, ReversedLens, rays::RaySlices, trace::GhostTree, transmission::GHOST_TERMS,
+};
+
+/// A lens at one wavelength, for rays from the film that two of its surfaces reflect.
+#[derive(Clone, Debug)]
+pub struct FilmGhosts {
+    tree: GhostTree<f32>,
+}
+
+/// One way of a ray out of the lens, drawn from all that it may take.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GhostRay {
+    /// Where it leaves the plane of the first vertex, mm in the lens frame.
+    pub point_mm: DVec3,
+    /// Where it goes, towards −z.
+    pub direction: DVec3,
+    /// The sum of the shares of all ways: what radiance along this one counts, in the mean over the drawing.
+    pub share: f64,
+}
+
+impl ReversedLens {
+    /// Returns the ghosts of the lens as they are met from the film.
+    ///
+    /// # Errors
+    /// When the lens is tilted or decentered or has mirrors or gratings.
+    pub fn ghosts(&self) -> Result<FilmGhosts, OpticsError> {
+        let lens = self.forward();
+        // The film may be curved: rays come from any place.
+        if lens.placements().is_some() {
+            lens.check_ghosts(0.0)?;
+        }
+        Ok(FilmGhosts { tree: lens.ghost_tree(0.0, true, GHOST_TERMS) })
+    }
+}
+
+impl MonoLens {
+    /// Returns the radius of a circle in the last vertex plane that all rays cross which come to the last surface from film places up to
+    /// `reach_mm` from the axis, so far behind the vertex; `None` where the film reaches into the hollow of that surface.
+    pub fn rear_circle_mm(&self, film_distance_mm: f64, reach_mm: f64) -> Option<f64> {
+        let rim_mm = self.semi_aperture_mm(self.n_surfaces() - 1);
+        let mut most_mm = rim_mm;
+        for i in 1..=REAR_STEPS {
+            let radius_mm = rim_mm * f64::from(i) / f64::from(REAR_STEPS);
+            // The surface lies so far before its vertex plane there.
+            let before_mm = -self.last_sag_mm(DVec2::new(0.0, radius_mm));
+            let way_mm = film_distance_mm + before_mm;
+            if way_mm <= 0.0 || !way_mm.is_finite() {
+                return None;
+            }
+            for place_mm in [-reach_mm, reach_mm] {
+                most_mm = most_mm.max((radius_mm + (place_mm - radius_mm) * before_mm / way_mm).abs());
+            }
+        }
+        Some(most_mm)
+    }
+}
+
+/// Rings of the last surface that are looked at.
+const REAR_STEPS: u32 = 64;
+
+impl FilmGhosts {
+    /// Follows rays from the film, which start near the last vertex, by all pairs of surfaces, and draws one way of each by a number of 0 to 1:
+    /// a way is as likely as its share of the light. None of a ray that no pair lets out.
+    pub fn trace(&self, rays: &mut RayBatchF32, drawn: &[f64]) -> Vec<Option<GhostRay>> {
+        let mut slices = rays.slices();
+        let flip = |slices: &mut RaySlices<'_, f32>| {
+            slices.z.iter_mut().chain(slices.n.iter_mut()).for_each(|v| *v = -*v);
+        };
+        flip(&mut slices);
+        let mut numbers = drawn.to_vec();
+        let mut ways: Vec<Option<GhostRay>> = vec![None; numbers.len()];
+        self.tree.trace(&slices, &mut |pair, start, [x, y, l, m, n], shares| {
+            if pair.is_none() {
+                return;
+            }
+            let lit = shares.iter().enumerate().filter(|(_, share)| **share > 0.0);
+            for (i, &share) in lit {
+                let (way, number) = (&mut ways[start + i], &mut numbers[start + i]);
+                let total = way.map_or(0.0, |way| way.share) + share;
+                let chance = share / total;
+                // What is left of the number is as evenly spread as it was.
+                if *number < chance {
+                    *number /= chance;
+                    let point_mm = DVec2::new(x[i].into(), y[i].into()).extend(0.0);
+                    let direction = DVec3::new(l[i].into(), m[i].into(), -f64::from(n[i]));
+                    *way = Some(GhostRay { point_mm, direction, share: total });
+                } else {
+                    *number = (*number - chance) / (1.0 - chance);
+                    if let Some(way) = way {
+                        way.share = total;
+                    }
+                }
+            }
+        });
+        flip(&mut slices);
+        ways
+    }
+}
