@@ -147,7 +147,7 @@ fn scene_info_says_what_was_understood() {
     files(folder.path());
     let text = output(folder.path(), &["scene", "info", "cube.hdr", "--depth-m", "2", "-o", "cube.png"]);
     for words in [
-        "reflectance, 1000 being a perfect white, 7 bands of 400–700 nm",
+        "reflectance, 1000 being a perfect white, under a light of x, y 0.313, 0.329 and 1000 lx, 7 bands of 400–700 nm",
         "'frobnicate'",
         "1 without data are black",
         "no field of view",
