@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::{
     camera::CameraFile,
-    camera_files::{HARMLESS, check_matrix, is_fisheye, unknown_model},
+    camera_models::{HARMLESS, check_matrix, is_fisheye, unknown_model},
     distortion::Distortion,
     stated::{Stated, short},
 };

@@ -165,7 +165,12 @@ pub(crate) fn from_layer(layer: &LayerAttributes) -> Attributes {
         ("screenWindowCenter", layer.screen_window_center.0 != 0.0 || layer.screen_window_center.1 != 0.0),
     ];
     let standard = standard.into_iter().filter(|(_, is_there)| *is_there).map(|(name, _)| name.to_owned());
-    let mut others: Vec<String> = own.chain(standard).collect();
+    let is_text = |name: &str| matches!(get(name), Some(AttributeValue::Text(_)));
+    // Ours whose values are none that can stand there.
+    let unfit = [PITCH, FOCAL, CENTER_X, CENTER_Y, FOV].into_iter().filter(|name| number(name).is_none());
+    let unfit = unfit.chain([UNITS, LIGHT].into_iter().filter(|name| !is_text(name)));
+    let unfit = unfit.filter(|name| get(name).is_some()).map(|name| format!("{name}, which is no likely value"));
+    let mut others: Vec<String> = own.chain(standard).chain(unfit).collect();
     others.sort();
     let light = match get(LIGHT) {
         Some(AttributeValue::Text(text)) => {

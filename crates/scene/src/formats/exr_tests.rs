@@ -120,6 +120,20 @@ fn unknown_channels_and_attributes_are_noted() {
 }
 
 #[test]
+fn attributes_of_ours_that_cannot_be_are_named() {
+    let file = file();
+    let bands = || vec![("S0.500nm", flat(1.0)), ("Z", flat(1.0))];
+    for (name, value) in [("viewFocalPx", "thirty"), ("samplePitchUm", "none")] {
+        write_raw(&file.path, bands(), &[(name, value)]);
+        let notes = read_scene(&file.path, &ReadOptions::default()).unwrap().notes.join("\n");
+        assert!(notes.contains(&format!("'{name}, which is no likely value'")), "{notes}");
+    }
+    write_raw(&file.path, bands(), &[("samplePitchUm", "3")]);
+    let notes = read_scene(&file.path, &ReadOptions::default()).unwrap().notes.join("\n");
+    assert!(notes.contains("its attribute 'samplePitchUm' is not used"), "{notes}");
+}
+
+#[test]
 fn parts_of_bands_are_one_picture() {
     let file = file();
     let part = |name: &str, channels: Vec<(&str, FlatSamples)>| {

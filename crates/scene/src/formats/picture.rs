@@ -4,14 +4,14 @@ use std::path::Path;
 
 use dioptric_pictures::{Curve, DynamicImage, ImageError, StatedColors, read_reduced, size_of};
 use dioptric_spectrum::{Display, Quantity, SpectralImage, WavelengthGrid, srgb_decode, srgb_encode};
-use image::{ImageDecoder, metadata::Orientation};
+use image::metadata::Orientation;
 use ndarray::Array2;
 use rayon::prelude::*;
 
 use super::{
-    picture_parts::notes_on_samples,
+    picture_parts::{notes_on_samples, orientation_of},
     primaries::into_srgb,
-    spectral_exr::read_planes_and_primaries_exr,
+    spectral_exr::{NamedPlanes, read_planes_and_primaries_exr},
     stated::{Noted, name_of, note_of},
     unusable::{check_made, said, unreadable},
 };
@@ -233,13 +233,6 @@ fn stated_colors(path: &Path) -> Result<Option<StatedColors>, SceneError> {
     StatedColors::of(path).map_err(|reason| unreadable(path, reason))
 }
 
-/// Returns the orientation that a picture states.
-pub(super) fn orientation_of(path: &Path) -> Orientation {
-    let reader = image::ImageReader::open(path).ok().and_then(|reader| reader.with_guessed_format().ok());
-    let decoder = reader.and_then(|reader| reader.into_decoder().ok());
-    decoder.and_then(|mut decoder| decoder.orientation().ok()).unwrap_or(Orientation::NoTransforms)
-}
-
 /// Returns what a picture's samples are, in words.
 pub(super) fn kind_of(picture: &DynamicImage, colors: Option<&StatedColors>) -> String {
     let color = picture.color();
@@ -256,7 +249,7 @@ pub(super) fn kind_of(picture: &DynamicImage, colors: Option<&StatedColors>) -> 
 #[derive(Clone, Debug, PartialEq)]
 pub struct PictureSamples {
     /// Each channel with its name: `Y` for gray, `R`, `G` and `B`, or what an EXR file calls it.
-    pub planes: Vec<(String, Array2<f32>)>,
+    pub planes: NamedPlanes,
     /// The highest code of a file of whole numbers, 255 or 65 535; `None` for floating-point samples.
     pub top: Option<u16>,
     /// What the samples of red, green and blue, or of gray, are, where they are not those of sRGB, or of floats in its primaries; the reason where they

@@ -7,11 +7,10 @@ use std::{
 };
 
 use dioptric_pictures::{Exif, size_of};
-use image::metadata::Orientation;
+use image::{ImageDecoder, metadata::Orientation};
 
 use super::{
     contents::is_of,
-    picture::orientation_of,
     spectral_exr::notes_on_planes_exr,
     stated::{name_of, note_of, short},
     unusable::unreadable,
@@ -64,6 +63,13 @@ pub fn notes_on_samples(path: &Path) -> Result<Vec<String>, SceneError> {
     let is_turned = orientation_of(path) != Orientation::NoTransforms;
     let note = || format!("{}: its pixels are counted as stored, not turned as its orientation says", name_of(path));
     Ok(is_turned.then(note).into_iter().chain(notes_on_parts(path)?).collect())
+}
+
+/// Returns the orientation that a picture states.
+pub(super) fn orientation_of(path: &Path) -> Orientation {
+    let reader = image::ImageReader::open(path).ok().and_then(|reader| reader.with_guessed_format().ok());
+    let decoder = reader.and_then(|reader| reader.into_decoder().ok());
+    decoder.and_then(|mut decoder| decoder.orientation().ok()).unwrap_or(Orientation::NoTransforms)
 }
 
 /// Returns what the Exif data state of light and geometry that is not used.

@@ -180,6 +180,9 @@ fn of_exr(path: &Path, options: &ReadOptions) -> Result<Contents, SceneError> {
             let told = reading.unit.as_deref().map(light_unit).transpose()?;
             let unit = told.or_else(|| reading.quantity.and_then(FileQuantity::light_unit)).filter(|_| is_unit_open);
             let scale = reading.scale.unwrap_or(1.0);
+            // Of a film, which a scene is none.
+            let pitch = image.pitch_um().map(|_| "samplePitchUm".to_owned());
+            notes.extend(note_of(path, "attribute", pitch.as_slice()));
             let (quantity, grid) = (image.quantity(), image.grid().clone());
             let mut planes = image.into_planes();
             for (plane, &nm) in planes.iter_mut().zip(grid.centers_nm()) {

@@ -306,16 +306,19 @@ fn hidden_of(path: &Path, layer: RawLayer, notes: &mut Vec<String>) -> Result<(S
     Ok((image, RawDepth::in_file(path, "channel 'Z' of the layer 'hidden'".to_owned(), z_m, DepthKind::Axial)))
 }
 
+/// Planes of samples, each with the name of its channel.
+pub type NamedPlanes = Vec<(String, Array2<f32>)>;
+
 /// Reads every channel of an EXR file's first layer as single floats, by name.
 ///
 /// # Errors
 /// When the file is truncated, too large or no EXR.
-pub fn read_planes_exr(path: &Path) -> Result<Noted<Vec<(String, Array2<f32>)>>, SceneError> {
+pub fn read_planes_exr(path: &Path) -> Result<Noted<NamedPlanes>, SceneError> {
     Ok(read_planes_and_primaries_exr(path)?.map(|(planes, _)| planes))
 }
 
 /// The channels of an EXR file by name, and the matrix from its primaries to linear sRGB.
-pub(super) type PlanesAndPrimaries = (Vec<(String, Array2<f32>)>, Option<[[f64; 3]; 3]>);
+pub(super) type PlanesAndPrimaries = (NamedPlanes, Option<[[f64; 3]; 3]>);
 
 /// Reads the same, with the matrix from the primaries that the file states to linear sRGB; none where they are those of sRGB.
 pub(super) fn read_planes_and_primaries_exr(path: &Path) -> Result<Noted<PlanesAndPrimaries>, SceneError> {

@@ -99,8 +99,11 @@ fn comments_of_depths_are_named() {
     check_noted(&scene, &["'depths in mm'"]);
 }
 
+/// The name of a layer, its rows and columns, and its channels with the number that they have everywhere.
+type LayerOf<'a> = (&'a str, (usize, usize), &'a [(&'a str, f32)]);
+
 /// Writes an EXR file of channels that are the same everywhere, of layers of so many samples.
-fn write_exr(path: &Path, layers: &[(&str, (usize, usize), &[(&str, f32)])]) {
+fn write_exr(path: &Path, layers: &[LayerOf<'_>]) {
     let layers = layers.iter().map(|(name, size, channels)| {
         let plane = |v: f32| FlatSamples::F32(vec![v; size.0 * size.1]);
         let of = |(name, v): &(&str, f32)| {

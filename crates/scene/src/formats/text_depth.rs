@@ -1,4 +1,4 @@
-//! Depths as text: a row a line, numbers between spaces or commas, as NumPy's `savetxt` and spreadsheets write them.
+//! Depths as text: a row a line, numbers between spaces or commas, as `savetxt` of `NumPy` and spreadsheets write them.
 
 use std::path::Path;
 
