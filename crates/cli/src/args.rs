@@ -54,13 +54,18 @@ impl Cli {
     }
 }
 
-/// Lets every option that takes a number, or a list of them, take a negative one: whether it makes sense is for those to say who
-/// know what it is.
+/// Lets every option take a value that begins as a negative number does, as `-5`, `-1000/m` or `-1,2`, but files: whether it makes sense is for
+/// those to say who know what it is.
 fn takes_negative_numbers(command: clap::Command) -> clap::Command {
-    let is_number = |arg: &Arg| arg.get_value_parser().type_id() == TypeId::of::<f64>();
-    let is_list = |arg: &Arg| arg.get_value_names().is_some_and(|names| names.iter().any(|name| name == "LIST"));
+    let is_file = |arg: &Arg| arg.get_value_parser().type_id() == TypeId::of::<PathBuf>();
+    // An option whose value may be left out would take the next option for it.
+    let takes_one = |arg: &Arg| {
+        arg.get_long().is_some()
+            && arg.get_action().takes_values()
+            && arg.get_num_args().is_none_or(|n| n.min_values() > 0)
+    };
     command
-        .mut_args(|arg| if is_number(&arg) || is_list(&arg) { arg.allow_hyphen_values(true) } else { arg })
+        .mut_args(|arg| if takes_one(&arg) && !is_file(&arg) { arg.allow_hyphen_values(true) } else { arg })
         .mut_subcommands(takes_negative_numbers)
 }
 

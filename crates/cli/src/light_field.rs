@@ -12,7 +12,7 @@ use crate::{
     paintings::painting_folder,
     render_args::LightFieldArgs,
     run::Clock,
-    terminal::{print, print_json},
+    terminal::{print, print_json, remark},
 };
 
 /// Refocused pictures where no depths are asked for.
@@ -32,7 +32,12 @@ pub(crate) fn run(arguments: &LightFieldArgs, common: &Common) -> anyhow::Result
     let (clock, cancel) = (Clock::new(common.quiet), Cancel::new());
     let n_views = arguments.views.map(usize::from);
     let field = match &arguments.irradiance {
-        Some(path) => kept.decoded(&Irradiance::read_exr(path, None)?, n_views, &clock, &cancel)?,
+        Some(path) => {
+            let mut notes = vec![];
+            let irradiance = Irradiance::read_exr(path, None)?.told_in(&mut notes);
+            notes.iter().for_each(|note| remark(common.quiet, note));
+            kept.decoded(&irradiance, n_views, &clock, &cancel)?
+        }
         None => kept.light_field(n_views, &clock, &cancel)?,
     };
     let search = search(arguments, &kept, (&clock, &cancel))?;

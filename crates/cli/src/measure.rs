@@ -58,7 +58,7 @@ fn mtf(arguments: &MtfArgs, common: &Common) -> anyhow::Result<()> {
 
 fn texture(arguments: &TextureArgs, common: &Common) -> anyhow::Result<()> {
     let picture = opened(&arguments.picture, &arguments.picture_args, common)?;
-    let beside = |path: &Path| MeasuredPicture::open(path, curve(arguments.picture_args.curve));
+    let beside = |path: &Path| opened(path, &arguments.picture_args, common);
     let region = |text: &Option<String>| text.as_deref().map(PixelRegion::parse).transpose();
     let request = TextureRequest {
         region: region(&arguments.region)?,
@@ -137,6 +137,7 @@ fn color(arguments: &ColorArgs, common: &Common) -> anyhow::Result<()> {
         };
         let subject = format!("{} against {}", file_name(&arguments.picture), file_name(against));
         let finish = Finish::new(("compare", "Two pictures"), subject, out, common)?;
+        tell(&notes_on_picture(against, curve), common);
         let open = |path: &Path| request.viewing.open(path, curve);
         return finish.with(&request.compare(&open(&arguments.picture)?, &open(against)?)?, comparison_table);
     }

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use dioptric_analysis::measure::{CodeCurve, MeasuredPicture, Measurement, notes_on_picture};
+use dioptric_analysis::measure::{CodeCurve, MeasuredPicture, Measurement};
 use dioptric_pipeline::{PipelineError, Staged};
 use dioptric_report::{MeasurementWords, write_measurement};
 
@@ -23,9 +23,9 @@ pub(crate) fn curve(kind: CurveKind) -> CodeCurve {
 
 /// Opens a picture to be measured, and tells what of its statements is used.
 pub(crate) fn opened(path: &Path, arguments: &PictureArgs, common: &Common) -> Result<MeasuredPicture, PipelineError> {
-    let curve = curve(arguments.curve);
-    tell(&notes_on_picture(path, curve), common);
-    MeasuredPicture::open(path, curve)
+    let picture = MeasuredPicture::open(path, curve(arguments.curve))?;
+    tell(&picture.notes, common);
+    Ok(picture)
 }
 
 /// What becomes of a measurement: files in a folder, and numbers on standard output.

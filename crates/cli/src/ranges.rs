@@ -75,6 +75,22 @@ mod tests {
     }
 
     #[test]
+    fn values_may_begin_as_negative_numbers_do() {
+        for line in [
+            "scene convert a.png b.exr --depth-unit -1000/m --fill-depth -1 --unit -W --variable -1",
+            "scene info a.hdr --scale -2 --scene-wavelengths-nm -400,500 --white-level -1",
+            "render a.pbrt --eye -1,0,2 --look-at 0,-1,0 -o out",
+            "run --scene a.exr --focus-mm -5 --illuminant -3K",
+        ] {
+            let read = Cli::words().try_get_matches_from(["dioptric"].into_iter().chain(line.split(' ')));
+            assert!(read.is_ok(), "{line}: {}", read.unwrap_err());
+        }
+        // A file is no number, and what follows it is an option.
+        let line = "dioptric scene info a.hdr --depth --scale 2";
+        assert!(Cli::words().try_get_matches_from(line.split(' ')).is_err());
+    }
+
+    #[test]
     fn what_is_beyond_a_range_is_named() {
         assert_eq!(
             said("dioptric run --fov-deg 20 --noise all --bracket-stops -4,-2,0 --wavelengths-nm 400:700:10"),

@@ -117,20 +117,20 @@ pub(crate) struct ViewArgs {
     #[arg(long, conflicts_with = "eye")]
     pub(crate) frame: bool,
     /// Where the camera stands, m
-    #[arg(long, value_name = "X,Y,Z", value_parser = parse_point, allow_hyphen_values = true)]
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse_point)]
     pub(crate) eye: Option<(f64, f64, f64)>,
     /// What is in the middle of the picture, m [default: the middle of the world]
-    #[arg(long, value_name = "X,Y,Z", value_parser = parse_point, allow_hyphen_values = true, requires = "eye")]
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse_point, requires = "eye")]
     pub(crate) look_at: Option<(f64, f64, f64)>,
     /// What is up in the picture [default: what is up in the world]
-    #[arg(long, value_name = "X,Y,Z", value_parser = parse_point, allow_hyphen_values = true, requires = "eye")]
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse_point, requires = "eye")]
     pub(crate) up: Option<(f64, f64, f64)>,
     /// Light from beyond: even:RADIANCE (W m⁻² sr⁻¹ nm⁻¹), day:ELEVATION,AZIMUTH,TURBIDITY (degrees; day alone is day:45,30,3), or a picture
     /// of all directions, its rows by height [default: even:1 where nothing else gives light]
     #[arg(long, value_name = "SKY", value_parser = parse_sky)]
     pub(crate) sky: Option<WorldSky>,
     /// Lamps at a place, m, of a luminous flux, lm, and the color of daylight
-    #[arg(long, value_name = "X,Y,Z,LM", value_parser = parse_lamp, allow_hyphen_values = true)]
+    #[arg(long, value_name = "X,Y,Z,LM", value_parser = parse_lamp)]
     pub(crate) light: Vec<WorldLamp>,
 }
 

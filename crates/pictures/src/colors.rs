@@ -8,7 +8,10 @@ use moxcms::{
     ToneReprCurve, TransferCharacteristics, XyY,
 };
 
-use crate::bmp::{BmpColors, colors_of_bmp};
+use crate::{
+    bmp::{BmpColors, colors_of_bmp},
+    exif::{Exif, TiffFields},
+};
 
 /// How far curve and matrix of a profile may be from those of sRGB to be taken as these: four digits of a profile's fractions.
 const SAME: f64 = 2e-3;
@@ -56,7 +59,7 @@ impl StatedColors {
             Some(profile) => Self::of_icc(&profile),
             None => {
                 let exif = decoder.exif_metadata().ok().flatten();
-                let is_adobe = exif.as_deref().is_some_and(is_adobe_rgb);
+                let is_adobe = exif.as_deref().is_some_and(|bytes| Exif::of_bytes(bytes).is_adobe_rgb());
                 is_adobe
                     .then(|| {
                         Self::of_profile(&ColorProfile::new_adobe_rgb(), "Adobe RGB, as its Exif data says".to_owned())
@@ -271,35 +274,6 @@ fn of_code_points(points: &png::CodingIndependentCodePoints) -> Result<Option<St
     )
 }
 
-/// The fields of a TIFF file or of Exif data, which are one.
-struct TiffFields<'a> {
-    bytes: &'a [u8],
-    is_big_endian: bool,
-}
-
-impl<'a> TiffFields<'a> {
-    fn new(bytes: &'a [u8]) -> Option<Self> {
-        let is_big_endian = bytes.starts_with(b"MM\0*");
-        (is_big_endian || bytes.starts_with(b"II*\0")).then_some(Self { bytes, is_big_endian })
-    }
-
-    fn number(&self, at: usize, n: usize) -> Option<usize> {
-        let bytes = self.bytes.get(at..at.checked_add(n)?)?;
-        let digits = |sum: usize, byte: &u8| sum << 8 | usize::from(*byte);
-        Some(if self.is_big_endian { bytes.iter().fold(0, digits) } else { bytes.iter().rev().fold(0, digits) })
-    }
-
-    fn first_directory(&self) -> Option<usize> {
-        self.number(4, 4)
-    }
-
-    /// Returns the place of the count of a field, behind which its value or the place of that lies.
-    fn field(&self, directory: usize, tag: usize) -> Option<usize> {
-        let n = self.number(directory, 2)?;
-        (0..n).map(|i| directory + 2 + 12 * i).find(|at| self.number(*at, 2) == Some(tag)).map(|at| at + 4)
-    }
-}
-
 /// Returns the profile of a TIFF file, whose field is of bytes, or of bytes of no kind.
 fn profile_of_tiff(path: &Path) -> Option<Vec<u8>> {
     const ICC_PROFILE: usize = 34_675;
@@ -322,22 +296,4 @@ fn colors_of_jpeg(path: &Path) -> Option<usize> {
         }
         at += 2 + (usize::from(high) << 8 | usize::from(low));
     }
-}
-
-/// Returns whether Exif data say Adobe RGB: no sRGB (`ColorSpace` 65535), and interoperability R03 (DCF 2.0, 2010, 4.2).
-fn is_adobe_rgb(exif: &[u8]) -> bool {
-    const EXIF_DIRECTORY: usize = 0x8769;
-    const INTEROPERABILITY_DIRECTORY: usize = 0xA005;
-    const COLOR_SPACE: usize = 0xA001;
-    const INTEROPERABILITY_INDEX: usize = 1;
-    let found = || -> Option<bool> {
-        let fields = TiffFields::new(exif)?;
-        let below = |directory: usize, tag: usize| fields.number(fields.field(directory, tag)? + 4, 4);
-        let exif_directory = below(fields.first_directory()?, EXIF_DIRECTORY)?;
-        let is_other = fields.number(fields.field(exif_directory, COLOR_SPACE)? + 4, 2)? == 0xFFFF;
-        let interoperability = below(exif_directory, INTEROPERABILITY_DIRECTORY)?;
-        let at = fields.field(interoperability, INTEROPERABILITY_INDEX)? + 4;
-        Some(is_other && exif.get(at..at + 3)? == b"R03")
-    };
-    found().unwrap_or(false)
 }

@@ -3,6 +3,7 @@
 
 mod bmp;
 mod colors;
+mod exif;
 mod reduced;
 mod tagged;
 
@@ -16,6 +17,7 @@ use dioptric_files::memory;
 use image::{ExtendedColorType, ImageDecoder, ImageReader};
 
 pub use colors::StatedColors;
+pub use exif::Exif;
 pub use image::{DynamicImage, ImageError, ImageFormat, Limits};
 pub use reduced::{Curve, read_reduced};
 pub use tagged::{CodeSpace, encode_in};

@@ -48,8 +48,16 @@ pub fn convert_irradiance(
         return Ok(Some(notes));
     }
     let name = input.file_stem().unwrap_or_default().to_string_lossy();
-    let image = if is_mat(input) { read_iset_irradiance(input)?.image } else { read_spectral_exr(input)?.image };
+    let mut notes = vec![];
+    let image = if is_mat(input) {
+        let read = read_iset_irradiance(input)?;
+        notes.extend(read.notes);
+        read.image
+    } else {
+        read_spectral_exr(input)?.told_in(&mut notes).image
+    };
     write_iset_irradiance(output, &image, &name)?;
     let way = "its focal length is as long as the film is wide, from which ISETCam finds the distance between samples";
-    Ok(Some(vec![format!("{}: irradiance of {name}; {way}", output.display())]))
+    notes.insert(0, format!("{}: irradiance of {name}; {way}", output.display()));
+    Ok(Some(notes))
 }

@@ -130,7 +130,7 @@ fn restored(file: &Path, key: &ViewKey) -> Option<GatheredView> {
     if !file.exists() {
         return None;
     }
-    let read = read_spectral_exr(file).ok()?;
+    let read = read_spectral_exr(file).ok()?.of_own_file();
     // Names of bands have fewer digits than their wavelengths.
     let radiance = SpectralImage::new(Quantity::Radiance, key.grid.clone(), read.image.into_planes()).ok()?;
     let depth = read.depth?;

@@ -111,7 +111,7 @@ fn errors(found: &[Array2<f32>], truth: &SpectralImage, is_edge: &Array2<bool>) 
 #[test]
 fn edges_are_those_of_a_traced_picture() {
     let folder = dioptric_golden::shared("reference/render/depth_edge").unwrap();
-    let truth = read_spectral_exr(&folder.join("dgauss.exr")).unwrap().image;
+    let truth = read_spectral_exr(&folder.join("dgauss.exr")).unwrap().of_own_file().image;
     let grid = truth.grid().clone();
     let world =
         read_world(&folder.join("pinhole.pbrt"), &ReadOptions { metres_per_unit: 1.0 }, &Cancel::new()).unwrap();

@@ -181,7 +181,8 @@ fn measured<'py, M: Serialize + Send + 'static>(
     to_python(py, &run_apart(py, |_| work())?)
 }
 
-fn warn(py: Python<'_>, notes: &[String]) -> PyResult<()> {
+/// Warns of what is to be said, a sentence each.
+pub(crate) fn warn(py: Python<'_>, notes: &[String]) -> PyResult<()> {
     for note in notes {
         py.import("warnings")?.call_method1("warn", (note,))?;
     }

@@ -8,6 +8,7 @@ use ndarray::{Array2, Array3};
 use pyo3::{IntoPyObjectExt, prelude::*};
 
 use crate::{
+    measure::warn,
     view::{Sample, view},
     worker::{Follower, run},
 };
@@ -36,7 +37,11 @@ enum Samples {
 ///     are read-only.
 #[pyfunction]
 pub(crate) fn read_samples(py: Python<'_>, path: PathBuf) -> PyResult<(Bound<'_, PyAny>, Bound<'_, PyAny>)> {
-    let samples = run(py, &Follower::nobody(), |_, _| read(&path))?;
+    let (samples, notes) = run(py, &Follower::nobody(), |_, _| {
+        let mut notes = vec![];
+        read(&path, &mut notes).map(|samples| (samples, notes))
+    })?;
+    warn(py, &notes)?;
     match samples {
         Samples::Bands(planes, centers_nm) => Ok((stack(py, &planes, true)?, centers_nm.into_bound_py_any(py)?)),
         Samples::Planes(planes, names) => Ok((stack(py, &planes, planes.len() > 1)?, names.into_bound_py_any(py)?)),
@@ -51,9 +56,9 @@ pub(crate) fn read_samples(py: Python<'_>, path: PathBuf) -> PyResult<(Bound<'_,
     }
 }
 
-fn read(path: &std::path::Path) -> Result<Samples, PipelineError> {
+fn read(path: &std::path::Path, notes: &mut Vec<String>) -> Result<Samples, PipelineError> {
     if !path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("exr")) {
-        let samples = read_picture_samples(path)?;
+        let samples = read_picture_samples(path)?.told_in(notes);
         return Ok(match samples.top {
             Some(top) => Samples::Codes(samples, top),
             None => named(samples.planes),
@@ -61,10 +66,11 @@ fn read(path: &std::path::Path) -> Result<Samples, PipelineError> {
     }
     match read_spectral_exr(path) {
         Ok(file) => {
+            let file = file.told_in(notes);
             let centers_nm = file.image.grid().centers_nm().to_vec();
             Ok(Samples::Bands(file.image.into_planes(), centers_nm))
         }
-        Err(SceneError::NoBands { .. }) => Ok(named(read_planes_exr(path)?)),
+        Err(SceneError::NoBands { .. }) => Ok(named(read_planes_exr(path)?.told_in(notes))),
         Err(other) => Err(other.into()),
     }
 }

@@ -5,7 +5,7 @@
 #[non_exhaustive]
 pub enum SpectrumError {
     /// A wavelength list that is empty, not finite and positive, or not ascending.
-    #[error("wavelengths must be finite, positive and ascending, but number {index} is {value} nm")]
+    #[error("wavelengths must be finite, positive and ascending, but number {} is {value} nm", index + 1)]
     Wavelengths {
         /// 0-based place in the list.
         index: usize,

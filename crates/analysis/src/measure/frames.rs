@@ -11,7 +11,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use dioptric_scene::read_picture_samples;
+use dioptric_scene::{Noted, read_picture_samples};
 use ndarray::Array2;
 
 use super::open::read_dng;
@@ -105,21 +105,20 @@ fn series_by_name(folder: &Path) -> Result<Vec<FileSeries>, PipelineError> {
 }
 
 /// Reads a frame of digital numbers.
-pub(crate) fn read_frame(path: &Path) -> Result<Array2<f32>, PipelineError> {
+pub(crate) fn read_frame(path: &Path) -> Result<Noted<Array2<f32>>, PipelineError> {
     if let Some(file) = read_dng(path)? {
         let wrong = |reason: &str| PipelineError::Read { path: path.to_owned(), reason: reason.to_owned() };
         return match file.raw.dn() {
-            Some(dn) => Ok(dn.mapv(f32::from)),
+            Some(dn) => Ok(Noted::new(dn.mapv(f32::from), [])),
             None => Err(wrong("its raw frame is no single plane of digital numbers, expected a mosaic or one filter")),
         };
     }
-    let samples = read_picture_samples(path)?;
     let wrong = |reason: String| PipelineError::Read { path: path.to_owned(), reason };
-    match (samples.top, samples.planes.len()) {
+    read_picture_samples(path)?.try_map(|samples| match (samples.top, samples.planes.len()) {
         (None, _) => Err(wrong("its samples are not whole numbers, expected a gray PNG or TIFF".to_owned())),
         (Some(_), 1) => Ok(samples.planes.into_iter().next().expect("there is one plane").1),
         (Some(_), n) => Err(wrong(format!("it has {n} channels, expected a gray PNG or TIFF"))),
-    }
+    })
 }
 
 /// Writes a descriptor: for each series its exposure time, s, photons and files.

@@ -300,16 +300,23 @@ pub fn measure_frames(path: &Path) -> Result<NoiseData, PipelineError> {
         }
         other => other,
     };
-    let mut collected = Collected::default();
+    let (mut collected, mut told) = (Collected::default(), vec![]);
     for series in find_series(path)? {
         let mut taken = Taken::new(series.time_s, series.photons);
         for file in &series.files {
-            let frame = read_frame(file)?;
+            let mut own = vec![];
+            let frame = read_frame(file)?.told_in(&mut own);
+            // What all frames of a camera say is told of the first.
+            if told.is_empty() {
+                told = own;
+            }
             taken.add(frame).map_err(|e| PipelineError::Read { path: file.clone(), reason: e.to_string() })?;
         }
         collected.add(taken).map_err(in_file)?;
     }
-    collected.analyze(path.display().to_string()).map_err(in_file)
+    let mut data = collected.analyze(path.display().to_string()).map_err(in_file)?;
+    data.notes.append(&mut told);
+    Ok(data)
 }
 
 /// Frames under equal light that a program holds.

@@ -37,6 +37,8 @@ pub struct MeasuredPicture {
     primaries: Primaries,
     /// Whether it was read from a file.
     is_of_file: bool,
+    /// What of its file is not used, a sentence each.
+    pub notes: Vec<String>,
 }
 
 /// A channel's name, the plane that holds it, and which pixels are its own.
@@ -87,10 +89,15 @@ fn unfit(name: &str, is_of_file: bool, reason: String) -> PipelineError {
     }
 }
 
-/// Returns what of a picture's statements is used or not when it is measured, a sentence each: how it is turned, and which colors it has.
+/// Returns what of a picture's statements is used or not when it is measured, a sentence each: how it is turned, which colors it has, and what
+/// nobody asks for. What cannot be read is refused when the picture is opened.
 pub fn notes_on_picture(path: &Path, curve: CodeCurve) -> Vec<String> {
-    let mut notes = notes_on_samples(path);
-    // What cannot be read is refused when the picture is opened.
+    notes_on_samples(path).into_iter().flatten().chain(notes_on_colors(path, curve)).collect()
+}
+
+/// Returns which colors of a picture's file are used when it is measured.
+fn notes_on_colors(path: &Path, curve: CodeCurve) -> Vec<String> {
+    let mut notes = vec![];
     if let Ok(Some(colors)) = StatedColors::of(path) {
         let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
         let decoder = ImageReader::open(path).ok().and_then(|r| r.with_guessed_format().ok()?.into_decoder().ok());
@@ -126,7 +133,10 @@ impl MeasuredPicture {
         if let Some(DngFile { raw, .. }) = read_dng(path)? {
             return Ok(Self { is_of_file: true, ..Self::of_raw(path.display().to_string(), &raw) });
         }
-        Self::of_codes(path.display().to_string(), read_picture_samples(path)?, curve, true)
+        let mut notes = vec![];
+        let samples = read_picture_samples(path)?.told_in(&mut notes);
+        notes.extend(notes_on_colors(path, curve));
+        Ok(Self { notes, ..Self::of_codes(path.display().to_string(), samples, curve, true)? })
     }
 
     /// Takes samples that a program holds: R, G and B, or one plane of gray.
@@ -169,6 +179,7 @@ impl MeasuredPicture {
             |(channel, (name, plane)): (usize, (String, Array2<f32>))| (name, plane.mapv(|v| light(channel, v)));
         Ok(Self {
             is_of_file,
+            notes: vec![],
             name,
             planes: planes.into_iter().enumerate().map(linear).collect(),
             mosaic: None,
@@ -184,6 +195,7 @@ impl MeasuredPicture {
         let named = if tile.is_some() { vec!["raw".to_owned()] } else { names.clone() };
         Self {
             is_of_file: false,
+            notes: vec![],
             name,
             planes: named.into_iter().zip(planes).collect(),
             mosaic: tile.map(|tile| (tile, names)),
@@ -218,6 +230,7 @@ impl MeasuredPicture {
             mosaic: None,
             primaries: Primaries::Srgb,
             is_of_file: true,
+            notes: vec![],
         }
     }
 

@@ -129,7 +129,8 @@ impl RegionRequest {
     pub fn measure_file(&self, path: &Path, curve: CodeCurve) -> Result<RegionMeasurement, PipelineError> {
         let is_exr = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr"));
         match is_exr.then(|| read_spectral_exr(path)) {
-            Some(Ok(file)) => self.measure_bands(&path.display().to_string(), &file.image),
+            // What its header states beside is told by `notes_on_picture`.
+            Some(Ok(file)) => self.measure_bands(&path.display().to_string(), &file.told_in(&mut vec![]).image),
             _ => self.measure(&MeasuredPicture::open(path, curve)?),
         }
     }

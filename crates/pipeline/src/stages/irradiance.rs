@@ -9,7 +9,7 @@ use std::{
 };
 
 use dioptric_forward::{ImagingPlan, ImagingTimes, Source};
-use dioptric_scene::{ExrSamples, IsetIrradiance, Scene, SpectralHead, read_iset_irradiance, read_spectral_exr};
+use dioptric_scene::{ExrSamples, IsetIrradiance, Noted, Scene, SpectralHead, read_iset_irradiance, read_spectral_exr};
 use dioptric_spectrum::{Bands, Observer, Quantity, SpectralImage, SpectrumError, WavelengthGrid};
 use ndarray::{Array2, Array3, ArrayView3, Axis, s};
 
@@ -252,7 +252,9 @@ impl Irradiance {
     /// When the file cannot be read, or holds no irradiance.
     pub fn read(path: &Path, pitch_um: Option<f64>) -> Result<(Self, WhiteOf, Vec<String>), PipelineError> {
         if !path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("mat")) {
-            return Ok((Self::read_exr(path, pitch_um)?, WhiteOf::read(path)?, vec![]));
+            let mut notes = vec![];
+            let irradiance = Self::read_exr(path, pitch_um)?.told_in(&mut notes);
+            return Ok((irradiance, WhiteOf::read(path)?, notes));
         }
         let IsetIrradiance { image, light, notes } = read_iset_irradiance(path)?;
         let pitch_um = image.pitch_um().or(pitch_um);
@@ -266,8 +268,13 @@ impl Irradiance {
     ///
     /// # Errors
     /// When the file cannot be read, or holds no irradiance.
-    pub fn read_exr(path: &Path, pitch_um: Option<f64>) -> Result<Self, PipelineError> {
-        let image = read_spectral_exr(path)?.image;
+    pub fn read_exr(path: &Path, pitch_um: Option<f64>) -> Result<Noted<Self>, PipelineError> {
+        let file = read_spectral_exr(path)?;
+        file.try_map(|file| Self::of_file(path, file.image, pitch_um))
+    }
+
+    /// Takes the irradiance of a file.
+    fn of_file(path: &Path, image: SpectralImage, pitch_um: Option<f64>) -> Result<Self, PipelineError> {
         let in_file = |reason: String| PipelineError::Read { path: path.to_owned(), reason };
         if image.quantity() != Quantity::Irradiance {
             let (found, expected) = (image.quantity().unit(), Quantity::Irradiance.unit());
@@ -613,7 +620,7 @@ mod tests {
         let path = folder.path().join("irradiance.exr");
         let made = image_with(u64::MAX, None);
         made.write_exr(&path, ExrSamples::Single).unwrap();
-        let read = Irradiance::read_exr(&path, None).unwrap();
+        let read = Irradiance::read_exr(&path, None).unwrap().of_own_file();
         assert_eq!((read.pitch_um(), read.grid()), (made.pitch_um(), made.grid()));
         for band in 0..3 {
             assert_eq!(read.band(band).unwrap(), made.band(band).unwrap());

@@ -172,7 +172,7 @@ impl KeptCamera {
             return Ok(Resumed { camera, notes });
         }
         let read = |file: &str| -> Result<Irradiance, PipelineError> {
-            let irradiance = Irradiance::read_exr(&folder.join(file), Some(kept.place.pitch_um))?;
+            let irradiance = Irradiance::read_exr(&folder.join(file), Some(kept.place.pitch_um))?.of_own_file();
             kept.check(&irradiance, file).map_err(unreadable)?;
             Ok(irradiance.stored_in(&folder.join(file), kept.camera.outputs.exr_samples))
         };
@@ -222,7 +222,7 @@ impl Kept {
 
 /// Returns the depth that a run wrote, if it did and it is of the scene's size.
 fn read_depth(path: &Path, size: (usize, usize)) -> Option<DepthMap> {
-    let planes = read_planes_exr(path).ok()?;
+    let planes = read_planes_exr(path).ok()?.of_own_file();
     let (_, z_m) = planes.into_iter().find(|(name, _)| name == "Z")?;
     (z_m.dim() == size).then(|| DepthMap::new(z_m).ok()).flatten()
 }

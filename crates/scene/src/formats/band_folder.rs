@@ -13,6 +13,7 @@ use super::{
     gray_picture::{GrayPicture, read_gray},
     stated::{merged, name_of, note_of},
     unusable::unreadable,
+    wavelength_unit::{PLAUSIBLE_NM, without_unit},
 };
 use crate::SceneError;
 
@@ -40,7 +41,18 @@ pub(super) fn band_folder(folder: &Path, told_nm: Option<&[f64]>) -> Result<Cube
     }
     let mut notes: Vec<String> = note_of(folder, "picture", &unused).into_iter().collect();
     let wavelengths_nm = match (told_nm, wavelengths_of(folder, &pictures)) {
-        (None, own) => own?,
+        (None, own) => {
+            let own = own?;
+            let named: Vec<f64> = pictures.iter().map(|(number, _)| *number).collect();
+            let is_other = are_wavelengths(&named) && named != own;
+            notes.extend(is_other.then(|| {
+                format!(
+                    "{}: the wavelengths in the names of its pictures are not used: its list has others",
+                    name_of(folder)
+                )
+            }));
+            own
+        }
         (Some(told), own) => {
             let is_other = own.is_ok_and(|own| own != told);
             notes.extend(is_other.then(|| {
@@ -58,16 +70,28 @@ pub(super) fn band_folder(folder: &Path, told_nm: Option<&[f64]>) -> Result<Cube
     }
     let pictures: Vec<Numbered> =
         wavelengths_nm.iter().copied().zip(pictures.into_iter().map(|(_, path)| path)).collect();
-    let (planes, top) = planes_of(folder, &pictures, &mut notes)?;
+    check_bands(folder, &pictures)?;
+    let (planes, top) = planes_of(&pictures, &mut notes)?;
     Ok(Cube { planes, top, wavelengths_nm: Some(wavelengths_nm), quantity: None, unit: None, notes })
 }
 
+/// Refuses two pictures of one wavelength, and one of none.
+fn check_bands(folder: &Path, pictures: &[Numbered]) -> Result<(), SceneError> {
+    for (index, (nm, path)) in pictures.iter().enumerate() {
+        if let Some((_, other)) = pictures[..index].iter().find(|(own, _)| own == nm) {
+            let reason =
+                format!("{} and {} are both of {nm} nm: expected a picture a band", name_of(other), name_of(path));
+            return Err(unreadable(folder, reason));
+        }
+        if !PLAUSIBLE_NM.contains(nm) {
+            return Err(unreadable(path, format!("its band would lie at {nm} nm: expected a wavelength of light")));
+        }
+    }
+    Ok(())
+}
+
 /// Returns the numbers of all pictures, each with its wavelength, and the largest of whole numbers: codes of fewer bits are so many times as large.
-fn planes_of(
-    folder: &Path,
-    pictures: &[Numbered],
-    notes: &mut Vec<String>,
-) -> Result<(Vec<Array2<f32>>, Option<f64>), SceneError> {
+fn planes_of(pictures: &[Numbered], notes: &mut Vec<String>) -> Result<(Vec<Array2<f32>>, Option<f64>), SceneError> {
     let read: Result<Vec<_>, _> = pictures.par_iter().map(|(_, path)| read_gray(path, None)).collect();
     let mut told = vec![];
     let mut grays = vec![];
@@ -80,11 +104,15 @@ fn planes_of(
         grays.push(gray);
     }
     notes.extend(merged(told.into_iter()));
-    let size = grays[0].values.dim();
-    if let Some(gray) = grays.iter().find(|gray| gray.values.dim() != size) {
-        let reason =
-            format!("the rows of a band and its columns are {:?}, those of another {size:?}", gray.values.dim());
-        return Err(unreadable(folder, reason));
+    let (rows, columns) = grays[0].values.dim();
+    let other = grays.iter().zip(pictures).find(|(gray, _)| gray.values.dim() != (rows, columns));
+    if let Some((gray, (_, path))) = other {
+        let (own_rows, own_columns) = gray.values.dim();
+        let reason = format!(
+            "it is {own_columns} × {own_rows} samples, but {} {columns} × {rows}: expected bands of one size",
+            name_of(&pictures[0].1)
+        );
+        return Err(unreadable(path, reason));
     }
     let top = grays
         .iter()
@@ -139,14 +167,21 @@ fn number_at_end(stem: &str) -> Option<f64> {
     stem[stem.len() - digits..].trim_start_matches('.').parse().ok()
 }
 
+/// Whether the numbers that names end in are wavelengths, nm.
+fn are_wavelengths(numbers: &[f64]) -> bool {
+    numbers.iter().all(|number| (150.0..=20_000.0).contains(number))
+}
+
 fn wavelengths_of(folder: &Path, pictures: &[(f64, PathBuf)]) -> Result<Vec<f64>, SceneError> {
     if let Some(list) = LISTS.iter().map(|name| folder.join(name)).find(|path| path.is_file()) {
         let text = fs::read_to_string(&list).map_err(|error| unreadable(&list, error))?;
         let is_separator = |c: char| c.is_whitespace() || c == ',' || c == ';';
-        return Ok(text.split(is_separator).filter_map(|word| word.parse().ok()).collect());
+        let numbers: Vec<f64> = text.split(is_separator).filter_map(|word| word.parse().ok()).collect();
+        return without_unit(&numbers)
+            .ok_or_else(|| unreadable(&list, "its numbers are no likely nm: expected wavelengths in nm"));
     }
     let numbers: Vec<f64> = pictures.iter().map(|(number, _)| *number).collect();
-    if numbers.iter().all(|number| (150.0..=20_000.0).contains(number)) {
+    if are_wavelengths(&numbers) {
         return Ok(numbers);
     }
     let is_cave = |path: &PathBuf| path.file_stem().is_some_and(|stem| stem.to_string_lossy().contains("_ms_"));
@@ -220,7 +255,7 @@ mod tests {
         assert!(read_band_folder(folder.path(), None).unwrap_err().to_string().contains("no spectral band"));
         let folder = folder_of(&["a_400.png"]);
         save(&ImageBuffer::from_pixel(9, 9, Luma([1_u8])).into(), &folder.path().join("a_500.png")).unwrap();
-        assert!(read_band_folder(folder.path(), None).unwrap_err().to_string().contains("rows of a band"));
+        assert!(read_band_folder(folder.path(), None).unwrap_err().to_string().contains("expected bands of one size"));
         let folder = folder_of(&["a_400.png"]);
         let colored = ImageBuffer::from_pixel(4, 3, image::Rgb([200_u8, 20, 100]));
         save(&colored.into(), &folder.path().join("a_500.png")).unwrap();

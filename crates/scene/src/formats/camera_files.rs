@@ -12,7 +12,9 @@ use serde::{
 use serde_json::Value;
 
 use super::{
-    camera::CameraData,
+    camera::CameraFile,
+    camera_models::{HARMLESS, check_matrix, is_fisheye, unknown_model},
+    camera_yaml::of_yaml,
     distortion::Distortion,
     stated::{Stated, short},
     unusable::{check_memory, unreadable},
@@ -21,41 +23,7 @@ use crate::SceneError;
 
 /// Endings of a picture's stem that its camera file does not repeat.
 const PARTS: [&str; 4] = [".radiance_depth", ".radiance", ".reflectance", ".depth"];
-/// Keys that change nothing of what a scene is.
-const HARMLESS: [&str; 9] =
-    ["source", "name", "comment", "comments", "description", "note", "notes", "license", "camera_angle_y"];
-/// What calibrations call the polynomial of `OpenCV`, or no distortion at all.
-const POLYNOMIALS: [&str; 12] = [
-    "OPENCV",
-    "PINHOLE",
-    "SIMPLE_PINHOLE",
-    "SIMPLE_RADIAL",
-    "RADIAL",
-    "PERSPECTIVE",
-    "PLUMB_BOB",
-    "RATIONAL_POLYNOMIAL",
-    "RADTAN",
-    "RADIAL_TANGENTIAL",
-    "BROWN_CONRADY",
-    "NONE",
-];
-/// What they call a fisheye by the angle.
-const FISHEYES: [&str; 5] = ["OPENCV_FISHEYE", "FISHEYE", "EQUIDISTANT", "EQUI", "KANNALA_BRANDT"];
-
-/// Returns whether a model is a fisheye; `None` of one that is not known.
-fn is_fisheye(model: &str) -> Option<bool> {
-    let model = model.trim().trim_matches(['"', '\'']).to_uppercase().replace(['-', ' '], "_");
-    if model.is_empty() || POLYNOMIALS.contains(&model.as_str()) {
-        return Some(false);
-    }
-    FISHEYES.contains(&model.as_str()).then_some(true)
-}
-
-fn unknown_model(model: &str) -> String {
-    format!("its camera model is '{}', expected PINHOLE, OPENCV or OPENCV_FISHEYE", short(model))
-}
-
-impl CameraData {
+impl CameraFile {
     /// Reads the camera file beside a picture, or returns `None` where there is none.
     ///
     /// For `a_1.radiance_depth.exr` the names looked for are `a_1.camera.json`, `a_1_camera.json` and `a_camera.json`.
@@ -81,25 +49,7 @@ impl CameraData {
             }
             text => of_colmap(path, text),
         };
-        let data = data.map_err(|reason| unreadable(path, reason))?;
-        let numbers = [data.fx_px, data.fy_px, data.cx_px, data.cy_px];
-        if !(numbers.iter().all(|n| n.is_finite())
-            && data.distortion.is_finite()
-            && data.fx_px > 0.0
-            && data.fy_px > 0.0)
-        {
-            let reason = format!(
-                "focal lengths {} and {} px, center ({}, {}) px: expected finite numbers and focal lengths above 0",
-                data.fx_px, data.fy_px, data.cx_px, data.cy_px
-            );
-            return Err(unreadable(path, reason));
-        }
-        match data.depth_unit_m {
-            Some(unit_m) if !(unit_m.is_finite() && unit_m > 0.0) => {
-                Err(unreadable(path, format!("depth_unit_m is {unit_m}, expected a length above 0")))
-            }
-            _ => Ok(data),
-        }
+        data.and_then(Self::checked).map_err(|reason| unreadable(path, reason))
     }
 }
 
@@ -143,7 +93,7 @@ impl<'de> Deserialize<'de> for Object {
 }
 
 /// Reads JSON of ours, `Open3D`, nerfstudio or ROS.
-fn of_json(path: &Path, text: &str) -> Result<CameraData, String> {
+fn of_json(path: &Path, text: &str) -> Result<CameraFile, String> {
     let Object(entries) = serde_json::from_str(text).map_err(|error| error.to_string())?;
     let mut keys = Stated::new("key", entries);
     // Centers of pixels are at whole numbers for OpenCV and Open3D, at halves for nerfstudio.
@@ -158,19 +108,14 @@ fn of_json(path: &Path, text: &str) -> Result<CameraData, String> {
     if keys.get("units").and_then(Value::as_str).is_some_and(|unit| ["px", "pixel", "pixels"].contains(&unit)) {
         keys.take("units");
     }
-    let size @ (width, height) = (side(&mut keys, &["width", "w"])?, side(&mut keys, &["height", "h"])?);
-    let angle_rad = number(&mut keys, &["camera_angle_x"])?;
+    let size = (side(&mut keys, &["width", "w"])?, side(&mut keys, &["height", "h"])?);
+    let angles_rad = [number(&mut keys, &["camera_angle_x"])?, number(&mut keys, &["camera_angle_y"])?];
     let [fx, fy, cx, cy] = pinhole_of(&mut keys)?;
-    let of_angle = || Some(0.5 * width? as f64 / (0.5 * angle_rad?).tan());
     let depth_unit_m = depth_unit_of(&mut keys)?;
     let distortion = distortion_of(&mut keys, is_fisheye, is_nerf)?;
-    let missing = |name: &str| format!("missing {name}: expected width, height, fx_px, fy_px, cx_px and cy_px");
-    let fx = fx.or_else(of_angle).ok_or_else(|| missing("fx_px"))?;
     let half = if is_nerf { 0.5 } else { 0.0 };
-    let middle = |side: Option<usize>| side.map(|n| 0.5 * n as f64 - 0.5 + half);
-    let cx = cx.or_else(|| middle(width)).ok_or_else(|| missing("cx_px"))?;
-    let cy = cy.or_else(|| middle(height)).ok_or_else(|| missing("cy_px"))?;
-    Ok(CameraData {
+    let missing = |name: &str| format!("missing {name}: expected width, height, fx_px, fy_px, cx_px and cy_px");
+    Ok(CameraFile {
         file: path.to_owned(),
         size: match size {
             (Some(width), Some(height)) => Some((width, height)),
@@ -178,10 +123,9 @@ fn of_json(path: &Path, text: &str) -> Result<CameraData, String> {
             (None, _) => return Err(missing("width")),
             (_, None) => return Err(missing("height")),
         },
-        fx_px: fx,
-        fy_px: fy.unwrap_or(fx),
-        cx_px: cx - half,
-        cy_px: cy - half,
+        focal_px: [fx, fy],
+        angles_rad,
+        center_px: [cx, cy].map(|center| center.map(|center| center - half)),
         distortion,
         depth_unit_m,
         note: keys.note(path, |name| HARMLESS.contains(&name)),
@@ -318,7 +262,7 @@ fn numbers_of(value: &Value, name: &str) -> Result<Vec<f64>, String> {
 }
 
 /// Reads the first camera of COLMAP's `cameras.txt`: number, model, width, height and parameters, with centers of pixels at halves.
-fn of_colmap(path: &Path, text: &str) -> Result<CameraData, String> {
+fn of_colmap(path: &Path, text: &str) -> Result<CameraFile, String> {
     let expected = "expected JSON, YAML, or a line of COLMAP's cameras.txt: number, model, width, height, parameters";
     let mut lines = text.lines().map(str::trim).filter(|line| !line.is_empty() && !line.starts_with('#'));
     let line = lines.next().ok_or(expected)?;
@@ -344,150 +288,16 @@ fn of_colmap(path: &Path, text: &str) -> Result<CameraData, String> {
         }
     };
     let more: Vec<String> = lines.map(short).collect();
-    Ok(CameraData {
+    Ok(CameraFile {
         file: path.to_owned(),
         size: Some(size),
-        fx_px: f.0,
-        fy_px: f.1,
-        cx_px: c.0 - 0.5,
-        cy_px: c.1 - 0.5,
+        focal_px: [Some(f.0), Some(f.1)],
+        angles_rad: [None; 2],
+        center_px: [Some(c.0 - 0.5), Some(c.1 - 0.5)],
         distortion: Distortion::of_list(k, model.ends_with("_FISHEYE"))?,
         depth_unit_m: None,
         note: super::stated::note_of(path, "line", &more),
     })
-}
-
-/// Checks that of a camera matrix nothing is left out: what must be 0, for it to be that of a camera whose rows and columns are at right angles.
-fn check_matrix(name: &str, rest: &[f64]) -> Result<(), String> {
-    match rest.iter().all(|number| number.abs() < 1e-9) {
-        true => Ok(()),
-        false => Err(format!("its {name} has a skew or a last row other than 0, 0, 1, expected none")),
-    }
-}
-
-/// Reads YAML of a calibration of `OpenCV` or ROS (`camera_matrix`, `distortion_coefficients`, `image_width`, `image_height`), or of one camera of
-/// Kalibr (`intrinsics`, `distortion_coeffs`, `resolution`).
-fn of_yaml(path: &Path, text: &str) -> Result<CameraData, String> {
-    let mut keys = Stated::new("key", yaml_entries(text)?);
-    let list = |text: String| -> Result<Vec<f64>, String> {
-        let words = text.trim_matches(['[', ']']).split(',').map(str::trim).filter(|word| !word.is_empty());
-        words.map(|word| word.parse().map_err(|_| format!("'{}' is no number", short(word)))).collect()
-    };
-    let matrix = keys.take_any(&["camera_matrix", "Camera_Matrix", "K", "cameraMatrix"]).map(list).transpose()?;
-    let (f, c) = match (matrix, keys.take("intrinsics").map(list).transpose()?) {
-        (Some(m), None) => {
-            let &[fx, skew, cx, below, fy, cy, left, right, last] = &m[..] else {
-                return Err("its camera_matrix has not 9 numbers".to_owned());
-            };
-            check_matrix("camera_matrix", &[skew, below, left, right, last - 1.0])?;
-            ((fx, fy), (cx, cy))
-        }
-        (None, Some(numbers)) => {
-            let &[fx, fy, cx, cy] = &numbers[..] else {
-                return Err("its intrinsics are not 4 numbers, expected those of a pinhole".to_owned());
-            };
-            ((fx, fy), (cx, cy))
-        }
-        (Some(_), Some(_)) => return Err("it has a camera_matrix and intrinsics: expected one".to_owned()),
-        (None, None) => return Err("it has no camera_matrix".to_owned()),
-    };
-    let mut is_bent_as_fisheye = false;
-    for name in ["camera_model", "distortion_model"] {
-        let Some(model) = keys.take(name) else { continue };
-        is_bent_as_fisheye |= is_fisheye(&model).ok_or_else(|| unknown_model(&model))?;
-    }
-    let names = ["distortion_coefficients", "Distortion_Coefficients", "distortion_coeffs", "distCoeffs", "D"];
-    let k = keys.take_any(&names).map(list).transpose()?.unwrap_or_default();
-    let mut side = |names: &[&str]| -> Result<Option<usize>, String> {
-        let Some(text) = keys.take_any(names) else { return Ok(None) };
-        let wrong = || format!("{} is '{}', expected a number of samples", names[0], short(&text));
-        text.parse::<usize>().ok().filter(|n| *n > 0).map(Some).ok_or_else(wrong)
-    };
-    let size = match (side(&["image_width", "image_Width"])?, side(&["image_height", "image_Height"])?) {
-        (Some(width), Some(height)) => Some((width, height)),
-        (None, None) => None,
-        _ => return Err("it has one of image_width and image_height, expected both".to_owned()),
-    };
-    let size = match (size, keys.take("resolution").map(list).transpose()?.as_deref()) {
-        (None, Some(&[width, height])) if width >= 1.0 && height >= 1.0 => Some((width as usize, height as usize)),
-        (None, Some(_)) => return Err("its resolution is no width and height".to_owned()),
-        (size, _) => size,
-    };
-    // A rectification that turns nothing is none.
-    const NO_TURN: [f64; 9] = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
-    if keys.get("rectification_matrix").is_some_and(|text| list(text.clone()).is_ok_and(|own| own == NO_TURN)) {
-        keys.take("rectification_matrix");
-    }
-    Ok(CameraData {
-        file: path.to_owned(),
-        size,
-        fx_px: f.0,
-        fy_px: f.1,
-        cx_px: c.0,
-        cy_px: c.1,
-        distortion: Distortion::of_list(&k, is_bent_as_fisheye)?,
-        depth_unit_m: None,
-        note: keys.note(path, |name| {
-            const OURS: [&str; 9] = [
-                "calibration_time",
-                "calibration_Time",
-                "nframes",
-                "board_width",
-                "board_height",
-                "square_size",
-                "flags",
-                "camera_name",
-                "sensor_type",
-            ];
-            HARMLESS.contains(&name) || OURS.contains(&name) || name.contains("error")
-        }),
-    })
-}
-
-/// Returns the `key: value` lines, in which the `data: [...]` of a matrix belongs to the key above; lists may run over lines.
-fn yaml_entries(text: &str) -> Result<Vec<(String, String)>, String> {
-    let mut entries: Vec<(String, String)> = vec![];
-    // A key without a value, of which no matrix has been found yet.
-    let mut matrix: Option<String> = None;
-    let without_comment = |line: &str| line.split(" #").next().unwrap_or_default().trim().to_owned();
-    let mut rest = text.lines().map(without_comment);
-    while let Some(line) = rest.next() {
-        if line.is_empty() || line.starts_with(['%', '#']) || line == "---" || line == "..." {
-            continue;
-        }
-        let Some((key, value)) = line.split_once(':') else {
-            return Err(format!("'{}' is no key: value", short(&line)));
-        };
-        let mut value = value.trim().to_owned();
-        while value.starts_with('[') && !value.ends_with(']') {
-            let Some(more) = rest.next() else {
-                return Err(format!("the list of '{}' is never closed by ']'", short(key)));
-            };
-            value.push_str(&more);
-        }
-        let entry = match (key.trim(), &matrix) {
-            ("rows" | "cols" | "dt", Some(_)) => continue,
-            ("data", Some(name)) => {
-                let name = name.clone();
-                matrix = None;
-                (name, value)
-            }
-            (key, _) if value.is_empty() || value.contains("opencv-matrix") => {
-                entries.extend(matrix.replace(key.to_owned()).map(|name| (name, String::new())));
-                continue;
-            }
-            (key, _) => {
-                entries.extend(matrix.take().map(|name| (name, String::new())));
-                (key.to_owned(), value)
-            }
-        };
-        if entries.iter().any(|(own, value)| *own == entry.0 && *value != entry.1) {
-            return Err(format!("the key '{}' stands twice: expected it once", short(&entry.0)));
-        }
-        entries.push(entry);
-    }
-    entries.extend(matrix.map(|name| (name, String::new())));
-    Ok(entries)
 }
 
 #[cfg(test)]

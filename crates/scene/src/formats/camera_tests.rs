@@ -1,45 +1,50 @@
 //! Camera files of each program, and what is made of their numbers.
 
 use super::*;
-use crate::View;
+use crate::{View, formats::camera::CameraData};
 use approx::assert_abs_diff_eq;
 
 const GOOD: &str = r#"{"width": 741, "height": 500, "fx_px": 994.978, "fy_px": 994.978, "cx_px": 311.0,
     "cy_px": 254.0, "source": "a stereo pair"}"#;
 
-fn read(text: &str, rows: usize, columns: usize) -> Result<CameraData, SceneError> {
+const PICTURE: &str = "motor_370.radiance_depth.exr";
+
+fn read_file(text: &str) -> Result<CameraFile, SceneError> {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("motor_camera.json"), text).unwrap();
-    let picture = folder.path().join("motor_370.radiance_depth.exr");
-    CameraData::beside(&picture)?.unwrap().of_size(&picture, rows, columns)
+    Ok(CameraFile::beside(&folder.path().join(PICTURE))?.unwrap())
+}
+
+fn read(text: &str, rows: usize, columns: usize) -> Result<CameraData, SceneError> {
+    read_file(text)?.of_size(Path::new(PICTURE), rows, columns)
 }
 
 #[test]
 fn camera_file_is_found_and_scaled() {
     let full = read(GOOD, 500, 741).unwrap();
     let view = View { focal_px: 994.978, center_x_px: 311.0, center_y_px: 254.0 };
-    assert_eq!((full.view(), &full.note), (view, &None));
+    assert_eq!((full.view(), full.notes.len()), (view, 0));
     assert_eq!(read(GOOD, 250, 370).unwrap().view(), view.binned(2));
-    assert_eq!(CameraData::beside(Path::new("nowhere/a.exr")), Ok(None));
-    assert_eq!(full.straightened(500, 741), None);
+    assert_eq!(CameraFile::beside(Path::new("nowhere/a.exr")), Ok(None));
+    assert_eq!(full.straightened(500, 741).unwrap(), None);
 }
 
 #[test]
 fn unknown_keys_are_named() {
     let text = GOOD.replace("\"source\"", "\"shutter\": 3, \"Fx_px\": 5, \"units\": \"mm\", \"source\"");
-    let note = read(&text, 500, 741).unwrap().note.unwrap();
-    assert_eq!(note, "motor_camera.json: its keys 'shutter', 'Fx_px', 'units' are not used");
+    let notes = read(&text, 500, 741).unwrap().notes;
+    assert_eq!(notes[0], "motor_camera.json: its keys 'shutter', 'Fx_px', 'units' are not used");
     let in_samples = GOOD.replace("\"source\"", "\"units\": \"pixels\", \"source\"");
-    assert_eq!(read(&in_samples, 500, 741).unwrap().note, None);
+    assert_eq!(read(&in_samples, 500, 741).unwrap().notes, [""; 0]);
 }
 
 #[test]
 fn other_programs_are_read() {
     let same = |text: &str, unit: Option<f64>| {
-        let data = read(text, 480, 640).unwrap();
-        assert_eq!(data.note, None, "{text}");
+        let (file, data) = (read_file(text).unwrap(), read(text, 480, 640).unwrap());
+        assert!(data.notes.is_empty(), "{text}");
         let numbers = [data.fx_px, data.fy_px, data.cx_px, data.cy_px];
-        assert_eq!((numbers, data.depth_unit_m), ([525.0, 526.0, 319.5, 239.5], unit), "{text}");
+        assert_eq!((numbers, file.depth_unit_m), ([525.0, 526.0, 319.5, 239.5], unit), "{text}");
         data.distortion
     };
     let bent = |k: [f64; 8]| Distortion::Polynomial { k, r8: 0.0 };
@@ -77,10 +82,37 @@ fn other_programs_are_read() {
 }
 
 #[test]
+fn what_is_not_stated_is_told_and_what_is_stated_twice_must_agree() {
+    // 640 samples at 525 px: 2 atan(320 / 525).
+    let angle = 2.0 * (320.0_f64 / 525.0).atan();
+    let nerf = read(&format!(r#"{{"camera_angle_x":{angle},"frames":[]}}"#), 480, 640).unwrap();
+    assert!((nerf.fx_px - 525.0).abs() < 1e-9 && nerf.fy_px == nerf.fx_px && nerf.notes.is_empty());
+    assert_eq!((nerf.cx_px, nerf.cy_px), (319.5, 239.5));
+    let both = |fl_x: f64| {
+        format!(r#"{{"w":640,"h":480,"camera_angle_x":{angle},"fl_x":{fl_x},"fl_y":{fl_x},"cx":320,"cy":240}}"#)
+    };
+    assert!(read(&both(525.0), 480, 640).unwrap().notes.is_empty());
+    assert!(
+        read(&both(600.0), 480, 640)
+            .unwrap_err()
+            .to_string()
+            .contains("600 px, and an angle of view that makes it 525 px")
+    );
+    let bare = read(r#"{"width":640,"height":480,"fx_px":525,"cy_px":239.5}"#, 480, 640).unwrap();
+    assert!(bare.notes[0].contains("cx_px, which is taken for the middle, nor fy_px"), "{:?}", bare.notes);
+    let normalized = r#"{"width":640,"height":480,"fx_px":0.82,"fy_px":1.09,"cx_px":0.5,"cy_px":0.5}"#;
+    assert!(read(normalized, 480, 640).unwrap_err().to_string().contains("expected it in samples"));
+    let camera = |name: &str| format!("{name}:\n  intrinsics: [525, 526, 319.5, 239.5]\n  resolution: [640, 480]\n");
+    assert!(read(&camera("cam0"), 480, 640).unwrap().notes.is_empty());
+    let two = camera("cam0") + &camera("cam1").replace("525", "530");
+    assert!(read(&two, 480, 640).unwrap_err().to_string().contains("several cameras, cam0, cam1"));
+}
+
+#[test]
 fn stretched_and_bent_pictures_are_straightened() {
     let text = GOOD.replace("\"fy_px\": 994.978", "\"fy_px\": 497.489, \"k1\": -0.3");
     let data = read(&text, 500, 741).unwrap();
-    let (straight, note) = data.straightened(500, 741).unwrap();
+    let (straight, note) = data.straightened(500, 741).unwrap().unwrap();
     assert_eq!((straight.rows, straight.columns), (1000, 741));
     assert!(note.contains("2.0000 times") && note.contains("bends"), "{note}");
     // The axis stays where it was, and a direction is found where the lens pictured it.
@@ -98,6 +130,7 @@ fn camera_file_that_does_not_fit_is_refused_by_name() {
         (GOOD, 100, 100, "741 × 500"),
         (GOOD, 1, 800, "741 × 500"),
         (&GOOD.replace("994.978", "-1"), 500, 741, "focal"),
+        (&GOOD.replace("fy_px\": 994.978", "fy_px\": 1e-9"), 500, 741, "times as wide as high"),
         (&GOOD.replace("width", "wide"), 500, 741, "width"),
         (&GOOD.replace("fx_px", "fx_pix"), 500, 741, "fx_px"),
         (&GOOD.replace("741", "\"wide\""), 500, 741, "width is"),
@@ -116,7 +149,8 @@ fn camera_file_that_does_not_fit_is_refused_by_name() {
         ("[3]", 500, 741, "expected JSON"),
         ("1 FISHEYE 3 4 5", 500, 741, "FISHEYE"),
     ] {
-        let message = read(text, rows, columns).unwrap_err().to_string();
+        let read = read(text, rows, columns).and_then(|data| data.straightened(rows, columns));
+        let message = read.unwrap_err().to_string();
         assert!(message.contains("motor_camera.json") && message.contains(word), "{message}");
     }
 }

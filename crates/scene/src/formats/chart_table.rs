@@ -121,7 +121,7 @@ mod tests {
             ("nm,a\n400,0.1\n500\n", "line 3: 1 numbers"),
             ("nm,a\n400,0.1\n500,x\n", "line 3: '500,x'"),
             ("nm\n400\n", "line 2"),
-            ("500,0.1\n400,0.1\n400,0.2\n", "ascending"),
+            ("500,0.1\n400,0.1\n400,0.2\n", "bands 2 and 3 lie both at 400 nm"),
         ] {
             write(text);
             let message = read_scene(&path, &options).unwrap_err().to_string();

@@ -16,7 +16,7 @@ use super::{
     reading::{FileQuantity, Frame, Panorama, Place, light_unit},
     stated::short,
     unusable::unreadable,
-    wavelength_unit::PLAUSIBLE_NM,
+    wavelength_unit::ascending,
 };
 use crate::{SceneError, SceneLight};
 
@@ -49,6 +49,8 @@ pub(super) struct Contents {
 pub(super) struct Hidden {
     pub(super) file: PathBuf,
     pub(super) contents: Contents,
+    /// Whether the file has nothing else.
+    pub(super) is_own_file: bool,
 }
 
 /// The samples of a file.
@@ -167,6 +169,23 @@ impl Contents {
         }
     }
 
+    /// The bands of the file; none of colors.
+    pub(super) fn own_grid(&self) -> Option<WavelengthGrid> {
+        match (&self.own_grid, &self.image) {
+            (Some(own), _) => Some(own.clone()),
+            (None, Image::Spectral(image)) => Some(image.grid().clone()),
+            (None, _) => None,
+        }
+    }
+
+    /// Whether a light is put on the samples, so that they shine.
+    pub(super) fn is_reflectance(&self, options: &ReadOptions) -> bool {
+        match &self.image {
+            Image::Spectral(image) => image.quantity() == Quantity::Reflectance,
+            Image::Linear { .. } | Image::Codes(..) => options.reading.quantity == Some(FileQuantity::Reflectance),
+        }
+    }
+
     /// The rows and columns of the samples.
     pub(super) fn size(&self) -> (usize, usize) {
         match &self.image {
@@ -208,10 +227,33 @@ impl Cube {
     ///
     /// # Errors
     /// When wavelengths or the quantity are missing, or there is another number of wavelengths.
-    pub(super) fn into_contents(self, path: &Path, options: &ReadOptions) -> Result<Contents, SceneError> {
-        let Self { planes, top, wavelengths_nm, quantity, unit: own_unit, mut notes } = self;
-        let reading = &options.reading;
-        let wavelengths_nm = match (&reading.wavelengths_nm, wavelengths_nm) {
+    pub(super) fn into_contents(mut self, path: &Path, options: &ReadOptions) -> Result<Contents, SceneError> {
+        let wavelengths_nm = self.bands_nm(path, options)?;
+        let order = ascending(path, &wavelengths_nm, 0..wavelengths_nm.len())?;
+        let unit = self.unit(path, options)?;
+        let (level, what) = self.level(path, options, unit)?;
+        let values = |reason: SpectrumError| SceneError::Values { file: path.to_owned(), reason };
+        let grid = WavelengthGrid::new(order.iter().map(|&band| wavelengths_nm[band]).collect()).map_err(values)?;
+        let mut planes: Vec<Option<Array2<f32>>> = self.planes.into_iter().map(Some).collect();
+        let mut planes: Vec<Array2<f32>> = order.iter().filter_map(|&band| planes[band].take()).collect();
+        let scale = options.reading.scale.unwrap_or(1.0);
+        planes.par_iter_mut().zip(grid.centers_nm()).for_each(|(plane, &nm)| {
+            let factor = scale / level * unit.map_or(1.0, |unit| unit.factor_at(nm));
+            if factor != 1.0 {
+                plane.mapv_inplace(|v| (f64::from(v) * factor) as f32);
+            }
+        });
+        let choice = options.reading.no_data.unwrap_or_default();
+        self.notes.extend(mend(path, &grid, &mut planes, choice)?.note(path, choice));
+        let quantity = if unit.is_none() { Quantity::Reflectance } else { Quantity::Radiance };
+        let image = SpectralImage::new(quantity, grid, planes).map_err(values)?;
+        Ok(Contents { notes: self.notes, ..Contents::of(Image::Spectral(image), what) })
+    }
+
+    /// Returns the wavelength of each band: those of the file, or those told.
+    fn bands_nm(&mut self, path: &Path, options: &ReadOptions) -> Result<Vec<f64>, SceneError> {
+        let n = self.planes.len();
+        let wavelengths_nm = match (&options.reading.wavelengths_nm, self.wavelengths_nm.take()) {
             (Some(told), Some(own)) if *told != own => {
                 let reason = "it states its wavelengths: --scene-wavelengths-nm says something else";
                 return Err(unreadable(path, reason));
@@ -219,10 +261,9 @@ impl Cube {
             (Some(told), _) => told.clone(),
             (None, Some(own)) => own,
             // Bands that are asked for are the file's own where there are as many.
-            (None, None) => match options.grid.as_ref().filter(|grid| grid.len() == planes.len()) {
+            (None, None) => match options.grid.as_ref().filter(|grid| grid.len() == n) {
                 Some(grid) => grid.centers_nm().to_vec(),
                 None => {
-                    let n = planes.len();
                     let reason = format!(
                         "it does not tell the wavelengths of its {n} bands: expected --scene-wavelengths-nm, {n} numbers"
                     );
@@ -230,18 +271,19 @@ impl Cube {
                 }
             },
         };
-        if wavelengths_nm.len() != planes.len() {
-            let reason = format!("{} bands, but {} wavelengths", planes.len(), wavelengths_nm.len());
-            return Err(unreadable(path, reason));
+        if wavelengths_nm.len() != n {
+            return Err(unreadable(path, format!("{n} bands, but {} wavelengths", wavelengths_nm.len())));
         }
-        if let Some(nm) = wavelengths_nm.iter().find(|nm| !PLAUSIBLE_NM.contains(*nm)) {
-            let reason = format!("a band lies at {nm} nm: expected wavelengths in nm, or --scene-wavelengths-nm");
-            return Err(unreadable(path, reason));
-        }
+        Ok(wavelengths_nm)
+    }
+
+    /// Returns the unit of light of the numbers; `None` of reflectances, and where nothing says what they are.
+    fn unit(&self, path: &Path, options: &ReadOptions) -> Result<Option<LightUnit>, SceneError> {
+        let reading = &options.reading;
         let units = |reason: &str| Err(SceneError::Units { file: path.to_owned(), reason: reason.to_owned() });
-        let told_unit = reading.unit.as_deref().map(light_unit).transpose()?;
-        if let Some((own, words)) = &own_unit {
-            let is_other = told_unit.is_some_and(|told| told != *own)
+        let told = reading.unit.as_deref().map(light_unit).transpose()?;
+        if let Some((own, words)) = &self.unit {
+            let is_other = told.is_some_and(|told| told != *own)
                 || reading.quantity == Some(FileQuantity::Reflectance)
                 || options.white_level.is_some();
             if is_other {
@@ -249,60 +291,48 @@ impl Cube {
             }
         }
         // What a file says of its numbers holds where nothing else is said.
-        let is_own_reflectance = quantity == Some(FileQuantity::Reflectance) && reading.quantity.is_none();
-        if is_own_reflectance && told_unit.is_some() {
+        let is_own_reflectance = self.quantity == Some(FileQuantity::Reflectance) && reading.quantity.is_none();
+        if is_own_reflectance && told.is_some() {
             return units("it holds reflectances by its unit, which --unit contradicts");
         }
-        let quantity = reading.quantity.or(quantity);
-        let unit: Option<LightUnit> = match (quantity, told_unit.or(own_unit.as_ref().map(|(unit, _)| *unit))) {
+        let quantity = reading.quantity.or(self.quantity);
+        match (quantity, told.or(self.unit.as_ref().map(|(unit, _)| *unit))) {
             (Some(FileQuantity::Reflectance), Some(_)) => {
-                return units("a reflectance has no unit: expected --unit or --quantity reflectance, not both");
+                units("a reflectance has no unit: expected --unit or --quantity reflectance, not both")
             }
-            (_, Some(unit)) => Some(unit),
-            (Some(quantity), None) => quantity.light_unit(),
-            (None, None) => None,
-        };
-        let is_reflectance = unit.is_none();
-        let scale = reading.scale.unwrap_or(1.0);
-        let usual_unit = match quantity {
-            Some(FileQuantity::Photons) => "photons/s/m^2/sr/nm",
-            _ => "W/m^2/sr/nm",
-        };
-        let words =
-            reading.unit.as_deref().or(own_unit.as_ref().map(|(_, words)| words.as_str())).unwrap_or(usual_unit);
-        if !is_reflectance && options.white_level.is_some() {
-            return units("it holds light, of which no number is a perfect white: expected it without --white-level");
+            (_, Some(unit)) => Ok(Some(unit)),
+            (quantity, None) => Ok(quantity.and_then(FileQuantity::light_unit)),
         }
-        let (level, what) = match (is_reflectance, options.white_level, top) {
-            (false, ..) => (1.0, format!("radiance in {}", short(words))),
-            (true, Some(level), _) => (level, format!("reflectance, {level} being a perfect white")),
-            (true, None, Some(top)) if reading.scale.is_none() => {
-                (top, format!("reflectance, {top}, its largest code, being a perfect white"))
-            }
-            (true, None, _) if quantity.is_some() => (1.0, "reflectance, 1 being a perfect white".to_owned()),
-            (true, None, _) => {
+    }
+
+    /// Returns the number of a perfect white, 1 of light, and what the numbers are in words.
+    fn level(&self, path: &Path, options: &ReadOptions, unit: Option<LightUnit>) -> Result<(f64, String), SceneError> {
+        let reading = &options.reading;
+        let quantity = reading.quantity.or(self.quantity);
+        let units = |reason: &str| Err(SceneError::Units { file: path.to_owned(), reason: reason.to_owned() });
+        if unit.is_some() {
+            if options.white_level.is_some() {
                 return units(
-                    "it does not tell what its numbers are: expected --quantity radiance, reflectance or photons",
+                    "it holds light, of which no number is a perfect white: expected it without --white-level",
                 );
             }
-        };
-        let mut order: Vec<usize> = (0..planes.len()).collect();
-        order.sort_by(|&a, &b| wavelengths_nm[a].total_cmp(&wavelengths_nm[b]));
-        let values = |reason: SpectrumError| SceneError::Values { file: path.to_owned(), reason };
-        let grid = WavelengthGrid::new(order.iter().map(|&band| wavelengths_nm[band]).collect()).map_err(values)?;
-        let mut planes: Vec<Option<Array2<f32>>> = planes.into_iter().map(Some).collect();
-        let mut planes: Vec<Array2<f32>> = order.iter().filter_map(|&band| planes[band].take()).collect();
-        planes.par_iter_mut().zip(grid.centers_nm()).for_each(|(plane, &nm)| {
-            let factor = scale / level * unit.map_or(1.0, |unit| unit.factor_at(nm));
-            if factor != 1.0 {
-                plane.mapv_inplace(|v| (f64::from(v) * factor) as f32);
+            let usual = match quantity {
+                Some(FileQuantity::Photons) => "photons/s/m^2/sr/nm",
+                _ => "W/m^2/sr/nm",
+            };
+            let own = self.unit.as_ref().map(|(_, words)| words.as_str());
+            return Ok((1.0, format!("radiance in {}", short(reading.unit.as_deref().or(own).unwrap_or(usual)))));
+        }
+        match (options.white_level, self.top) {
+            (Some(level), _) => Ok((level, format!("reflectance, {level} being a perfect white"))),
+            (None, Some(top)) if reading.scale.is_none() => {
+                Ok((top, format!("reflectance, {top}, its largest code, being a perfect white")))
             }
-        });
-        let choice = reading.no_data.unwrap_or_default();
-        notes.extend(mend(path, &grid, &mut planes, choice)?.note(path, choice));
-        let quantity = if is_reflectance { Quantity::Reflectance } else { Quantity::Radiance };
-        let image = SpectralImage::new(quantity, grid, planes).map_err(values)?;
-        Ok(Contents { notes, ..Contents::of(Image::Spectral(image), what) })
+            (None, _) if quantity.is_some() => Ok((1.0, "reflectance, 1 being a perfect white".to_owned())),
+            (None, _) => {
+                units("it does not tell what its numbers are: expected --quantity radiance, reflectance or photons")
+            }
+        }
     }
 }
 

@@ -9,6 +9,7 @@ use super::{
     camera_files::beside,
     contents::{MATLAB_OR_HDF5, is_of},
     depth_numbers::{DepthNumbers, depth_numbers},
+    length_unit::length_in_name,
     raw_depth::{DepthWords, RawDepth},
     reading::{DepthKind, DepthUnit},
     stated::name_of,
@@ -70,9 +71,15 @@ pub(super) fn likely_beside(picture: &Path) -> Vec<String> {
         let ending = name.rsplit('.').next().unwrap_or_default();
         let is_map =
             ["png", "tif", "tiff", "exr", "pfm", "npy", "npz", "dpt"].contains(&ending) || is_of(path, MATLAB_OR_HDF5);
-        let rest =
-            name.strip_prefix(&stem).or_else(|| name.strip_suffix(ending)?.trim_end_matches('.').strip_suffix(&stem));
-        let says = |rest: &str| ["depth", "disp"].iter().any(|word| rest.contains(word));
+        const WORDS: [&str; 2] = ["depth", "disp"];
+        let is_end = |c: Option<char>| c.is_none_or(|c| !c.is_alphanumeric());
+        // The stem is a word by itself, or stands before one of ours.
+        let behind = name
+            .strip_prefix(&stem)
+            .filter(|rest| is_end(rest.chars().next()) || WORDS.iter().any(|word| rest.starts_with(word)));
+        let before = || name.strip_suffix(ending)?.trim_end_matches('.').strip_suffix(&stem);
+        let rest = behind.or_else(|| before().filter(|rest| is_end(rest.chars().last())));
+        let says = |rest: &str| WORDS.iter().any(|word| rest.contains(word));
         is_map && rest.is_some_and(says) && path != picture && !known.contains(path)
     };
     let paths = entries.take(10_000).filter_map(|entry| Some(entry.ok()?.path()));
@@ -96,15 +103,17 @@ fn is_of_hypersim(path: &Path) -> bool {
 pub(super) fn read_depth(path: &Path, words: DepthWords<'_>) -> Result<RawDepth, SceneError> {
     let mut notes = vec![];
     let numbers = depth_numbers(path, words.variable)?.told_in(&mut notes);
+    if numbers.values.is_empty() {
+        return Err(unreadable(path, "it has no samples"));
+    }
     // Distances that are counted from the camera say so by the name of their channel, or their file.
     let kind = if is_of_hypersim(path) { DepthKind::Radial } else { numbers.kind };
     let unit_m = unit_m_of(path, &numbers, words)?;
-    let is_inverse = matches!(words.kind, Some(DepthKind::Inverse | DepthKind::InverseBetween { .. }));
     let depth = RawDepth {
         kind,
         unit: DepthUnit::Metres(unit_m),
         is_picture: numbers.top.is_some(),
-        top: numbers.top.filter(|top| *top == u16::MAX && !is_inverse),
+        top: numbers.top,
         columns: numbers.values.ncols(),
         frame: numbers.frame,
         values: numbers.values,
@@ -132,11 +141,16 @@ fn unit_m_of(path: &Path, numbers: &DepthNumbers, words: DepthWords<'_>) -> Resu
     if let Some(unit_m) = words.unit_m {
         return Ok(unit_m);
     }
+    let own = length_in_name(&path.file_stem().unwrap_or_default().to_string_lossy());
+    // Codes of metres would be of whole ones.
+    if let Some(own_m) = own.filter(|own_m| numbers.top.is_none() || *own_m < 1.0) {
+        return Ok(own_m);
+    }
     match numbers.top {
-        Some(255) => wrong(
+        Some(..=255.0) => wrong(
             "what one of its codes of 8 bits stands for is not known: expected --depth-unit, as 255/m, or --depth-kind",
         ),
-        Some(u16::MAX) => {
+        Some(65_535.0) => {
             // Neither end counts: each may stand for what was not measured.
             let inner = numbers.values.iter().copied().filter(|v| *v > 0.0 && *v < 65535.0).fold(0.0, f32::max);
             if inner > STRETCHED_FROM && numbers.values.iter().any(|v| *v == 65535.0) {

@@ -8,12 +8,14 @@ use super::{
     contents::{MATLAB_OR_HDF5, is_of},
     exr_depth_file::{DepthChannel, read_depth_exr},
     gray_picture::read_gray,
+    length_unit::length_in_name,
     mat::{Plane, read_plane},
     npy::{NpyArray, read_npy},
     npz::read_npz_plane,
     pfm::read_pfm,
     reading::{DepthKind, Frame},
     stated::{Noted, name_of},
+    text_depth::read_text_depth,
     unusable::unreadable,
 };
 use crate::SceneError;
@@ -21,8 +23,8 @@ use crate::SceneError;
 /// Numbers of a file of depth as they stand there.
 pub(super) struct DepthNumbers {
     pub(super) values: Array2<f32>,
-    /// The last code of whole numbers: 255 and 65535 of bytes and of words, 0 of others; none of floats.
-    pub(super) top: Option<u16>,
+    /// The largest number that whole numbers can be; none of floats.
+    pub(super) top: Option<f64>,
     /// What the names in the file say that they count.
     pub(super) kind: DepthKind,
     /// The length of 1, m, where the file states it.
@@ -35,7 +37,7 @@ pub(super) struct DepthNumbers {
 
 /// Reads the numbers of a file of depth; of several arrays, channels or planes that of the name or number told.
 pub(super) fn depth_numbers(path: &Path, told: Option<&str>) -> Result<Noted<DepthNumbers>, SceneError> {
-    let of = |values: Array2<f32>, top: Option<u16>| DepthNumbers {
+    let of = |values: Array2<f32>, top: Option<f64>| DepthNumbers {
         values,
         top,
         kind: DepthKind::Axial,
@@ -46,7 +48,7 @@ pub(super) fn depth_numbers(path: &Path, told: Option<&str>) -> Result<Noted<Dep
     let mut notes = vec![];
     let named = |name: &str| format!("'{name}' of {}", name_of(path));
     let ending = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
-    if told.is_some() && ["pfm", "npy"].contains(&ending.as_str()) {
+    if told.is_some() && ["pfm", "npy", "txt", "csv", "asc"].contains(&ending.as_str()) {
         return Err(unreadable(path, "it has one depth without a name, expected it without --depth-variable"));
     }
     let numbers = match ending.as_str() {
@@ -64,21 +66,30 @@ pub(super) fn depth_numbers(path: &Path, told: Option<&str>) -> Result<Noted<Dep
         "npz" => {
             let (name, array) = read_npz_plane(path, told)?.told_in(&mut notes);
             let (values, top) = plane_of(path, array)?;
-            DepthNumbers { from: named(&name), kind: kind_of_array(&name), ..of(values, top) }
+            let (kind, unit_m) = (kind_of_array(&name), length_in_name(&name));
+            DepthNumbers { from: named(&name), kind, unit_m, ..of(values, top) }
         }
         _ if is_of(path, MATLAB_OR_HDF5) => {
             let Plane { name, values, top, unit_m } = read_plane(path, told)?.told_in(&mut notes);
-            let kind = kind_of_array(&name);
-            DepthNumbers { from: named(&name), kind, unit_m, ..of(values, codes_of_top(top)) }
+            let (kind, named_m) = (kind_of_array(&name), length_in_name(&name));
+            if let (Some(unit_m), Some(named_m)) = (unit_m, named_m)
+                && unit_m != named_m
+            {
+                let reason = format!("its {} states another unit than its name: expected one of them", named(&name));
+                return Err(unreadable(path, reason));
+            }
+            let unit_m = unit_m.or(named_m);
+            DepthNumbers { from: named(&name), kind, unit_m, ..of(values, top) }
         }
         "exr" => {
             let DepthChannel { name, plane, kind, frame } = read_depth_exr(path, told)?.told_in(&mut notes);
             let from = format!("channel {}", named(&name));
-            DepthNumbers { from, kind, frame: Some(frame), ..of(plane, None) }
+            DepthNumbers { from, kind, unit_m: length_in_name(&name), frame: Some(frame), ..of(plane, None) }
         }
+        "txt" | "csv" | "asc" => of(read_text_depth(path)?.told_in(&mut notes), None),
         _ => {
             let gray = read_gray(path, told)?.told_in(&mut notes);
-            of(gray.values, codes_of_top(gray.top))
+            of(gray.values, gray.top)
         }
     };
     Ok(Noted::new(numbers, notes))
@@ -90,21 +101,12 @@ fn kind_of_array(name: &str) -> DepthKind {
     if last.eq_ignore_ascii_case("distance") { DepthKind::Radial } else { DepthKind::Axial }
 }
 
-/// Returns the last code of whole numbers whose largest is this.
-fn codes_of_top(top: Option<f64>) -> Option<u16> {
-    top.map(|top| match top {
-        _ if top <= 255.0 => u16::from(u8::MAX),
-        65535.0 => u16::MAX,
-        _ => 0,
-    })
-}
-
 /// Returns an array of rows and columns, whatever its sides of 1.
-fn plane_of(path: &Path, array: NpyArray) -> Result<(Array2<f32>, Option<u16>), SceneError> {
+fn plane_of(path: &Path, array: NpyArray) -> Result<(Array2<f32>, Option<f64>), SceneError> {
     let sides: Vec<usize> = array.sides.iter().copied().filter(|side| *side != 1).collect();
     let &[rows, columns] = &sides[..] else {
         return Err(unreadable(path, format!("its sides are {:?}, expected rows and columns", array.sides)));
     };
     let values = Array2::from_shape_vec((rows, columns), array.values).map_err(|error| unreadable(path, error))?;
-    Ok((values, codes_of_top(array.top)))
+    Ok((values, array.top))
 }

@@ -10,7 +10,7 @@ use std::{
 use dioptric_spectrum::{Quantity, SpectralImage, WavelengthGrid};
 
 use super::{
-    camera::CameraData,
+    camera::CameraFile,
     contents::{Contents, Image},
     depth::files_beside,
     envi_data::{EnviFile, Meaning, Wanted},
@@ -20,7 +20,8 @@ use super::{
     reading::{FileQuantity, Frame, NoData, light_unit},
     reduced::reduced_size,
     stated::{name_of, note_of, short},
-    unusable::{starts_with, unreadable},
+    unusable::{in_file, starts_with, unreadable},
+    wavelength_unit::ascending,
 };
 use crate::{SceneError, resample::resampling_weights};
 
@@ -28,6 +29,8 @@ use crate::{SceneError, resample::resampling_weights};
 const LIMIT_HEADER_BYTES: u64 = 64 << 20;
 /// Bands of a cube and of its references that lie no farther apart are the same, nm.
 const SAME_BAND_NM: f64 = 0.1;
+/// What the names of cubes of a perfect white and of no light begin with.
+const REFERENCES: [&str; 2] = ["white_reference", "dark_reference"];
 /// Endings of the file of numbers beside `NAME.hdr`; none at all as well.
 const DATA_ENDINGS: [&str; 9] = ["", "raw", "img", "dat", "bsq", "bil", "bip", "bin", "cube"];
 
@@ -52,12 +55,17 @@ pub(super) fn contents_of_envi(path: &Path, options: &ReadOptions) -> Result<Con
         _ => &[],
     };
     notes.extend(references.iter().flat_map(|reference| reference.notes.clone()));
+    if references.is_empty() {
+        let beside = [REFERENCES[0], REFERENCES[1]].map(|start| file.files_beside(start));
+        let names = beside.into_iter().collect::<Result<Vec<_>, _>>()?.concat();
+        notes.extend(note_of(path, "reference", &names.iter().map(|file| name_of(file)).collect::<Vec<_>>()));
+    }
     notes.extend(file.notes_of_exposures(references));
     if let (Meaning::Light(..), Some(own)) = (&meaning, file.header.reflectance_scale) {
         let name = name_of(path);
         notes.push(format!("{name}: its reflectance scale factor of {own} is not used: it has a unit of radiance"));
     }
-    let order = file.order();
+    let order = ascending(path, &file.wavelengths_nm, file.good_bands())?;
     let own = WavelengthGrid::new(order.iter().map(|&band| file.wavelengths_nm[band]).collect())
         .map_err(|reason| SceneError::Values { file: path.to_owned(), reason })?;
     let wanted = options.grid.clone().unwrap_or_else(|| own.clone());
@@ -65,7 +73,7 @@ pub(super) fn contents_of_envi(path: &Path, options: &ReadOptions) -> Result<Con
     let weights = if wanted == own {
         (0..own.len()).map(|band| vec![(band, 1.0)]).collect()
     } else {
-        resampling_weights(&own, &wanted)?
+        resampling_weights(&own, &wanted).map_err(|error| in_file(path, &error))?
     };
     let choice = options.reading.no_data.unwrap_or_default();
     let own_size = (file.header.rows, file.header.columns);
@@ -102,7 +110,7 @@ pub(super) fn contents_of_envi(path: &Path, options: &ReadOptions) -> Result<Con
 fn stands_alone(path: &Path, options: &ReadOptions) -> bool {
     let reading = &options.reading;
     let others = reading.depth.is_some() || reading.view.is_some() || reading.panorama.is_some();
-    !others && files_beside(path).is_empty() && matches!(CameraData::beside(path), Ok(None))
+    !others && files_beside(path).is_empty() && matches!(CameraFile::beside(path), Ok(None))
 }
 
 /// Rows and columns of a file.
@@ -173,7 +181,7 @@ impl EnviFile {
     /// Reads the header and finds the file of numbers. Bands whose wavelengths nothing states are those wanted, where there are as many.
     fn open(header_path: &Path, told_nm: Option<&[f64]>, wanted_nm: Option<&[f64]>) -> Result<Self, SceneError> {
         let mut header = envi_header::parse(header_path, &header_text(header_path)?)?;
-        let mut notes: Vec<String> = header.note.take().into_iter().collect();
+        let mut notes: Vec<String> = header.note.take().into_iter().chain(header.note_of_order.take()).collect();
         let wrong = |key: &str, reason: String| SceneError::Header {
             file: header_path.to_owned(),
             line: 0,
@@ -245,12 +253,9 @@ impl EnviFile {
         Ok(self)
     }
 
-    /// Returns the good bands by ascending wavelength.
-    fn order(&self) -> Vec<usize> {
-        let is_good = |band: &usize| !self.header.bad_bands.get(*band).copied().unwrap_or(false);
-        let mut order: Vec<usize> = (0..self.header.bands).filter(is_good).collect();
-        order.sort_by(|&a, &b| self.wavelengths_nm[a].total_cmp(&self.wavelengths_nm[b]));
-        order
+    /// Returns the bands that are not marked as bad.
+    fn good_bands(&self) -> impl Iterator<Item = usize> {
+        (0..self.header.bands).filter(|band| !self.header.bad_bands.get(*band).copied().unwrap_or(false))
     }
 
     /// Returns the note of data units that are none of light, and say more than that the numbers are a share or a count.
@@ -329,13 +334,13 @@ impl EnviFile {
         if header.are_gains_of_reflectance {
             return Ok((Meaning::Reflectance(scale), "reflectance by its gains".to_owned()));
         }
-        if let (Some(white), Some(dark)) = (self.beside("white_reference")?, self.beside("dark_reference")?) {
+        if let (Some(white), Some(dark)) = (self.beside(REFERENCES[0])?, self.beside(REFERENCES[1])?) {
             let what =
                 format!("reflectance between {} and {}", name_of(&white.header_path), name_of(&dark.header_path));
             self.check_reference(&white)?;
             self.check_reference(&dark)?;
             let times = self.times_as_long_as(&white)?;
-            return Ok((Meaning::Between(Box::new([white, dark]), times), what));
+            return Ok((Meaning::Between(Box::new([white, dark]), scale / times), what));
         }
         let is_float = matches!(header.data_type, DataType::F32 | DataType::F64);
         if wants_light == Some(false) && (is_float || reading.scale.is_some()) {
@@ -417,6 +422,7 @@ impl EnviFile {
                 }
             }
             notes.extend(note_of(&reference.header_path, "key", &alone));
+            notes.extend(self.notes_of_settings(reference));
         }
         // Without references `tint` changes nothing.
         let is_alone = |key: &String| !(compared.contains(key) || references.is_empty() && key == "tint");
@@ -425,8 +431,21 @@ impl EnviFile {
         notes
     }
 
-    /// Opens the cube beside this one whose name starts so, if there is one.
-    fn beside(&self, start: &str) -> Result<Option<Self>, SceneError> {
+    /// Returns what is said of a reference that was taken with another setting of the camera, a sentence each.
+    fn notes_of_settings(&self, reference: &Self) -> Vec<String> {
+        let (own, theirs) = (&self.header.settings, &reference.header.settings);
+        let other = |(key, value): &(String, String)| {
+            let (_, own) = own.iter().find(|(own, _)| own == key)?;
+            (own != value).then(|| {
+                let (name, of) = (name_of(&reference.header_path), name_of(&self.header_path));
+                format!("{name}: its {key} is {value}, that of {of} {own}: its numbers are taken as they are")
+            })
+        };
+        theirs.iter().filter_map(other).collect()
+    }
+
+    /// Returns the headers beside this one whose names start so, in their order.
+    fn files_beside(&self, start: &str) -> Result<Vec<PathBuf>, SceneError> {
         let folder = self.header_path.parent().filter(|folder| !folder.as_os_str().is_empty());
         let folder = folder.unwrap_or(Path::new("."));
         let entries = fs::read_dir(folder).map_err(|error| unreadable(folder, error))?;
@@ -436,6 +455,12 @@ impl EnviFile {
             .filter(|path| path.file_name().is_some_and(|name| name.to_string_lossy().starts_with(start)))
             .collect();
         found.sort();
+        Ok(found)
+    }
+
+    /// Opens the cube beside this one whose name starts so, if there is one.
+    fn beside(&self, start: &str) -> Result<Option<Self>, SceneError> {
+        let found = self.files_beside(start)?;
         let Some((first, others)) = found.split_first() else { return Ok(None) };
         let mut reference = Self::open(first, None, Some(&self.wavelengths_nm))?;
         // What a reference holds is a perfect white, or darkness, whatever else its header makes of its numbers.

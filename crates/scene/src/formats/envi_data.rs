@@ -45,7 +45,7 @@ pub(super) enum Meaning {
     Light(Vec<f64>),
     /// A reflectance: a factor.
     Reflectance(f64),
-    /// A reflectance between cubes of a perfect white and of no light, and how many times as long as the white's this light was gathered.
+    /// A reflectance between cubes of a perfect white and of no light, and a factor.
     Between(Box<[EnviFile; 2]>, f64),
 }
 
@@ -58,6 +58,75 @@ pub(super) struct EnviFile {
     pub(super) notes: Vec<String>,
 }
 
+/// The bands of a file that are needed, read a few lines at a time.
+struct Lines<'a> {
+    of: &'a EnviFile,
+    data: File,
+    /// The bands, ascending.
+    needed: Vec<usize>,
+    meaning: &'a Meaning,
+    /// The needed bands of a perfect white and of no light.
+    references: Option<[Vec<Array2<f32>>; 2]>,
+    /// The columns that are wanted.
+    columns: Range<usize>,
+}
+
+impl<'a> Lines<'a> {
+    fn open(of: &'a EnviFile, wanted: &Wanted<'_>, meaning: &'a Meaning) -> Result<Self, SceneError> {
+        let mut needed: Vec<usize> = wanted.weights.iter().flatten().map(|(place, _)| wanted.order[*place]).collect();
+        needed.sort_unstable();
+        needed.dedup();
+        let references = match meaning {
+            Meaning::Between(pair, _) => {
+                Some([pair[0].lines(&needed, of.header.rows)?, pair[1].lines(&needed, of.header.rows)?])
+            }
+            _ => None,
+        };
+        let data = File::open(&of.data_path).map_err(|error| unreadable(&of.data_path, error))?;
+        Ok(Self { of, data, needed, meaning, references, columns: wanted.window.1.clone() })
+    }
+
+    /// Reads lines of the needed bands, and makes light or reflectances of their numbers.
+    fn read(&mut self, lines: Range<usize>) -> Result<Vec<Vec<f32>>, SceneError> {
+        let mut raw = self.of.read(&mut self.data, &self.needed, lines.clone())?;
+        let (of, columns) = (self.of, self.of.header.columns);
+        raw.par_iter_mut().zip(&self.needed).enumerate().for_each(|(index, (samples, &band))| match self.meaning {
+            Meaning::Light(factors) => of.convert(samples, band, factors[band]),
+            Meaning::Reflectance(factor) => of.convert(samples, band, *factor),
+            Meaning::Between(_, factor) => {
+                of.convert(samples, band, 1.0);
+                let Some([white, dark]) = &self.references else { return };
+                for (at, sample) in samples.iter_mut().enumerate() {
+                    let (row, column) = (lines.start + at / columns, at % columns);
+                    let of = |lines: &[Array2<f32>]| lines[index][(row % lines[index].nrows(), column)];
+                    let (white, dark) = (of(white), of(dark));
+                    *sample = if white > dark { (*sample - dark) / (white - dark) * *factor as f32 } else { f32::NAN };
+                }
+            }
+        });
+        if self.columns.len() < columns {
+            raw.par_iter_mut().for_each(|samples| {
+                let lines = samples.chunks(columns);
+                *samples = lines.flat_map(|line| &line[self.columns.clone()]).copied().collect();
+            });
+        }
+        Ok(raw)
+    }
+
+    /// Puts the sum of bands, by their places in `order`, with weights, into a part of a plane.
+    fn sum(&self, raw: &[Vec<f32>], order: &[usize], weights: &[(usize, f64)], part: &mut [f32]) {
+        let band = |at: usize| raw[self.needed.binary_search(&order[at]).expect("the band was asked for")].as_slice();
+        if let [(only, 1.0)] = weights[..] {
+            part.copy_from_slice(band(only));
+            return;
+        }
+        let bands: Vec<(&[f32], f64)> = weights.iter().map(|&(at, weight)| (band(at), weight)).collect();
+        for (at, sample) in part.iter_mut().enumerate() {
+            *sample = bands.iter().map(|(samples, weight)| weight * f64::from(samples[at])).sum::<f64>() as f32;
+        }
+    }
+}
+
 impl EnviFile {
     /// Reads the planes that are sums of bands (by their places in `order`, with weights), of means over blocks of samples, and puts light
     /// in the place of what is none.
@@ -66,94 +135,13 @@ impl EnviFile {
         wanted: &Wanted<'_>,
         meaning: &Meaning,
     ) -> Result<(Vec<Array2<f32>>, Mended), SceneError> {
-        let &Wanted { order, weights, grid, ref window, size: (rows, columns), choice } = wanted;
-        let (own_rows, own_columns) = (window.0.len(), window.1.len());
+        let &Wanted { weights, ref window, size: (rows, columns), .. } = wanted;
         // What is wanted of it, and a few lines at a time.
         let bytes = [rows, columns, weights.len(), 4].iter().fold(1_u64, |n, &side| n.saturating_mul(side as u64));
         check_made(&self.data_path, bytes.saturating_add(2 * AT_ONCE_BYTES as u64))?;
-        let mut needed: Vec<usize> = weights.iter().flatten().map(|(place, _)| order[*place]).collect();
-        needed.sort_unstable();
-        needed.dedup();
-        let references = match meaning {
-            Meaning::Between(pair, _) => {
-                Some([pair[0].lines(&needed, self.header.rows)?, pair[1].lines(&needed, self.header.rows)?])
-            }
-            _ => None,
-        };
-        let is_whole = (rows, columns) == (own_rows, own_columns);
-        let mut planes: Vec<Array2<f32>> = weights.iter().map(|_| Array2::zeros((rows, columns))).collect();
-        let mut mended = Mended::default();
-        let mut file = File::open(&self.data_path).map_err(|error| unreadable(&self.data_path, error))?;
-        for lines in self.chunks(window.0.clone(), needed.len()) {
-            let mut raw = self.read(&mut file, &needed, lines.clone())?;
-            raw.par_iter_mut().zip(&needed).enumerate().for_each(|(index, (samples, &band))| match meaning {
-                Meaning::Light(factors) => self.convert(samples, band, factors[band]),
-                Meaning::Reflectance(factor) => self.convert(samples, band, *factor),
-                Meaning::Between(_, times) => {
-                    self.convert(samples, band, 1.0);
-                    let Some([white, dark]) = &references else { return };
-                    for (at, sample) in samples.iter_mut().enumerate() {
-                        let (row, column) = (lines.start + at / self.header.columns, at % self.header.columns);
-                        let of = |lines: &[Array2<f32>]| lines[index][(row % lines[index].nrows(), column)];
-                        let (white, dark) = (of(white), of(dark));
-                        *sample =
-                            if white > dark { (*sample - dark) / (white - dark) / *times as f32 } else { f32::NAN };
-                    }
-                }
-            });
-            if own_columns < self.header.columns {
-                raw.par_iter_mut().for_each(|samples| {
-                    let lines = samples.chunks(self.header.columns);
-                    *samples = lines.flat_map(|line| &line[window.1.clone()]).copied().collect();
-                });
-            }
-            // Counted from the first line of the window.
-            let lines = lines.start - window.0.start..lines.end - window.0.start;
-            let place = |band: usize| needed.binary_search(&band).expect("it was asked for");
-            let sum_of = |weights: &[(usize, f64)], part: &mut [f32]| {
-                if let [(only, 1.0)] = weights[..] {
-                    part.copy_from_slice(&raw[place(order[only])]);
-                    return;
-                }
-                let bands: Vec<(&[f32], f64)> =
-                    weights.iter().map(|&(at, weight)| (raw[place(order[at])].as_slice(), weight)).collect();
-                for (at, sample) in part.iter_mut().enumerate() {
-                    *sample = bands.iter().map(|(samples, weight)| weight * f64::from(samples[at])).sum::<f64>() as f32;
-                }
-            };
-            if is_whole {
-                planes.par_iter_mut().zip(weights).for_each(|(plane, weights)| {
-                    let mut part = plane.slice_mut(ndarray::s![lines.clone(), ..]);
-                    sum_of(weights, part.as_slice_mut().expect("whole rows of a new plane follow each other"));
-                });
-                continue;
-            }
-            let of_weights = |weights: &Vec<(usize, f64)>| {
-                let mut part = Array2::zeros((lines.len(), own_columns));
-                sum_of(weights, part.as_slice_mut().expect("a new plane is in standard order"));
-                part
-            };
-            let mut parts: Vec<Array2<f32>> = weights.par_iter().map(of_weights).collect();
-            mended.add(mend_rows(&self.header_path, grid, &mut parts, choice, window.0.start + lines.start)?);
-            planes.par_iter_mut().zip(&parts).for_each(|(plane, part)| {
-                for (line, samples) in part.rows().into_iter().enumerate() {
-                    let row = block_of(lines.start + line, rows, own_rows);
-                    for (column, sample) in samples.iter().enumerate() {
-                        plane[(row, block_of(column, columns, own_columns))] += sample;
-                    }
-                }
-            });
-        }
-        if is_whole {
-            mended = mend_rows(&self.header_path, grid, &mut planes, choice, window.0.start)?;
-        } else {
-            let side = |block: usize, n: usize, own: usize| start_of(block + 1, n, own) - start_of(block, n, own);
-            for plane in &mut planes {
-                for ((row, column), sum) in plane.indexed_iter_mut() {
-                    *sum /= (side(row, rows, own_rows) * side(column, columns, own_columns)) as f32;
-                }
-            }
-        }
+        let lines = Lines::open(self, wanted, meaning)?;
+        let is_whole = (rows, columns) == (window.0.len(), window.1.len());
+        let (planes, mended) = if is_whole { self.whole(lines, wanted)? } else { self.means(lines, wanted)? };
         let mended = mended.checked(&self.header_path).map_err(|error| match meaning {
             Meaning::Between(pair, _) => {
                 let (white, dark) = (name_of(&pair[0].header_path), name_of(&pair[1].header_path));
@@ -164,6 +152,58 @@ impl EnviFile {
             }
             _ => error,
         })?;
+        Ok((planes, mended))
+    }
+
+    /// Reads the planes with all samples of the window.
+    fn whole(&self, mut lines: Lines<'_>, wanted: &Wanted<'_>) -> Result<(Vec<Array2<f32>>, Mended), SceneError> {
+        let &Wanted { order, weights, grid, ref window, size, choice } = wanted;
+        let mut planes: Vec<Array2<f32>> = weights.iter().map(|_| Array2::zeros(size)).collect();
+        for at in self.chunks(window.0.clone(), lines.needed.len()) {
+            let raw = lines.read(at.clone())?;
+            // Counted from the first line of the window.
+            let rows = at.start - window.0.start..at.end - window.0.start;
+            planes.par_iter_mut().zip(weights).for_each(|(plane, weights)| {
+                let mut part = plane.slice_mut(ndarray::s![rows.clone(), ..]);
+                let part = part.as_slice_mut().expect("whole rows of a new plane follow each other");
+                lines.sum(&raw, order, weights, part);
+            });
+        }
+        let mended = mend_rows(&self.header_path, grid, &mut planes, choice, window.0.start)?;
+        Ok((planes, mended))
+    }
+
+    /// Reads the planes of means over blocks of the window's samples.
+    fn means(&self, mut lines: Lines<'_>, wanted: &Wanted<'_>) -> Result<(Vec<Array2<f32>>, Mended), SceneError> {
+        let &Wanted { order, weights, grid, ref window, size: (rows, columns), choice } = wanted;
+        let (own_rows, own_columns) = (window.0.len(), window.1.len());
+        let mut planes: Vec<Array2<f32>> = weights.iter().map(|_| Array2::zeros((rows, columns))).collect();
+        let mut mended = Mended::default();
+        for at in self.chunks(window.0.clone(), lines.needed.len()) {
+            let raw = lines.read(at.clone())?;
+            let of_weights = |weights: &Vec<(usize, f64)>| {
+                let mut part = Array2::zeros((at.len(), own_columns));
+                lines.sum(&raw, order, weights, part.as_slice_mut().expect("a new plane is in standard order"));
+                part
+            };
+            let mut parts: Vec<Array2<f32>> = weights.par_iter().map(of_weights).collect();
+            mended.add(mend_rows(&self.header_path, grid, &mut parts, choice, at.start)?);
+            let first = at.start - window.0.start;
+            planes.par_iter_mut().zip(&parts).for_each(|(plane, part)| {
+                for (line, samples) in part.rows().into_iter().enumerate() {
+                    let row = block_of(first + line, rows, own_rows);
+                    for (column, sample) in samples.iter().enumerate() {
+                        plane[(row, block_of(column, columns, own_columns))] += sample;
+                    }
+                }
+            });
+        }
+        let side = |block: usize, n: usize, own: usize| start_of(block + 1, n, own) - start_of(block, n, own);
+        for plane in &mut planes {
+            for ((row, column), sum) in plane.indexed_iter_mut() {
+                *sum /= (side(row, rows, own_rows) * side(column, columns, own_columns)) as f32;
+            }
+        }
         Ok((planes, mended))
     }
 

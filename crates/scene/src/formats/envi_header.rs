@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use super::{
-    stated::note_of,
-    wavelength_unit::{PLAUSIBLE_NM, UNITS, in_nm},
+    stated::{self, name_of, note_of},
+    wavelength_unit::{PLAUSIBLE_NM, UNITS, in_nm, without_unit},
 };
 use crate::SceneError;
 
@@ -73,10 +73,14 @@ pub(crate) struct EnviHeader {
     pub(crate) radiance_scale: Option<f64>,
     /// How long the light was gathered, or how much of it: keys with their numbers, which count between a cube and its references.
     pub(crate) exposures: Vec<(String, f64)>,
+    /// How the camera was set and which it was: keys with their words, which count between a cube and its references.
+    pub(crate) settings: Vec<(String, String)>,
     /// `data units`, as written.
     pub(crate) data_units: Option<String>,
     /// What of the header is not used.
     pub(crate) note: Option<String>,
+    /// What is taken for the order of bytes where it does not state it.
+    pub(crate) note_of_order: Option<String>,
 }
 
 /// A `key = value` of the header and the line it starts on.
@@ -130,6 +134,10 @@ const HARMLESS: [&str; 37] = [
 
 /// Keys of how long the light was gathered, or how much of it.
 const EXPOSURES: [&str; 4] = ["tint", "integration time", "exposure", "exposure time"];
+
+/// Keys of how the camera was set, and of which it was.
+const SETTINGS: [&str; 9] =
+    ["binning", "himg", "vimg", "hroi", "vroi", "x start", "sensor type", "camera id", "serial number"];
 
 /// Keys that are used. A writer may leave out the spaces in them, or put underscores in their place.
 const USED: [&str; 23] = [
@@ -195,8 +203,10 @@ pub(crate) fn parse(path: &Path, text: &str) -> Result<EnviHeader, SceneError> {
         reflectance_scale: entries.positive("reflectance scale factor")?,
         radiance_scale: entries.positive("radiance scale factor")?,
         exposures: entries.exposures(),
+        settings: entries.settings(),
         data_units: entries.get("data units").map(|entry| entry.value.trim_matches(['{', '}']).trim().to_owned()),
         note: None,
+        note_of_order: None,
     };
     if header.columns == 0 || header.rows == 0 || header.bands == 0 {
         return Err(entries.wrong("samples", "a cube without samples".to_owned()));
@@ -214,6 +224,10 @@ pub(crate) fn parse(path: &Path, text: &str) -> Result<EnviHeader, SceneError> {
         entries.used.retain(|key| !key.starts_with("data reflectance"));
     }
     header.note = entries.note();
+    if entries.list.iter().all(|entry| entry.key != "byte order") && header.data_type.bytes() > 1 {
+        header.note_of_order =
+            Some(format!("{}: it does not state the order of bytes: the lowest is taken to be first", name_of(path)));
+    }
     Ok(header)
 }
 
@@ -271,6 +285,12 @@ impl Entries<'_> {
         let found: Vec<(String, f64)> = EXPOSURES.iter().filter_map(|key| number(key)).collect();
         self.used.extend(found.iter().map(|(key, _)| key.clone()));
         found
+    }
+
+    /// Returns how the camera was set, without the spaces of lists.
+    fn settings(&self) -> Vec<(String, String)> {
+        let own = self.list.iter().filter(|entry| SETTINGS.contains(&entry.key.as_str()));
+        own.map(|entry| (entry.key.clone(), shown(&entry.value.replace(' ', "")))).collect()
     }
 
     fn number<T: std::str::FromStr>(&mut self, key: &str) -> Result<Option<T>, SceneError> {
@@ -379,30 +399,18 @@ impl Entries<'_> {
     fn wavelengths_nm(&mut self) -> Result<Option<Vec<f64>>, SceneError> {
         let unit = self.get("wavelength units").map(|entry| entry.value.to_ascii_lowercase());
         let Some(numbers) = self.numbers("wavelength")? else { return Ok(None) };
-        let plain = |factor: f64| {
-            // A product of 1.0 keeps the number to the bit.
-            Ok(Some(numbers.iter().map(|number| number * factor).collect()))
-        };
         match unit.as_deref() {
             Some("index") => Ok(None),
             None | Some("unknown" | "") => {
-                let are_counted =
-                    numbers.len() > 1 && numbers.windows(2).all(|pair| pair[1] - pair[0] == 1.0) && numbers[0] <= 1.0;
-                let all = |range: std::ops::Range<f64>| numbers.iter().all(|number| range.contains(number));
-                if !are_counted && all(0.15..20.0) {
-                    return plain(1000.0);
-                }
-                if all(150.0..20_000.0) {
-                    return plain(1.0);
-                }
                 let reason = "the header does not say their unit, and they are no likely nm or µm: expected 'wavelength units' in \
                               the header, or --scene-wavelengths-nm";
-                Err(self.wrong("wavelength", reason.to_owned()))
+                without_unit(&numbers).map(Some).ok_or_else(|| self.wrong("wavelength", reason.to_owned()))
             }
             Some(other) => match in_nm(other, &numbers) {
                 Some(all) => match all.iter().zip(&numbers).find(|(nm, _)| !PLAUSIBLE_NM.contains(*nm)) {
                     Some((_, number)) => {
-                        let reason = format!("{number} in {} is no wavelength of light", shown(other));
+                        let reason =
+                            format!("{} in {} is no wavelength of light", stated::shown(*number), shown(other));
                         Err(self.wrong("wavelength units", reason))
                     }
                     None => Ok(Some(all)),

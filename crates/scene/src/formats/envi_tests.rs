@@ -154,6 +154,30 @@ fn white_is_reported_by_the_caller_the_header_or_references() {
 }
 
 #[test]
+fn references_of_other_settings_and_those_that_do_not_count_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let (text, bytes) = (header(1, "bsq", 0), samples(1, "bsq", 0));
+    write(folder.path(), "dark_reference_1", &text, &[1; 29]);
+    // A factor that is told counts with references too.
+    write(folder.path(), "white_reference_1", &format!("{text}binning = {{2, 2}}\n"), &[201; 29]);
+    let binned = write(folder.path(), "b", &format!("{text}binning = {{1, 1}}\n"), &bytes);
+    let scaled = |scale: Option<f64>| {
+        let reading = FileReading { scale, ..FileReading::default() };
+        read_with(&binned, &ReadOptions { reading, ..ReadOptions::default() }).unwrap()
+    };
+    let ((plain, notes), (double, _)) = (scaled(None), scaled(Some(2.0)));
+    assert_eq!(double.planes()[1][(3, 2)], 2.0 * plain.planes()[1][(3, 2)]);
+    let expected =
+        "white_reference_1.hdr: its binning is {2,2}, that of b.hdr {1,1}: its numbers are taken as they are";
+    assert!(notes.iter().any(|note| note == expected), "{notes:?}");
+    // References beside a cube that says itself what its numbers are.
+    let factor = write(folder.path(), "c", &format!("{text}reflectance scale factor = 50\n"), &bytes);
+    let (_, notes) = read_with(&factor, &ReadOptions::default()).unwrap();
+    let expected = "c.hdr: its references 'white_reference_1.hdr', 'dark_reference_1.hdr' are not used";
+    assert!(notes.iter().any(|note| note == expected), "{notes:?}");
+}
+
+#[test]
 fn gains_offsets_and_scale_factors_are_obeyed() {
     let folder = tempfile::tempdir().unwrap();
     let (text, bytes) = (header(1, "bil", 0), samples(1, "bil", 0));

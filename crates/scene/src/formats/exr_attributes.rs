@@ -1,11 +1,17 @@
 //! The header attributes of our EXR files: units, sample pitch, camera data.
 
+use std::path::Path;
+
 use exr::{
     meta::attribute::EnvironmentMap,
     prelude::{AttributeValue, LayerAttributes, Text},
 };
 
-use super::{light_unit::LightUnit, stated::Stated};
+use super::{
+    camera::SAME_FOCAL,
+    light_unit::LightUnit,
+    stated::{Stated, name_of},
+};
 use crate::{SceneError, SceneLight, View};
 
 const LAYOUT_VERSION: &str = "spectralLayoutVersion";
@@ -73,7 +79,36 @@ pub(super) fn is_harmless(name: &str) -> bool {
     NAMES.contains(&name) || STARTS.iter().any(|start| name.starts_with(start))
 }
 
+/// Returns a text of a header, which is UTF-8 or, where it cannot be, Latin-1.
+pub(super) fn words_of(text: &Text) -> String {
+    String::from_utf8(text.as_slice().to_vec()).unwrap_or_else(|_| text.to_string())
+}
+
 impl Attributes {
+    /// Returns what is taken in place of camera data that the header should state beside its focal length.
+    pub(super) fn note_of_center(&self, path: &Path) -> Option<String> {
+        let is_whole = self.center_x_px.is_some() && self.center_y_px.is_some();
+        (self.focal_px.is_some() && !is_whole).then(|| {
+            format!("{}: it does not state {CENTER_X} and {CENTER_Y}: its axis is taken for the middle", name_of(path))
+        })
+    }
+
+    /// Returns the names of what a part of the same picture states otherwise, which is not used.
+    pub(super) fn other_of(&self, part: &Self) -> Vec<String> {
+        let numbers = [
+            (PITCH, self.pitch_um, part.pitch_um),
+            (FOCAL, self.focal_px, part.focal_px),
+            (CENTER_X, self.center_x_px, part.center_x_px),
+            (CENTER_Y, self.center_y_px, part.center_y_px),
+            (FOV, self.fov_deg, part.fov_deg),
+            ("whiteLuminance", self.white_cd_m2, part.white_cd_m2),
+        ];
+        let is_other = |own: Option<f64>, theirs: Option<f64>| theirs.is_some() && theirs != own;
+        let numbers = numbers.into_iter().filter(|(_, own, theirs)| is_other(*own, *theirs)).map(|(name, ..)| name);
+        let light = (part.light != Ok(None) && part.light != self.light).then_some(LIGHT);
+        numbers.chain(light).map(str::to_owned).collect()
+    }
+
     /// Returns the camera data; a center that is not given lies in the middle.
     pub(crate) fn view(&self, columns: usize, rows: usize) -> Result<Option<View>, SceneError> {
         let centered = |focal_px| View {
@@ -81,9 +116,17 @@ impl Attributes {
             center_x_px: self.center_x_px.unwrap_or(0.5 * (columns as f64 - 1.0)),
             center_y_px: self.center_y_px.unwrap_or(0.5 * (rows as f64 - 1.0)),
         };
-        let view = match (self.focal_px, self.fov_deg) {
-            (Some(focal_px), _) => centered(focal_px),
-            (None, Some(fov_deg)) => centered(View::from_horizontal_fov_deg(fov_deg, columns, rows)?.focal_px),
+        let of_angle = |fov_deg| View::from_horizontal_fov_deg(fov_deg, columns, rows).map(|view| view.focal_px);
+        let view = match (self.focal_px, self.fov_deg.map(of_angle).transpose()?) {
+            (Some(own), Some(other)) if (own / other - 1.0).abs() > SAME_FOCAL => {
+                return Err(SceneError::Setting {
+                    what: FOCAL,
+                    value: format!("{own} px, and {FOV} makes it {other:.2} px"),
+                    expected: "one of them, or both alike".to_owned(),
+                });
+            }
+            (Some(own), _) => centered(own),
+            (None, Some(other)) => centered(other),
             (None, None) => return Ok(None),
         };
         view.check()?;
@@ -97,19 +140,19 @@ pub(crate) fn from_layer(layer: &LayerAttributes) -> Attributes {
     let number = |name: &str| match get(name) {
         Some(&AttributeValue::F64(value)) => Some(value),
         Some(&AttributeValue::F32(value)) => Some(f64::from(value)),
-        Some(AttributeValue::Text(text)) => text.to_string().trim().parse().ok(),
+        Some(AttributeValue::Text(text)) => words_of(text).trim().parse().ok(),
         _ => None,
     };
     let unit = match get(UNITS) {
         // `W.m^-2.sr^-1` is what the layout's reference library writes for values a nanometre.
         Some(AttributeValue::Text(text)) => {
-            let text = text.to_string();
+            let text = words_of(text);
             LightUnit::parse(&text).map(Some).ok_or(text)
         }
         _ => Ok(None),
     };
     let ours = [LAYOUT_VERSION, UNITS, PITCH, FOCAL, CENTER_X, CENTER_Y, FOV, LIGHT];
-    let own = layer.other.keys().map(ToString::to_string).filter(|name| !ours.contains(&name.as_str()));
+    let own = layer.other.keys().map(words_of).filter(|name| !ours.contains(&name.as_str()));
     // Attributes of the standard that would change where or how bright things are.
     let standard = [
         ("adoptedNeutral", layer.adopted_neutral.is_some()),
@@ -122,11 +165,16 @@ pub(crate) fn from_layer(layer: &LayerAttributes) -> Attributes {
         ("screenWindowCenter", layer.screen_window_center.0 != 0.0 || layer.screen_window_center.1 != 0.0),
     ];
     let standard = standard.into_iter().filter(|(_, is_there)| *is_there).map(|(name, _)| name.to_owned());
-    let mut others: Vec<String> = own.chain(standard).collect();
+    let is_text = |name: &str| matches!(get(name), Some(AttributeValue::Text(_)));
+    // Ours whose values are none that can stand there.
+    let unfit = [PITCH, FOCAL, CENTER_X, CENTER_Y, FOV].into_iter().filter(|name| number(name).is_none());
+    let unfit = unfit.chain([UNITS, LIGHT].into_iter().filter(|name| !is_text(name)));
+    let unfit = unfit.filter(|name| get(name).is_some()).map(|name| format!("{name}, which is no likely value"));
+    let mut others: Vec<String> = own.chain(standard).chain(unfit).collect();
     others.sort();
     let light = match get(LIGHT) {
         Some(AttributeValue::Text(text)) => {
-            let light = serde_json::from_str::<SceneLight>(&text.to_string()).map_err(|error| error.to_string());
+            let light = serde_json::from_str::<SceneLight>(&words_of(text)).map_err(|error| error.to_string());
             let is_light =
                 |light: SceneLight| light.illuminant.check().map(|()| light).map_err(|error| error.to_string());
             light.and_then(is_light).map(Some)

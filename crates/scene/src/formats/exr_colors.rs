@@ -14,6 +14,12 @@ use crate::SceneError;
 pub(super) const EXPECTED: &str =
     "channels R, G and B or Y, or named like S0.550,000000nm (light) or T.550,000000nm (reflectance)";
 
+/// Whether a layer has the name of a picture, and not of one of its passes.
+pub(super) fn is_called_picture(layer: &str) -> bool {
+    let last = layer.rsplit('.').next().unwrap_or_default().to_ascii_lowercase();
+    ["combined", "rgb", "rgba", "color", "beauty", "image"].contains(&last.as_str())
+}
+
 /// Takes red, green and blue of the layer told, or else `R`, `G` and `B`, or those of a layer, Blender's `….Combined` before others; or
 /// gray, `Y`. Returns them with what stands before their letters.
 ///
@@ -36,10 +42,8 @@ pub(super) fn colors_of(
         .filter(|prefix| ["G", "B"].iter().all(|letter| names.contains(&full(prefix, letter))))
         .collect();
     let listed = || prefixes.iter().map(|prefix| format!("'{prefix}'")).collect::<Vec<_>>().join(", ");
-    let last = |prefix: &str| prefix.rsplit('.').next().unwrap_or_default().to_ascii_lowercase();
-    let is_beauty =
-        |prefix: &&&str| ["combined", "rgb", "rgba", "color", "beauty", "image"].contains(&last(prefix).as_str());
-    let of_picture = || prefixes.iter().find(|prefix| prefix.is_empty()).or_else(|| prefixes.iter().find(is_beauty));
+    let is_called = |prefix: &&&str| is_called_picture(prefix);
+    let of_picture = || prefixes.iter().find(|prefix| prefix.is_empty()).or_else(|| prefixes.iter().find(is_called));
     let prefix = match told {
         Some(told) => {
             let found = prefixes.iter().find(|prefix| **prefix == told);

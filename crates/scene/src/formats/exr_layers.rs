@@ -10,13 +10,16 @@ use ndarray::Array2;
 
 use super::{
     band_name,
-    exr_attributes::{self, Attributes},
+    exr_attributes::{self, Attributes, words_of},
     exr_colors::are_srgb,
     reading::Frame,
     stated::{Noted, Stated},
-    unusable::{check_memory, unreadable},
+    unusable::{check_memory, said, unreadable},
 };
 use crate::SceneError;
+
+/// The most columns, and rows, of a picture.
+const MOST_SAMPLES: usize = 1 << 20;
 
 /// What a file states of all its layers.
 pub(super) struct Head {
@@ -69,6 +72,11 @@ impl RawLayer {
         }
     }
 
+    /// Whether it has red, or gray.
+    pub(super) fn has_colors(&self) -> bool {
+        self.planes.iter().any(|(name, _)| ["R", "Y"].contains(&name.rsplit('.').next().unwrap_or_default()))
+    }
+
     pub(super) fn has_bands(&self) -> bool {
         let is_band = band_name::parse(&self.name).is_some() && self.planes.len() == 1;
         is_band || self.planes.iter().any(|(name, _)| band_name::parse(name).is_some())
@@ -114,6 +122,13 @@ pub(super) fn read_layers(path: &Path) -> Result<(Head, Vec<RawLayer>), SceneErr
     if !(aspect.is_finite() && aspect > 0.0) {
         return Err(unreadable(path, format!("its pixelAspectRatio is {aspect}, expected a number above 0")));
     }
+    if window.size.0 > MOST_SAMPLES || window.size.1 > MOST_SAMPLES {
+        let reason = format!(
+            "its display window is {} × {} samples: expected sides up to {MOST_SAMPLES}",
+            window.size.0, window.size.1
+        );
+        return Err(unreadable(path, reason));
+    }
     let head = Head {
         display: (window.position.0.into(), window.position.1.into()),
         frame: Frame { columns: window.size.0, rows: window.size.1, x0: 0, y0: 0, aspect },
@@ -130,8 +145,8 @@ fn raw_layer(path: &Path, layer: Layer<AnyChannels<FlatSamples>>) -> Result<RawL
     Ok(RawLayer {
         size: (rows, columns),
         position: (position.0.into(), position.1.into()),
-        name: layer.attributes.layer_name.as_ref().map(ToString::to_string).unwrap_or_default(),
-        view: layer.attributes.view_name.as_ref().map(ToString::to_string),
+        name: layer.attributes.layer_name.as_ref().map(words_of).unwrap_or_default(),
+        view: layer.attributes.view_name.as_ref().map(words_of),
         attributes: exr_attributes::from_layer(&layer.attributes),
         planes: planes?,
     })
@@ -148,11 +163,21 @@ fn plane_of(
         FlatSamples::F32(samples) => samples,
         FlatSamples::U32(samples) => samples.into_iter().map(|v| v as f32).collect(),
     };
-    let name = channel.name.to_string();
+    let name = words_of(&channel.name);
     match Array2::from_shape_vec((rows, columns), samples) {
         Ok(plane) => Ok((name, plane)),
         Err(_) => Err(unreadable(path, format!("channel '{name}' has not {rows} × {columns} samples"))),
     }
+}
+
+/// Returns the name of each layer and what its header states.
+pub(super) fn read_headers(path: &Path) -> Result<Vec<(String, Attributes)>, SceneError> {
+    let meta = MetaData::read_from_file(path, false).map_err(|error| unreadable(path, explain(&error)))?;
+    let of = |header: &exr::meta::header::Header| {
+        let own = &header.own_attributes;
+        (own.layer_name.as_ref().map(words_of).unwrap_or_default(), exr_attributes::from_layer(own))
+    };
+    Ok(meta.headers.iter().map(of).collect())
 }
 
 /// Refuses a file whose samples take more memory than they may: as they stand in the file, and as single floats where they are none.
@@ -174,7 +199,7 @@ fn guard(path: &Path, file: File) -> Result<(), SceneError> {
 
 /// Returns what is wrong with an EXR file in a few words.
 fn explain(error: &exr::error::Error) -> String {
-    let text = error.to_string();
+    let text = said(error);
     // The crate turns the end of a file into these words.
     if text.contains("reference to missing bytes") {
         return "the file ends too early (truncated)".to_owned();

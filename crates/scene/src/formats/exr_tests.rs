@@ -78,14 +78,14 @@ fn a_scene_comes_back_to_the_bit() {
     for samples in [ExrSamples::Single, ExrSamples::Uncompressed] {
         let (file, mut scene) = (file(), scene());
         write_scene_exr(&file.path, &scene, samples).unwrap();
-        let back = read_spectral_exr(&file.path).unwrap();
+        let back = read_spectral_exr(&file.path).unwrap().of_own_file();
         assert_eq!(back.image, scene.radiance);
         assert_eq!((back.depth, back.view, back.hidden), (scene.depth.clone(), scene.view, None));
 
         let hidden = HiddenLayer { radiance: scene.radiance.clone(), depth: scene.depth.clone().unwrap() };
         scene.hidden = Some(hidden);
         write_scene_exr(&file.path, &scene, samples).unwrap();
-        let back = read_spectral_exr(&file.path).unwrap();
+        let back = read_spectral_exr(&file.path).unwrap().of_own_file();
         assert_eq!((back.image, back.hidden), (scene.radiance, scene.hidden));
     }
 }
@@ -117,6 +117,20 @@ fn unknown_channels_and_attributes_are_noted() {
         let notes = read_scene(&file.path, &ReadOptions::default()).unwrap().notes.join("\n");
         assert!(notes.contains(&format!("'{channel}'")) && notes.contains(&format!("'{attribute}'")), "{notes}");
     }
+}
+
+#[test]
+fn attributes_of_ours_that_cannot_be_are_named() {
+    let file = file();
+    let bands = || vec![("S0.500nm", flat(1.0)), ("Z", flat(1.0))];
+    for (name, value) in [("viewFocalPx", "thirty"), ("samplePitchUm", "none")] {
+        write_raw(&file.path, bands(), &[(name, value)]);
+        let notes = read_scene(&file.path, &ReadOptions::default()).unwrap().notes.join("\n");
+        assert!(notes.contains(&format!("'{name}, which is no likely value'")), "{notes}");
+    }
+    write_raw(&file.path, bands(), &[("samplePitchUm", "3")]);
+    let notes = read_scene(&file.path, &ReadOptions::default()).unwrap().notes.join("\n");
+    assert!(notes.contains("its attribute 'samplePitchUm' is not used"), "{notes}");
 }
 
 #[test]
@@ -172,10 +186,10 @@ fn irradiance_keeps_its_pitch_and_reflectance_its_kind() {
     let file = file();
     let irradiance = image(Quantity::Irradiance, vec![500.0]).with_pitch_um(1.4);
     write_spectral_exr(&file.path, &irradiance, &ExrParts::default()).unwrap();
-    assert_eq!(read_spectral_exr(&file.path).unwrap().image, irradiance);
+    assert_eq!(read_spectral_exr(&file.path).unwrap().of_own_file().image, irradiance);
     let reflectance = image(Quantity::Reflectance, vec![400.0, 700.0]);
     write_spectral_exr(&file.path, &reflectance, &ExrParts::default()).unwrap();
-    assert_eq!(read_spectral_exr(&file.path).unwrap().image, reflectance);
+    assert_eq!(read_spectral_exr(&file.path).unwrap().of_own_file().image, reflectance);
 }
 
 /// Returns what is known of an image before its samples.
@@ -220,7 +234,7 @@ fn rows_make_the_file_that_layers_make() {
     for samples in ExrSamples::NAMES.map(|(_, samples)| samples) {
         let whole = |at_once_bytes| SpectralHead { depth: Some(&depth), view, at_once_bytes, ..head(&tall, samples) };
         whole(1 << 20).write_exr(&file.path, &mut rows_of(&tall)).unwrap();
-        let (in_rows, bytes) = (read_spectral_exr(&file.path).unwrap(), fs::read(&file.path).unwrap());
+        let (in_rows, bytes) = (read_spectral_exr(&file.path).unwrap().of_own_file(), fs::read(&file.path).unwrap());
         assert_eq!((in_rows.depth.as_ref(), in_rows.view), (Some(&depth), view));
         assert_eq!(in_rows.image == tall, samples != ExrSamples::Half);
         whole(1).write_exr(&file.path, &mut rows_of(&tall)).unwrap();
@@ -229,7 +243,7 @@ fn rows_make_the_file_that_layers_make() {
         write_spectral_exr(&file.path, &tall, &parts).unwrap();
         assert_eq!(fs::read(&file.path).unwrap(), bytes);
         write_spectral_exr(&file.path, &tall, &ExrParts { hidden: Some(&hidden), ..parts }).unwrap();
-        let layered = read_spectral_exr(&file.path).unwrap();
+        let layered = read_spectral_exr(&file.path).unwrap().of_own_file();
         assert_eq!((layered.image, layered.depth, layered.view), (in_rows.image, in_rows.depth, in_rows.view));
     }
 }
@@ -242,7 +256,7 @@ fn half_floats_are_as_near_as_is_stated() {
         let mut bright = tall();
         bright.planes_mut().for_each(|mut plane| plane *= scale);
         head(&bright, ExrSamples::Half).write_exr(&file.path, &mut rows_of(&bright)).unwrap();
-        let back = read_spectral_exr(&file.path).unwrap().image;
+        let back = read_spectral_exr(&file.path).unwrap().of_own_file().image;
         assert_eq!((back.pitch_um(), back.quantity()), (Some(1.4), Quantity::Irradiance));
         let largest = 1e-3 * scale;
         for (found, sample) in back.planes().iter().flatten().zip(bright.planes().iter().flatten()) {
@@ -274,7 +288,7 @@ fn planes_of_volts_come_back() {
     let volts = &scene.radiance.planes()[0];
     write_planes_exr(&file.path, &[("V", volts), ("Z", scene.depth.as_ref().unwrap().z_m())], ExrSamples::Uncompressed)
         .unwrap();
-    let planes = read_planes_exr(&file.path).unwrap();
+    let planes = read_planes_exr(&file.path).unwrap().of_own_file();
     assert_eq!(planes.iter().find(|(name, _)| name == "V").map(|(_, plane)| plane), Some(volts));
     assert!(write_planes_exr(&file.path, &[], ExrSamples::Single).is_err());
     assert!(read_spectral_exr(&file.path).unwrap_err().to_string().contains("no spectral band"));
@@ -286,7 +300,7 @@ fn half_floats_other_units_and_rgb_are_read() {
     let half = FlatSamples::F16(vec![f16::from_f32(0.5); 4]);
     let channels = vec![("R", flat(9.0)), ("S0.0,55um", flat(2.0)), ("S0.1000nm", flat(3.0)), ("S0.400.0nm", half)];
     write_raw(&file.path, channels, &[("emissiveUnits", "W.m^-2.sr^-1")]);
-    let back = read_spectral_exr(&file.path).unwrap();
+    let back = read_spectral_exr(&file.path).unwrap().of_own_file();
     assert_eq!(back.image.grid().centers_nm()[1].round(), 550.0);
     assert_eq!(back.image.spectrum_at(1, 1), [0.5, 2.0, 3.0]);
     assert_eq!(back.image.quantity(), Quantity::Radiance);
@@ -299,7 +313,7 @@ fn bands_of_other_renderers_are_read() {
     for names in [["S0.450,000000nm", "S0.525,000000nm"], ["412.50-487.50nm", "487.50-562.50nm"], ["450nm", "525.0nm"]]
     {
         write_raw(&file.path, vec![("R", flat(9.0)), (names[0], flat(2.0)), (names[1], flat(3.0))], &[]);
-        let back = read_spectral_exr(&file.path).unwrap();
+        let back = read_spectral_exr(&file.path).unwrap().of_own_file();
         assert_eq!(
             (back.image.grid().centers_nm(), back.image.spectrum_at(1, 1)),
             (&[450.0, 525.0][..], vec![2.0, 3.0])
@@ -313,7 +327,7 @@ fn radiance_in_photons_becomes_watts() {
     let file = file();
     let unit = [("emissiveUnits", "photon.s^-1.m^-2.sr^-1")];
     write_raw(&file.path, vec![("S0.500nm", flat(1e15)), ("S0.600nm", flat(1e15))], &unit);
-    let back = read_spectral_exr(&file.path).unwrap().image;
+    let back = read_spectral_exr(&file.path).unwrap().of_own_file().image;
     // h c / λ with h c = 1.98644586e-25 J m.
     for (watts, nm) in back.spectrum_at(0, 1).iter().zip([500.0, 600.0]) {
         approx::assert_relative_eq!(*watts, 1.986_445_86e-1 / nm, max_relative = 1e-6);
@@ -376,7 +390,7 @@ fn a_hidden_layer_in_front_is_refused_by_its_place() {
 fn distance_becomes_depth_with_a_view() {
     let file = file();
     write_raw(&file.path, vec![("S0.500nm", flat(1.0)), ("distance", flat(2.0))], &[]);
-    let back = read_spectral_exr(&file.path).unwrap();
+    let back = read_spectral_exr(&file.path).unwrap().of_own_file();
     assert_eq!(back.depth_with(None), Ok(None));
     let view = View { focal_px: 1.0, center_x_px: 0.0, center_y_px: 0.0 };
     let depth = back.depth_with(Some(view)).unwrap().unwrap();
@@ -468,7 +482,7 @@ fn the_real_files_are_read() {
         ("spectral_exr_reference_Macbeth", Quantity::Reflectance, (400, 600), 36, false),
         ("spectral_exr_reference_D65", Quantity::Radiance, (1, 1), 90, false),
     ] {
-        let back = read_spectral_exr(&folder.join(format!("{name}.exr"))).unwrap();
+        let back = read_spectral_exr(&folder.join(format!("{name}.exr"))).unwrap().of_own_file();
         assert_eq!(back.image.quantity(), quantity, "{name}");
         assert_eq!((back.image.rows(), back.image.columns()), size, "{name}");
         assert_eq!(back.image.grid().len(), bands, "{name}");

@@ -8,7 +8,8 @@ use super::{
     contents::is_of,
     depth::files_beside,
     envi::{envi_size, header_of},
-    picture::{orientation_of, picture_size_of},
+    picture::picture_size_of,
+    picture_parts::orientation_of,
     reading::FileReading,
 };
 

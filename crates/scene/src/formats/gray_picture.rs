@@ -2,14 +2,14 @@
 
 use std::path::Path;
 
-use dioptric_pictures::DynamicImage;
+use dioptric_pictures::{DynamicImage, StatedColors};
 use ndarray::Array2;
 
 use super::{
     contents::is_of,
     picture::{decode, has_holes, pnm_top},
-    picture_parts::unknown_parts,
-    stated::{Noted, note_of},
+    picture_parts::notes_on_parts,
+    stated::{Noted, name_of, note_of},
     tiff_file::{TiffAs, TiffFile, TiffStack, read_tiff},
     unusable::unreadable,
 };
@@ -39,7 +39,12 @@ pub(super) fn read_gray(path: &Path, told: Option<&str>) -> Result<Noted<GrayPic
     if told.is_some() {
         return Err(unreadable(path, "it has one plane without a name, expected it without --depth-variable"));
     }
-    let mut notes: Vec<String> = note_of(path, "part", &unknown_parts(path)?).into_iter().collect();
+    let mut notes = notes_on_parts(path)?;
+    // What cannot be converted to light is a number all the same.
+    let colors = StatedColors::of(path).unwrap_or_else(|reason| Some(StatedColors::linear(reason, [[0.0; 3]; 3])));
+    notes.extend(colors.map(|colors| {
+        format!("{}: its codes are taken as numbers, and not as it states their light: {}", name_of(path), colors.name)
+    }));
     let gray = codes_of(path, &mut notes)?;
     Ok(Noted::new(gray, notes))
 }

@@ -2,22 +2,23 @@
 
 use std::path::Path;
 
-use dioptric_spectrum::DepthMap;
+use dioptric_spectrum::{DepthMap, WavelengthGrid};
 
 use super::{
-    camera::CameraData,
-    contents::Hidden,
+    camera::CameraFile,
+    contents::{Contents, Hidden},
     depth::depth_beside,
-    lighting::lit,
+    lighting::{lit, under},
     raw_depth::DepthWords,
     read_contents::contents_of,
     read_options::ReadOptions,
     reading::{FileReading, Frame},
     scene_depth::{behind, words},
     stated::name_of,
+    understood::{bands, brightness, range, resampling_note},
     unusable::unreadable,
 };
-use crate::{HiddenLayer, SceneError, View};
+use crate::{HiddenLayer, SceneError, SceneLight, View};
 
 /// Reads what lies behind the first surface from a file of its own, of any kind that a scene is read from: radiance and depth of the same
 /// samples, seen from the same place.
@@ -47,32 +48,81 @@ pub(super) fn read_hidden(
     };
     let mut unused: Vec<String> = contents.hidden.take().map(|_| "layer 'hidden'".to_owned()).into_iter().collect();
     unused.extend(contents.view.take().map(|_| "camera data".to_owned()));
-    let beside = CameraData::beside(file)?.map(|camera| camera.file);
-    let of_first = CameraData::beside(first)?.map(|camera| camera.file);
+    let beside = CameraFile::beside(file)?.map(|camera| camera.file);
+    let of_first = CameraFile::beside(first)?.map(|camera| camera.file);
     unused.extend(beside.filter(|beside| Some(beside) != of_first.as_ref()).map(|beside| name_of(&beside)));
     contents.notes.extend(
         (!unused.is_empty()).then(|| {
             format!("{}: its {} is not used, but that of {}", name_of(file), unused.join(", "), name_of(first))
         }),
     );
-    Ok(Hidden { file: file.to_owned(), contents })
+    Ok(Hidden { file: file.to_owned(), contents, is_own_file: true })
 }
 
-/// Returns radiance and depth of what lies behind a first surface of this view and depth, on the bands wanted.
+/// Returns radiance and depth of what lies behind a first surface of this view and depth, on the bands wanted; reflectances are under the light on
+/// the first surface where that is known and no other is asked for.
 pub(super) fn hidden_layer(
     hidden: Hidden,
-    (view, first): (Option<View>, Option<&DepthMap>),
+    front: Front<'_>,
     options: &ReadOptions,
     notes: &mut Vec<String>,
 ) -> Result<HiddenLayer, SceneError> {
-    let Hidden { file, mut contents } = hidden;
+    let Hidden { file, mut contents, is_own_file } = hidden;
     let (rows, columns) = contents.size();
     let lacks = || unreadable(&file, "a hidden layer needs a depth, expected a channel 'Z' or a NAME.depth.png");
     let depth = contents.depth.take().ok_or_else(lacks)?.resized(rows, columns)?;
     notes.append(&mut contents.notes);
     notes.extend(depth.notes.iter().cloned());
     let needs_view = || unreadable(&file, "the depth of its hidden layer needs a field of view (--fov-deg)");
-    let z_m = depth.axial_m(view)?.ok_or_else(needs_view)?;
-    let (radiance, _) = lit(&file, contents, options, notes)?;
-    Ok(HiddenLayer { radiance, depth: behind(&file, z_m, first)? })
+    let z_m = depth.axial_m(front.view)?.ok_or_else(needs_view)?;
+    let n_known = z_m.iter().filter(|z| **z > 0.0).count();
+    if n_known == 0 {
+        return Err(unreadable(&file, "its depth is nowhere a number above 0, so that nothing would lie behind"));
+    }
+    let options = options_behind(&contents, &front, options);
+    if contents.light.as_ref().is_some_and(|own| Some(own) != front.light) {
+        notes.push(format!(
+            "{}: the light that it states is not used: what is done to light counts for both layers",
+            name_of(&file)
+        ));
+    }
+    let own = contents.own_grid();
+    notes.extend(own.as_ref().and_then(|own| resampling_note(&name_of(&file), own, options.grid.as_ref())));
+    let (mut what, is_lit) = (contents.what.clone(), contents.is_reflectance(&options));
+    let (radiance, light) = lit(&file, contents, &options, notes)?;
+    if let Some(light) = light.filter(|_| is_lit) {
+        what += &under(&light);
+    }
+    let layer = HiddenLayer { radiance, depth: behind(&file, z_m, front.depth)? };
+    if is_own_file {
+        let grid = own.unwrap_or_else(|| layer.radiance.grid().clone());
+        notes.push(format!(
+            "{}: behind the first surface, {what}, {}{}; depth {} {}, known of {n_known} of {} samples",
+            name_of(&file),
+            bands(&grid),
+            brightness(&layer.radiance),
+            range(&layer.depth),
+            depth.describe(),
+            rows * columns
+        ));
+    }
+    Ok(layer)
+}
+
+/// The first surface, behind which a layer lies.
+pub(super) struct Front<'a> {
+    pub(super) view: Option<View>,
+    pub(super) depth: Option<&'a DepthMap>,
+    pub(super) grid: &'a WavelengthGrid,
+    pub(super) light: Option<&'a SceneLight>,
+}
+
+/// Returns the options for what lies behind: the bands of the first surface, and the light on it for what reflects.
+fn options_behind(contents: &Contents, front: &Front<'_>, options: &ReadOptions) -> ReadOptions {
+    let mut options = ReadOptions { grid: Some(front.grid.clone()), ..options.clone() };
+    if let Some(light) = front.light.filter(|_| contents.is_reflectance(&options)) {
+        options.light = options.light.or_else(|| Some(light.illuminant.clone()));
+        options.illuminance_lux = options.illuminance_lux.or(light.illuminance_lux);
+    }
+    options
 }

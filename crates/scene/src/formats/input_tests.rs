@@ -81,7 +81,7 @@ fn part_of_a_frame_lies_where_it_was() {
     // The camera file: 96 × 72, 120 px, its axis at 47.5, 35.5; the part of 32 × 24 starts at column 64.
     assert_eq!((scene.rows(), scene.columns()), (72, 96));
     assert_eq!((view.focal_px, view.center_x_px, view.center_y_px), (120.0, 47.5, 35.5));
-    let own = super::read_planes_exr(&path).unwrap();
+    let own = super::read_planes_exr(&path).unwrap().of_own_file();
     for plane in scene.radiance.planes() {
         let is_lit = |row: usize, column: usize| plane[(row, column)] > 0.0;
         for ((row, column), value) in own.iter().find(|(name, _)| name == "G").unwrap().1.indexed_iter() {
@@ -102,7 +102,7 @@ fn primaries_of_a_header_count() {
     let scene = read(&path, &usual());
     assert!(scene.notes.iter().any(|note| note.contains("primaries")), "{:?}", scene.notes);
     // What is gray for the file's primaries is gray.
-    let planes = super::read_planes_exr(&path).unwrap();
+    let planes = super::read_planes_exr(&path).unwrap().of_own_file();
     let at = |name: &str, place: (usize, usize)| planes.iter().find(|(own, _)| own == name).unwrap().1[place];
     let (rows, columns) = (scene.rows(), scene.columns());
     let places = (0..rows).flat_map(|row| (0..columns).map(move |column| (row, column)));

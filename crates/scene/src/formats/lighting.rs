@@ -14,7 +14,7 @@ use super::{
     smooth_lift::{Colors, SmoothLift},
     stated::name_of,
     understood::bands,
-    unusable::unreadable,
+    unusable::{in_file, unreadable},
 };
 use crate::{SceneError, SceneLight, resampled};
 
@@ -89,7 +89,7 @@ pub(super) fn lit(
         }
     };
     let image = match &options.grid {
-        Some(grid) if grid != image.grid() => resampled(&image, grid)?,
+        Some(grid) if grid != image.grid() => resampled(&image, grid).map_err(|error| in_file(path, &error))?,
         _ => image,
     };
     if image.quantity() != Quantity::Reflectance {
@@ -186,6 +186,13 @@ fn mend_colors(
         ndarray::Zip::from(plane).and(kept).and(own).for_each(|v, kept, own| *v = if *kept { *own } else { *v });
     }
     Ok(mended)
+}
+
+/// Returns the words for the light that was put on reflectances.
+pub(super) fn under(light: &SceneLight) -> String {
+    let [x, y] = light.illuminant.chromaticity();
+    let lux = light.illuminance_lux.map_or_else(String::new, |lux| format!(" and {lux:.0} lx"));
+    format!(", under a light of x, y {x:.3}, {y:.3}{lux}")
 }
 
 fn checked_lux(lux: f64) -> Result<f64, SceneError> {

@@ -6,6 +6,8 @@ mod band_name;
 mod belonging;
 mod camera;
 mod camera_files;
+mod camera_models;
+mod camera_yaml;
 mod chart_table;
 mod contents;
 mod cube_folder;
@@ -34,9 +36,12 @@ mod hidden_layer;
 mod input_tests;
 #[cfg(test)]
 mod kinds_tests;
+mod length_unit;
 mod light_unit;
 mod lighting;
 mod mat;
+#[cfg(test)]
+mod mutation_tests;
 mod no_data;
 mod npy;
 mod npz;
@@ -62,6 +67,9 @@ mod secondary_tests;
 mod smooth_lift;
 mod spectral_exr;
 mod stated;
+#[cfg(test)]
+mod statement_tests;
+mod text_depth;
 mod tiff_bands;
 mod tiff_directory;
 mod tiff_file;
@@ -87,10 +95,12 @@ pub use mat::{
     write_iset_scene,
 };
 pub use photons::joules_per_photon;
-pub use picture::{PictureSamples, notes_on_samples, read_picture, read_picture_samples};
+pub use picture::{PictureSamples, read_picture, read_picture_samples};
+pub use picture_parts::notes_on_samples;
 pub use point_table::PointTable;
 pub use read_options::{Part, ReadOptions};
 pub use read_scene::read_scene;
 pub use reading::{DepthKind, FileQuantity, FileReading, NoData, Panorama};
-pub use spectral_exr::{SpectralFile, read_planes_exr, read_spectral_exr};
+pub use spectral_exr::{NamedPlanes, SpectralFile, read_planes_exr, read_spectral_exr};
+pub use stated::Noted;
 pub use unmeasured::{FillDepth, filled_depth};

@@ -11,11 +11,12 @@ use zip::{ZipArchive, result::ZipError};
 use super::{
     axes,
     contents::Cube,
-    mat::{DEPTHS, WAVES},
+    mat::{DEPTHS, WAVES, is_called},
     npy::{NpyArray, is_array_of, parse},
     read_options::ReadOptions,
     stated::{Noted, name_of, note_of, short},
     unusable::{check_memory, unreadable},
+    wavelength_unit::listed_nm,
 };
 use crate::SceneError;
 
@@ -109,11 +110,21 @@ pub(super) fn read_npz(path: &Path, options: &ReadOptions) -> Result<Cube, Scene
         },
     };
     let array = archive.read(&chosen)?;
-    let list = archive.names.iter().find(|name| is_list(name) && **name != chosen).cloned();
-    let own: Option<Vec<f64>> = match &list {
-        Some(name) => Some(archive.read(name)?.values.into_iter().map(f64::from).collect()),
+    let named = archive.names.iter().find(|name| is_list(name) && **name != chosen).cloned();
+    let own: Option<Vec<f64>> = match &named {
+        Some(name) => {
+            // Singles of decimals, as they were written.
+            let numbers = archive.read(name)?.values.into_iter().map(|v| v.to_string().parse().unwrap_or(f64::NAN));
+            let unit = bare(name).ends_with("_nm").then_some("nm");
+            match listed_nm(bare(name), unit, &numbers.collect::<Vec<f64>>()) {
+                Err(_) if reading.wavelengths_nm.is_some() => None,
+                own => own.map_err(wrong)?,
+            }
+        }
         None => None,
     };
+    // A list that counts bands is none of wavelengths.
+    let list = named.filter(|_| own.is_some());
     let told = reading.wavelengths_nm.as_ref().map(Vec::len);
     let n_bands = told
         .or_else(|| own.as_ref().map(Vec::len))
@@ -139,7 +150,7 @@ pub(super) fn read_npz_plane(path: &Path, told: Option<&str>) -> Result<Noted<(S
         Some(told) => archive.named(told)?,
         None => {
             let planes = archive.of_sides(|sides| sides.iter().filter(|side| **side != 1).count() == 2)?;
-            let called = DEPTHS.iter().find_map(|own| planes.iter().find(|name| bare(name).eq_ignore_ascii_case(own)));
+            let called = DEPTHS.iter().find_map(|own| planes.iter().find(|name| is_called(bare(name), own)));
             match (called, &planes[..]) {
                 (Some(called), _) => called.clone(),
                 (None, [one]) => one.clone(),

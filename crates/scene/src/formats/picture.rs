@@ -4,14 +4,16 @@ use std::path::Path;
 
 use dioptric_pictures::{Curve, DynamicImage, ImageError, StatedColors, read_reduced, size_of};
 use dioptric_spectrum::{Display, Quantity, SpectralImage, WavelengthGrid, srgb_decode, srgb_encode};
-use image::{ImageDecoder, metadata::Orientation};
+use image::metadata::Orientation;
 use ndarray::Array2;
 use rayon::prelude::*;
 
 use super::{
+    picture_parts::{notes_on_samples, orientation_of},
     primaries::into_srgb,
-    stated::{name_of, note_of},
-    unusable::{check_made, unreadable},
+    spectral_exr::{NamedPlanes, read_planes_and_primaries_exr},
+    stated::{Noted, name_of, note_of},
+    unusable::{check_made, said, unreadable},
 };
 use crate::SceneError;
 
@@ -218,7 +220,8 @@ pub(super) fn has_holes(picture: &DynamicImage) -> bool {
 pub(super) fn note_beyond(path: &Path, share: f64) -> Option<String> {
     (share > 0.0).then(|| {
         format!(
-            "{}: {:.2} % of its pixels have colors beyond the display's gamut, which are held at its edge",
+            "{}: {:.2} % of its pixels have colors beyond the display's gamut, which ends before sRGB's in blue, and sooner on few bands: \
+             they are held at its edge",
             name_of(path),
             100.0 * share
         )
@@ -228,20 +231,6 @@ pub(super) fn note_beyond(path: &Path, share: f64) -> Option<String> {
 /// Returns the colors that a picture states; `None` for sRGB.
 fn stated_colors(path: &Path) -> Result<Option<StatedColors>, SceneError> {
     StatedColors::of(path).map_err(|reason| unreadable(path, reason))
-}
-
-/// Returns the orientation that a picture states.
-pub(super) fn orientation_of(path: &Path) -> Orientation {
-    let reader = image::ImageReader::open(path).ok().and_then(|reader| reader.with_guessed_format().ok());
-    let decoder = reader.and_then(|reader| reader.into_decoder().ok());
-    decoder.and_then(|mut decoder| decoder.orientation().ok()).unwrap_or(Orientation::NoTransforms)
-}
-
-/// Returns what of a picture's statements [`read_picture_samples`] does not use, a sentence each.
-pub fn notes_on_samples(path: &Path) -> Vec<String> {
-    let is_turned = orientation_of(path) != Orientation::NoTransforms;
-    let note = || format!("{}: its pixels are counted as stored, not turned as its orientation says", name_of(path));
-    is_turned.then(note).into_iter().collect()
 }
 
 /// Returns what a picture's samples are, in words.
@@ -260,7 +249,7 @@ pub(super) fn kind_of(picture: &DynamicImage, colors: Option<&StatedColors>) -> 
 #[derive(Clone, Debug, PartialEq)]
 pub struct PictureSamples {
     /// Each channel with its name: `Y` for gray, `R`, `G` and `B`, or what an EXR file calls it.
-    pub planes: Vec<(String, Array2<f32>)>,
+    pub planes: NamedPlanes,
     /// The highest code of a file of whole numbers, 255 or 65 535; `None` for floating-point samples.
     pub top: Option<u16>,
     /// What the samples of red, green and blue, or of gray, are, where they are not those of sRGB, or of floats in its primaries; the reason where they
@@ -272,14 +261,19 @@ pub struct PictureSamples {
 ///
 /// # Errors
 /// When the file is no such picture, or too large.
-pub fn read_picture_samples(path: &Path) -> Result<PictureSamples, SceneError> {
+pub fn read_picture_samples(path: &Path) -> Result<Noted<PictureSamples>, SceneError> {
     if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr")) {
-        let (planes, to_srgb) = super::spectral_exr::read_planes_and_primaries_exr(path)?;
-        let colors = to_srgb.map(|matrix| StatedColors::linear("chromaticities of its header".to_owned(), matrix));
-        return Ok(PictureSamples { planes, top: None, colors: Ok(colors) });
+        return Ok(read_planes_and_primaries_exr(path)?.map(|(planes, to_srgb)| {
+            let colors = to_srgb.map(|matrix| StatedColors::linear("chromaticities of its header".to_owned(), matrix));
+            PictureSamples { planes, top: None, colors: Ok(colors) }
+        }));
     }
     let colors = StatedColors::of(path);
+    let mut notes = notes_on_samples(path)?;
     let picture = decode(path, SAMPLES_BYTES)?;
+    if has_holes(&picture) {
+        notes.extend(note_of(path, "channel", &["opacity".to_owned()]));
+    }
     let (columns, rows) = (picture.width() as usize, picture.height() as usize);
     let parted = |samples: Vec<f32>, names: &[&str]| {
         let n = names.len();
@@ -307,7 +301,7 @@ pub fn read_picture_samples(path: &Path) -> Result<PictureSamples, SceneError> {
         }
         other => (parted(other.into_rgb32f().into_raw(), &RGB), None),
     };
-    Ok(PictureSamples { planes, top, colors })
+    Ok(Noted::new(PictureSamples { planes, top, colors }, notes))
 }
 
 /// Decodes a picture of any kind that is recognized by the file's content, of which `beside_bytes` are made for each pixel.
@@ -326,7 +320,7 @@ pub(super) fn pnm_top(path: &Path) -> Option<u32> {
 }
 
 fn undecodable(path: &Path, error: &ImageError) -> SceneError {
-    unreadable(path, error.to_string().replace('\n', " "))
+    unreadable(path, said(error))
 }
 
 #[cfg(test)]
@@ -381,7 +375,7 @@ mod tests {
         let check = |name: &str, picture: DynamicImage, names: &[&str], first: &[f32], top: Option<u16>| {
             let path = folder.path().join(name);
             save(&picture, &path).unwrap();
-            let read = read_picture_samples(&path).unwrap();
+            let read = read_picture_samples(&path).unwrap().of_own_file();
             let found: Vec<_> = read.planes.iter().map(|(name, plane)| (name.as_str(), plane[(1, 2)])).collect();
             let expected: Vec<_> = names.iter().copied().zip(first.iter().copied()).collect();
             assert_eq!((found, read.top), (expected, top), "{name}");

@@ -1,4 +1,4 @@
-//! The parts of PNG, JPEG and WebP files besides their pixels: what of them would change the scene and is not used.
+//! The parts of pictures' files besides their pixels: what of them would change the scene and is not used.
 
 use std::{
     fs::File,
@@ -6,7 +6,15 @@ use std::{
     path::Path,
 };
 
-use super::unusable::unreadable;
+use dioptric_pictures::{Exif, size_of};
+use image::{ImageDecoder, metadata::Orientation};
+
+use super::{
+    contents::is_of,
+    spectral_exr::notes_on_planes_exr,
+    stated::{name_of, note_of, short},
+    unusable::unreadable,
+};
 use crate::SceneError;
 
 /// Chunks of PNG that are used, or say how the pixels lie in the file, when they were made or what is printed.
@@ -36,19 +44,67 @@ const MOST_PARTS: usize = 10_000;
 /// Bytes of a part that are looked at.
 const MOST_BYTES: u64 = 65_536;
 
-/// Returns the names of the parts of a PNG, JPEG or WebP file that are not known; none of other files.
+/// Returns what of the parts of a picture's file, and of its Exif data, is not used, a sentence each.
 ///
 /// # Errors
 /// When the file cannot be opened, or is a JPEG file without an end, whose missing pixels decoders make up.
-pub(super) fn unknown_parts(path: &Path) -> Result<Vec<String>, SceneError> {
+pub(super) fn notes_on_parts(path: &Path) -> Result<Vec<String>, SceneError> {
+    Ok(note_of(path, "part", &unknown_parts(path)?).into_iter().chain(note_on_exif(path)).collect())
+}
+
+/// Returns what of a picture's statements [`read_picture_samples`](crate::read_picture_samples) does not use, a sentence each.
+///
+/// # Errors
+/// When the file cannot be opened, or ends too early.
+pub fn notes_on_samples(path: &Path) -> Result<Vec<String>, SceneError> {
+    if is_of(path, &["exr"]) {
+        return notes_on_planes_exr(path);
+    }
+    let is_turned = orientation_of(path) != Orientation::NoTransforms;
+    let note = || format!("{}: its pixels are counted as stored, not turned as its orientation says", name_of(path));
+    Ok(is_turned.then(note).into_iter().chain(notes_on_parts(path)?).collect())
+}
+
+/// Returns the orientation that a picture states.
+pub(super) fn orientation_of(path: &Path) -> Orientation {
+    let reader = image::ImageReader::open(path).ok().and_then(|reader| reader.with_guessed_format().ok());
+    let decoder = reader.and_then(|reader| reader.into_decoder().ok());
+    decoder.and_then(|mut decoder| decoder.orientation().ok()).unwrap_or(Orientation::NoTransforms)
+}
+
+/// Returns what the Exif data state of light and geometry that is not used.
+fn note_on_exif(path: &Path) -> Option<String> {
+    let exif = Exif::of(path);
+    let (mut columns, mut rows) = size_of(path).ok()?;
+    if orientation_of(path).to_exif() > 4 {
+        std::mem::swap(&mut columns, &mut rows);
+    }
+    let on_film = exif.horizontal_fov_deg(columns, rows).map(|fov_deg| {
+        let mm = exif.focal_on_film_mm.unwrap_or_default();
+        format!("{mm} mm on 35 mm film, with which it would be {fov_deg:.1}° wide (--fov-deg)")
+    });
+    let stated: Vec<String> = [
+        exif.focal_mm.map(|mm| format!("a focal length of {mm} mm")),
+        on_film.map(|words| format!("a focal length of {words}")),
+        exif.subject_distance_m.map(|m| format!("a distance of {m} m (--depth-m)")),
+        exif.gamma.map(|gamma| format!("a gamma of {gamma}")),
+    ]
+    .into_iter()
+    .flatten()
+    .collect();
+    (!stated.is_empty()).then(|| format!("{}: its Exif data state {}: not used", name_of(path), stated.join(", ")))
+}
+
+/// Returns the names of the parts of a PNG, JPEG, WebP, BMP or PNM file that are not known; none of other files.
+fn unknown_parts(path: &Path) -> Result<Vec<String>, SceneError> {
     let file = File::open(path).map_err(|error| unreadable(path, error))?;
     let mut file = BufReader::new(file);
-    let mut start = [0; 21];
+    let mut start = vec![];
     // What is shorter or broken is refused by whoever decodes it.
-    if file.read_exact(&mut start).is_err() {
+    if file.by_ref().take(MOST_BYTES).read_to_end(&mut start).is_err() {
         return Ok(vec![]);
     }
-    let names = match start {
+    let names = match start[..] {
         [0x89, b'P', b'N', b'G', ..] => file.seek(SeekFrom::Start(8)).and_then(|_| of_png(&mut file)),
         [0xff, 0xd8, ..] => {
             let names = file.seek(SeekFrom::Start(2)).and_then(|_| of_jpeg(&mut file));
@@ -57,10 +113,11 @@ pub(super) fn unknown_parts(path: &Path) -> Result<Vec<String>, SceneError> {
             }
             names.map(Option::unwrap_or_default)
         }
-        // The header of extended files has a flag for those with frames.
-        [b'R', b'I', b'F', b'F', .., b'V', b'P', b'8', b'X', _, _, _, _, flags] if flags & 2 != 0 => {
-            Ok(vec!["further frames (ANIM)".to_owned()])
+        [b'R', b'I', b'F', b'F', _, _, _, _, b'W', b'E', b'B', b'P', ..] => {
+            file.seek(SeekFrom::Start(12)).and_then(|_| of_webp(&mut file))
         }
+        [b'B', b'M', ..] => Ok(of_bmp(&start)),
+        [b'P', b'1'..=b'7', ..] => Ok(of_pnm(&start)),
         _ => Ok(vec![]),
     };
     let mut names = names.unwrap_or_default();
@@ -69,8 +126,113 @@ pub(super) fn unknown_parts(path: &Path) -> Result<Vec<String>, SceneError> {
     Ok(names)
 }
 
-fn of_png(file: &mut (impl Read + Seek)) -> std::io::Result<Vec<String>> {
+/// What the names of parts call pixels that are not square.
+const NOT_SQUARE: &str = "pixels that are not square";
+
+/// Returns the name of a comment that says something of the numbers, and not who made them when.
+fn comment(text: &[u8]) -> Option<String> {
+    const WORDS: [&str; 15] = [
+        "depth",
+        "scale",
+        "unit",
+        "metre",
+        "meter",
+        "mm",
+        "focal",
+        "fov",
+        "wavelength",
+        "nm",
+        "gain",
+        "offset",
+        "baseline",
+        "exposure",
+        "gamma",
+    ];
+    let text = String::from_utf8_lossy(text).trim().to_owned();
+    let lower = text.to_lowercase();
+    let mut words = lower.split(|c: char| !c.is_ascii_alphabetic()).filter(|word| !word.is_empty());
+    let is_telling =
+        words.any(|word| WORDS.iter().any(|known| word == *known || (known.len() > 3 && word.contains(known))));
+    (is_telling && lower.contains(|c: char| c.is_ascii_digit())).then(|| format!("comment '{}'", short(&text)))
+}
+
+/// Returns the names of what phones and renderers put into XMP data.
+fn of_xmp(content: &[u8]) -> Vec<String> {
+    let has = |word: &[u8]| content.windows(word.len()).any(|own| own == word);
     let mut names = vec![];
+    if has(b"GDepth:") || has(b"GCamera:Depth") || has(b"Device:Camera") {
+        names.push("depth (XMP)".to_owned());
+    }
+    if has(b"hdrgm:") {
+        names.push("gain map (hdrgm)".to_owned());
+    }
+    if has(b"GPano:") {
+        names.push("panorama (XMP)".to_owned());
+    }
+    names
+}
+
+/// Names what the header of a BMP file says of the shape of its pixels.
+fn of_bmp(start: &[u8]) -> Vec<String> {
+    let number = |at: usize| start.get(at..at + 4).map(|four| i32::from_le_bytes([four[0], four[1], four[2], four[3]]));
+    match (number(38), number(42)) {
+        (Some(across), Some(down)) if across > 0 && down > 0 && differ(across.into(), down.into()) => {
+            vec![NOT_SQUARE.to_owned()]
+        }
+        _ => vec![],
+    }
+}
+
+/// Whether two resolutions are not one.
+pub(super) fn differ(across: f64, down: f64) -> bool {
+    (across / down - 1.0).abs() > 0.01
+}
+
+/// Names the comments in the header of a PNM file, of which two or three numbers stand before its samples.
+fn of_pnm(start: &[u8]) -> Vec<String> {
+    let (mut names, mut n_numbers, mut rest) = (vec![], 0, &start[2..]);
+    let n_wanted = if matches!(start[1], b'1' | b'4') { 2 } else { 3 };
+    while n_numbers < n_wanted && !rest.is_empty() {
+        let end = match rest[0] {
+            b'#' => {
+                let end = rest.iter().position(|byte| *byte == b'\n').unwrap_or(rest.len());
+                names.extend(comment(&rest[1..end]));
+                end
+            }
+            byte if byte.is_ascii_whitespace() => 1,
+            _ => {
+                n_numbers += 1;
+                rest.iter().position(|byte| byte.is_ascii_whitespace() || *byte == b'#').unwrap_or(rest.len())
+            }
+        };
+        rest = &rest[end..];
+    }
+    names
+}
+
+/// Names the further frames of a WebP file, and what its XMP data state.
+fn of_webp(file: &mut (impl Read + Seek)) -> std::io::Result<Vec<String>> {
+    let mut names = vec![];
+    for _ in 0..MOST_PARTS {
+        let mut head = [0; 8];
+        if file.read_exact(&mut head).is_err() {
+            break;
+        }
+        let [kind @ .., a, b, c, d] = head;
+        let n_bytes = u64::from(u32::from_le_bytes([a, b, c, d]));
+        let content = part(file, n_bytes + n_bytes % 2)?;
+        match &kind {
+            b"ANIM" | b"ANMF" => names.push("further frames (ANIM)".to_owned()),
+            b"XMP " => names.extend(of_xmp(&content)),
+            b"VP8 " | b"VP8L" | b"VP8X" | b"ALPH" | b"ICCP" | b"EXIF" => {}
+            kind => names.push(kind.iter().map(|byte| char::from(*byte)).collect()),
+        }
+    }
+    Ok(names)
+}
+
+fn of_png(file: &mut (impl Read + Seek)) -> std::io::Result<Vec<String>> {
+    let (mut names, mut n_bits) = (vec![], 0);
     for _ in 0..MOST_PARTS {
         let mut head = [0; 8];
         if file.read_exact(&mut head).is_err() {
@@ -78,17 +240,24 @@ fn of_png(file: &mut (impl Read + Seek)) -> std::io::Result<Vec<String>> {
         }
         let [a, b, c, d, kind @ ..] = head;
         let n_bytes = u64::from(u32::from_be_bytes([a, b, c, d]));
-        let content = part(file, n_bytes + 4)?;
+        let mut content = part(file, n_bytes + 4)?;
+        // Without its checksum.
+        content.truncate(n_bytes.min(MOST_BYTES) as usize);
         match &kind {
             b"tEXt" | b"zTXt" | b"iTXt" => {
                 let word = content.split(|byte| *byte == 0).next().unwrap_or_default();
                 let word: String = word.iter().map(|byte| char::from(*byte)).collect();
-                if !USUAL_WORDS.contains(&word.as_str()) {
-                    names.push(format!("text '{word}'"));
+                match word.as_str() {
+                    "XML:com.adobe.xmp" => names.extend(of_xmp(&content)),
+                    // What is behind the word and flags of compression; compressed texts are not looked at.
+                    usual if USUAL_WORDS.contains(&usual) => names.extend(comment(&content[word.len()..])),
+                    _ => names.push(format!("text '{word}'")),
                 }
             }
-            // Pixels that are not square.
-            b"pHYs" if content.get(..4) != content.get(4..8) => names.push("pHYs".to_owned()),
+            b"IHDR" => n_bits = content.get(8).copied().unwrap_or_default(),
+            // Samples of fewer bits that were shifted up to those of the file.
+            b"sBIT" if content.iter().any(|own| *own < n_bits) => names.push("sBIT (bits that tell)".to_owned()),
+            b"pHYs" if content.get(..4) != content.get(4..8) => names.push(format!("pHYs ({NOT_SQUARE})")),
             b"pHYs" => {}
             b"IEND" => break,
             kind if USED_CHUNKS.contains(&kind) => {}
@@ -111,15 +280,17 @@ fn of_jpeg(file: &mut (impl Read + Seek)) -> std::io::Result<Option<Vec<String>>
         }
         let n_bytes = u64::from(u16::from_be_bytes([high, low])).saturating_sub(2);
         let content = part(file, n_bytes)?;
-        let has = |word: &[u8]| content.windows(word.len()).any(|own| own == word);
-        if kind == 0xe2 && content.starts_with(b"MPF\0") {
-            names.push("further pictures (MPF)".to_owned());
-        }
-        if kind == 0xe1 && (has(b"GDepth:") || has(b"GCamera:Depth") || has(b"Device:Camera")) {
-            names.push("depth (XMP)".to_owned());
-        }
-        if kind == 0xe1 && has(b"hdrgm:") {
-            names.push("gain map (hdrgm)".to_owned());
+        match (kind, &content[..]) {
+            (0xe2, content) if content.starts_with(b"MPF\0") => names.push("further pictures (MPF)".to_owned()),
+            (0xe1, content) => names.extend(of_xmp(content)),
+            (0xe0, &[b'J', b'F', b'I', b'F', 0, _, _, _, a, b, c, d, ..]) => {
+                let [across, down] = [[a, b], [c, d]].map(|two| f64::from(u16::from_be_bytes(two)));
+                if across > 0.0 && down > 0.0 && differ(across, down) {
+                    names.push(format!("JFIF ({NOT_SQUARE})"));
+                }
+            }
+            (0xfe, content) => names.extend(comment(content)),
+            _ => {}
         }
     }
     Ok(Some(names))
@@ -174,18 +345,43 @@ mod tests {
             chunk(b"IEND", b""),
         ];
         assert_eq!(named(&png.concat()), ["acTL", "text 'exposure'", "zoRp"]);
+        let telling = [
+            b"\x89PNG\r\n\x1a\n".to_vec(),
+            chunk(b"tEXt", b"Comment\0depth in mm, 1000 a metre"),
+            chunk(b"pHYs", &[0, 0, 0, 9, 0, 0, 0, 18, 1]),
+            chunk(b"iTXt", b"XML:com.adobe.xmp\0\0\0\0\0<x GPano:ProjectionType='equirectangular'>"),
+        ];
+        assert_eq!(
+            named(&telling.concat()),
+            ["comment 'depth in mm, 1000 a metre'", "pHYs (pixels that are not square)", "panorama (XMP)"]
+        );
+        assert_eq!(named(b"P5\n# made 2021\n# depth_scale 5000\n6 4\n65535\n# 3 mm"), ["comment 'depth_scale 5000'"]);
         let segment =
             |kind: u8, content: &[u8]| [&[0xff, kind], &(content.len() as u16 + 2).to_be_bytes()[..], content].concat();
         let jpeg = [
             vec![0xff, 0xd8],
-            segment(0xe0, b"JFIF\0"),
+            segment(0xe0, b"JFIF\0\x01\x02\x01\0\x48\0\x90\0\0"),
+            segment(0xfe, b"focal 50, made by hand"),
             segment(0xe1, b"http://ns.adobe.com/xap/1.0/\0 <x GDepth:Near='1'>"),
             segment(0xe2, b"MPF\0 more"),
             segment(0xda, b""),
             vec![1, 2, 0xff, 0xd9],
         ];
-        assert_eq!(named(&jpeg.concat()), ["depth (XMP)", "further pictures (MPF)"]);
-        assert_eq!(named(b"RIFF\x20\0\0\0WEBPVP8X\x0a\0\0\0\x02 more"), ["further frames (ANIM)"]);
+        assert_eq!(
+            named(&jpeg.concat()),
+            [
+                "JFIF (pixels that are not square)",
+                "comment 'focal 50, made by hand'",
+                "depth (XMP)",
+                "further pictures (MPF)"
+            ]
+        );
+        let webp = |kind: &[u8], content: &[u8]| {
+            let length = (content.len() as u32).to_le_bytes();
+            [b"RIFF\x20\0\0\0WEBP", kind, &length, content, b"EXIF\0\0\0\0"].concat()
+        };
+        assert_eq!(named(&webp(b"ANMF", b"1234")), ["further frames (ANIM)"]);
+        assert_eq!(named(&webp(b"XMP ", b"<hdrgm:x/>")), ["gain map (hdrgm)"]);
         assert_eq!(named(b"BM and more than twenty bytes"), Vec::<String>::new());
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("cut.jpg");

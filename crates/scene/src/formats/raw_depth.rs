@@ -13,14 +13,18 @@ use crate::{SceneError, View};
 
 /// Depths from here on are those of the sky: Blender writes 1e10.
 const SKY_M: f64 = 1e9;
+/// Numbers that stand for none in arrays of any type: the last code of 16 bits, and what programs put where nothing was measured.
+const NONES: [f32; 8] = [65_535.0, -1.0, -99.0, -999.0, -9999.0, -99_999.0, -32_768.0, -2_147_483_648.0];
+/// The largest numbers of types of whole numbers, which stand for none in arrays of these.
+const TOPS: [f64; 4] = [32_767.0, 65_535.0, 2_147_483_647.0, 4_294_967_295.0];
 
 /// Depths as they stand in a file.
 pub(super) struct RawDepth {
     pub(super) values: Array2<f32>,
     pub(super) kind: DepthKind,
     pub(super) unit: DepthUnit,
-    /// The largest code of whole numbers, which stands for none.
-    pub(super) top: Option<u16>,
+    /// The largest number of whole numbers, which stands for none where it is that of their type.
+    pub(super) top: Option<f64>,
     /// Columns of the file, which a disparity is counted in.
     pub(super) columns: usize,
     /// The picture of which the depths are a part, where the file tells.
@@ -130,25 +134,30 @@ impl RawDepth {
         Ok(self)
     }
 
+    /// Whether a number of lengths stands for none.
+    fn is_none(&self, value: f32) -> bool {
+        NONES.contains(&value) || self.top.is_some_and(|top| TOPS.contains(&top) && value == top as f32)
+    }
+
     /// Returns the depths in metres along the axis; 0 where none was measured, infinity for the sky. `None` for what needs the
     /// view of the samples and has none.
     ///
     /// # Errors
     /// When two anchors are given and all numbers are alike.
     pub(super) fn axial_m(&self, view: Option<View>) -> Result<Option<Array2<f32>>, SceneError> {
-        let is_code = |value: f32| self.top.is_some_and(|top| value == f32::from(top));
+        let is_none = |value: f32| self.is_none(value);
         let factor = match self.unit {
             DepthUnit::Metres(factor) | DepthUnit::Samples(factor) => factor,
         };
         let along = |z_m: f64| if z_m >= SKY_M { f32::INFINITY } else { z_m as f32 };
         Ok(Some(match self.kind {
-            DepthKind::Axial => self.values.mapv(|v| if is_code(v) { 0.0 } else { along(factor * f64::from(v)) }),
+            DepthKind::Axial => self.values.mapv(|v| if is_none(v) { 0.0 } else { along(factor * f64::from(v)) }),
             DepthKind::Radial => {
                 let Some(view) = view else { return Ok(None) };
                 Array2::from_shape_fn(self.values.dim(), |(row, column)| {
                     let v = self.values[(row, column)];
                     let z_m = factor * f64::from(v) / view.distance_per_depth(row as f64, column as f64);
-                    if is_code(v) { 0.0 } else { along(z_m) }
+                    if is_none(v) { 0.0 } else { along(z_m) }
                 })
             }
             // The inverse of nothing is the sky; what is no number was not measured.

@@ -18,7 +18,7 @@ use super::{
     npz::read_npz,
     pfm::read_pfm,
     picture::{Oriented, oriented, picture_size_of},
-    picture_parts::unknown_parts,
+    picture_parts::notes_on_parts,
     primaries::into_srgb,
     radiance_header::RadianceHeader,
     raw_depth::RawDepth,
@@ -78,7 +78,7 @@ fn of_picture(path: &Path, options: &ReadOptions, mut notes: Vec<String>) -> Res
         oriented(path, reduced.as_ref().map(|reduced| (reduced.columns, reduced.rows)))?;
     notes.extend(more);
     notes.extend(reduced.map(|reduced| reduced.note));
-    notes.extend(note_of(path, "part", &unknown_parts(path)?));
+    notes.extend(notes_on_parts(path)?);
     let what = format!("a picture as a display shows it ({})", super::picture::kind_of(&picture, colors.as_ref()));
     let image = match picture {
         dioptric_pictures::DynamicImage::ImageRgb32F(_) | dioptric_pictures::DynamicImage::ImageRgba32F(_) => {
@@ -159,7 +159,7 @@ fn of_npy(path: &Path, options: &ReadOptions) -> Result<Contents, SceneError> {
 fn of_exr(path: &Path, options: &ReadOptions) -> Result<Contents, SceneError> {
     let reading = &options.reading;
     let depth = reading.depth_variable.as_deref().filter(|_| reading.depth.is_none());
-    let asked = AskedChannels { depth, colors: reading.variable.as_deref() };
+    let asked = AskedChannels { depth, colors: reading.variable.as_deref(), texts: &[] };
     let RawFile { image, depth, view, frame, panorama, light, hidden, mut notes } = read_raw_exr(path, asked)?;
     let choice = reading.no_data.unwrap_or_default();
     let view = view.map(|view| CameraData::of_view(path, view));
@@ -180,6 +180,9 @@ fn of_exr(path: &Path, options: &ReadOptions) -> Result<Contents, SceneError> {
             let told = reading.unit.as_deref().map(light_unit).transpose()?;
             let unit = told.or_else(|| reading.quantity.and_then(FileQuantity::light_unit)).filter(|_| is_unit_open);
             let scale = reading.scale.unwrap_or(1.0);
+            // Of a film, which a scene is none.
+            let pitch = image.pitch_um().map(|_| "samplePitchUm".to_owned());
+            notes.extend(note_of(path, "attribute", pitch.as_slice()));
             let (quantity, grid) = (image.quantity(), image.grid().clone());
             let mut planes = image.into_planes();
             for (plane, &nm) in planes.iter_mut().zip(grid.centers_nm()) {
@@ -208,7 +211,7 @@ fn of_exr(path: &Path, options: &ReadOptions) -> Result<Contents, SceneError> {
     let hidden = hidden.map(|(image, depth)| {
         image.check_samples().map_err(|reason| SceneError::Values { file: path.to_owned(), reason })?;
         let contents = Contents { depth: Some(depth), ..Contents::of(Image::Spectral(image), "radiance") };
-        Ok::<_, SceneError>(Box::new(Hidden { file: path.to_owned(), contents }))
+        Ok::<_, SceneError>(Box::new(Hidden { file: path.to_owned(), contents, is_own_file: false }))
     });
     let hidden = hidden.transpose()?;
     Ok(Contents { depth, view, frame: Some(frame), panorama, light, hidden, notes, heeds, ..Contents::of(image, what) })

@@ -2,21 +2,21 @@
 
 use std::path::Path;
 
-use dioptric_spectrum::{SpectralImage, WavelengthGrid};
+use dioptric_spectrum::SpectralImage;
 
 use super::{
-    camera::{CameraData, Straightened},
+    camera::{CameraData, CameraFile, Straightened},
     contents::{Contents, Image, straightened, straightened_depth},
-    hidden_layer::{hidden_layer, read_hidden},
-    lighting::lit,
+    hidden_layer::{Front, hidden_layer, read_hidden},
+    lighting::{lit, under},
     panorama::look,
     raw_depth::RawDepth,
     read_contents::contents_of,
     read_options::ReadOptions,
     scene_depth::{depth_of, raw_depth},
     stated::{name_of, note_of},
-    understood::{self, Sources, bands},
-    unusable::unreadable,
+    understood::{self, Sources, resampling_note},
+    unusable::{check_made, unreadable},
 };
 use crate::{Scene, SceneError, View};
 
@@ -46,14 +46,14 @@ pub fn read_scene(path: &Path, options: &ReadOptions) -> Result<Scene, SceneErro
 /// Returns the camera data of the image's own samples, and notes what else there was.
 fn camera_of(path: &Path, contents: &mut Contents, options: &ReadOptions) -> Result<Option<NamedCamera>, SceneError> {
     let frame = contents.frame();
-    let beside = CameraData::beside(path)?;
+    let beside = CameraFile::beside(path)?;
     let own = contents.view.take();
     let (name, mut unused) = (name_of(path), vec![]);
-    let mut leave = |own: Option<&CameraData>, beside: Option<&CameraData>| {
+    let mut leave = |own: Option<&CameraData>, beside: Option<&CameraFile>| {
         unused.extend(own.map(|_| format!("camera data of {name}")));
         unused.extend(beside.map(|beside| name_of(&beside.file)));
     };
-    let of_frame = |data: &CameraData| -> Result<CameraData, SceneError> {
+    let of_frame = |data: &CameraFile| -> Result<CameraData, SceneError> {
         Ok(data.of_size(path, frame.rows, frame.columns)?.shifted(frame.x0, frame.y0))
     };
     let found = match (options.horizontal_fov_deg, &options.reading.view) {
@@ -72,7 +72,7 @@ fn camera_of(path: &Path, contents: &mut Contents, options: &ReadOptions) -> Res
         }
         (None, Some(file)) => {
             leave(own.as_ref(), beside.as_ref().filter(|beside| beside.file != *file));
-            let data = of_frame(&CameraData::read(file)?)?;
+            let data = of_frame(&CameraFile::read(file)?)?;
             let from = name_of(&data.file);
             Some((data, Some(from)))
         }
@@ -89,7 +89,7 @@ fn camera_of(path: &Path, contents: &mut Contents, options: &ReadOptions) -> Res
             (None, None) => None,
         },
     };
-    contents.notes.extend(found.iter().filter_map(|(data, _)| data.note.clone()));
+    contents.notes.extend(found.iter().flat_map(|(data, _)| data.notes.clone()));
     // What the camera file says of the depth is used all the same.
     contents.notes.extend(note_of(path, "view", &unused));
     Ok(found)
@@ -120,24 +120,23 @@ fn finish(path: &Path, name: String, mut contents: Contents, options: &ReadOptio
         Some(raw) => depth_of(raw, view, options.fill_depth, &mut notes)?,
         None => None,
     };
-    let own_grid = match (&contents.own_grid, &contents.image) {
-        (Some(own), _) => Some(own.clone()),
-        (None, Image::Spectral(image)) => Some(image.grid().clone()),
-        (None, _) => None,
-    };
-    notes.extend(own_grid.as_ref().and_then(|own| resampling_note(own, options.grid.as_ref())));
+    let own_grid = contents.own_grid();
+    notes.extend(own_grid.as_ref().and_then(|own| resampling_note(&name, own, options.grid.as_ref())));
     sources.bands = own_grid;
     let hidden = contents.hidden.take();
     notes.extend(understood::doubt_of_reflectances(&name, &contents.image));
-    let is_part_already = contents.part.is_some();
+    let (is_part_already, is_lit) = (contents.part.is_some(), contents.is_reflectance(options));
     let (mut radiance, light) = lit(path, contents, options, &mut notes)?;
+    if let Some(light) = light.as_ref().filter(|_| is_lit) {
+        sources.what += &under(light);
+    }
     let hidden = match hidden {
         Some(_) if straight.is_some() => {
             return Err(unreadable(path, "its samples are not square or straight, which a hidden layer must be"));
         }
         Some(hidden) => {
-            let options = ReadOptions { grid: Some(radiance.grid().clone()), ..options.clone() };
-            Some(hidden_layer(*hidden, (view, depth.as_ref()), &options, &mut notes)?)
+            let front = Front { view, depth: depth.as_ref(), grid: radiance.grid(), light: light.as_ref() };
+            Some(hidden_layer(*hidden, front, options, &mut notes)?)
         }
         None => None,
     };
@@ -194,6 +193,8 @@ fn padded(
     let Some(place) = contents.frame().place_of(rows, columns).filter(|_| contents.part.is_none()) else {
         return Ok(camera);
     };
+    let n_bands = contents.own_grid().map_or(3, |grid| grid.len()) as u64;
+    check_made(path, (4 * n_bands).saturating_mul(place.rows as u64).saturating_mul(place.columns as u64))?;
     contents.notes.push(format!("{}: what it has no samples of is black", name_of(path)));
     contents.pad(place)?;
     Ok(camera.map(|(data, from)| (data.shifted(-(place.left as i64), -(place.top as i64)), from)))
@@ -211,7 +212,14 @@ fn straight_view(
         let what = "times as wide as high, which counts with a field of view or camera data alone";
         contents.notes.push(format!("{}: its samples are {aspect} {what}", name_of(path)));
     }
-    let straight = camera.as_ref().and_then(|(camera, _)| camera.straightened(rows, columns));
+    let straight = match &camera {
+        Some((camera, _)) => camera.straightened(rows, columns)?,
+        None => None,
+    };
+    if let Some((how, _)) = &straight {
+        let n_bands = contents.own_grid().map_or(3, |grid| grid.len()) as u64;
+        check_made(path, (4 * n_bands).saturating_mul((how.rows * how.columns) as u64))?;
+    }
     let mut view = camera.map(|(camera, _)| camera.view());
     let straight = straight.map(|(how, note)| {
         view = Some(how.view);
@@ -243,17 +251,6 @@ fn note_of_turned(path: &Path, contents: &Contents, camera: Option<&NamedCamera>
             others.join(", ")
         )
     })
-}
-
-/// Returns in a sentence how the bands of a file become those wanted, where they are others.
-fn resampling_note(own: &WavelengthGrid, wanted: Option<&WavelengthGrid>) -> Option<String> {
-    let wanted = wanted.filter(|wanted| *wanted != own)?;
-    Some(format!(
-        "{} become {}: spectra run in straight lines between the centers of bands, and a band wider than those of the file takes \
-         the mean over its width",
-        bands(own),
-        bands(wanted)
-    ))
 }
 
 #[cfg(test)]

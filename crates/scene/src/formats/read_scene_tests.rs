@@ -3,7 +3,7 @@
 use super::*;
 use crate::{FillDepth, SceneLight, write_spectral_exr};
 use approx::assert_relative_eq;
-use dioptric_spectrum::{Illuminant, Quantity};
+use dioptric_spectrum::{Illuminant, Quantity, WavelengthGrid};
 use ndarray::Array2;
 
 #[test]
@@ -41,7 +41,7 @@ fn resampled_bands_are_reported() {
     let scene = read_scene(&path, &with(Some(even.clone()))).unwrap();
     let note = &scene.notes[1];
     assert!(
-        note.starts_with("7 bands of 400–700 nm, 20 to 80 nm apart become 14 bands of 420–680 nm, 20 nm"),
+        note.starts_with("uneven.exr: 7 bands of 400–700 nm, 20 to 80 nm apart become 14 bands of 420–680 nm, 20 nm"),
         "{note}"
     );
     // A straight spectrum stays straight, whatever the bands.

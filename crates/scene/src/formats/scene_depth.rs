@@ -6,7 +6,7 @@ use dioptric_spectrum::DepthMap;
 use ndarray::Array2;
 
 use super::{
-    camera::CameraData,
+    camera::CameraFile,
     contents::{Contents, MATLAB_OR_HDF5, is_of},
     depth::{depth_beside, files_beside, likely_beside, read_depth},
     raw_depth::{DepthWords, RawDepth},
@@ -22,8 +22,8 @@ use crate::{SceneError, View};
 pub(super) fn words<'a>(path: &Path, options: &'a ReadOptions) -> Result<DepthWords<'a>, SceneError> {
     let reading = &options.reading;
     let camera = match &reading.view {
-        Some(file) => Some(CameraData::read(file)?),
-        None => CameraData::beside(path)?,
+        Some(file) => Some(CameraFile::read(file)?),
+        None => CameraFile::beside(path)?,
     };
     let unit_m = camera.and_then(|camera| camera.depth_unit_m);
     let (kind, variable) = (reading.depth_kind, reading.depth_variable.as_deref());

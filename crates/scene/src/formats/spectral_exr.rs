@@ -8,16 +8,17 @@ use ndarray::Array2;
 
 use super::{
     band_name::{self, BandKind},
-    exr_attributes::{self, Attributes},
-    exr_colors::{EXPECTED, colors_of, srgb_from},
+    exr_attributes::{Attributes, is_harmless},
+    exr_colors::{EXPECTED, colors_of, is_called_picture, srgb_from},
     exr_depth,
-    exr_layers::{RawLayer, leave_other_views, read_layers},
+    exr_layers::{RawLayer, leave_other_views, read_headers, read_layers},
     light_unit::LightUnit,
     primaries::into_srgb,
     raw_depth::RawDepth,
     reading::{DepthKind, Frame, Panorama},
-    stated::{Stated, name_of, note_of},
+    stated::{Noted, Stated, name_of, note_of},
     unusable::unreadable,
+    wavelength_unit::PLAUSIBLE_NM,
 };
 use crate::{HiddenLayer, SceneError, SceneLight, View};
 
@@ -37,6 +38,8 @@ pub struct SpectralFile {
     pub view: Option<View>,
     /// What lies behind the first surface, from a second layer of that name.
     pub hidden: Option<HiddenLayer>,
+    /// The light on a scene, where the file states it.
+    pub light: Option<SceneLight>,
 }
 
 impl SpectralFile {
@@ -70,8 +73,16 @@ pub(super) fn axial(distance_m: &Array2<f32>, view: View) -> Array2<f32> {
 /// # Errors
 /// One sentence with the file's name when it is truncated, too large, without spectral bands, of mixed units, or holds
 /// a sample that is not finite or is negative.
-pub fn read_spectral_exr(path: &Path) -> Result<SpectralFile, SceneError> {
-    let RawFile { image, depth, view, hidden, panorama, .. } = read_raw_exr(path, AskedChannels::default())?;
+pub fn read_spectral_exr(path: &Path) -> Result<Noted<SpectralFile>, SceneError> {
+    let asked = AskedChannels { texts: &TEXTS, ..AskedChannels::default() };
+    let RawFile { image, depth, view, hidden, panorama, frame, light, mut notes } = read_raw_exr(path, asked)?;
+    if (frame.aspect - 1.0).abs() > 1e-6 {
+        notes.push(format!(
+            "{}: its samples are {} times as wide as high, which is not used",
+            name_of(path),
+            frame.aspect
+        ));
+    }
     if panorama.is_some() {
         return Err(unreadable(path, "it is an environment map, expected a picture in perspective"));
     }
@@ -91,8 +102,11 @@ pub fn read_spectral_exr(path: &Path) -> Result<SpectralFile, SceneError> {
     let is_axial = depth.as_ref().is_none_or(|depth| depth.kind == DepthKind::Axial);
     let map = depth.map(|depth| DepthMap::new(depth.values)).transpose().map_err(values)?;
     let (depth, distance_m) = if is_axial { (map, None) } else { (None, map.map(|map| map.z_m().clone())) };
-    Ok(SpectralFile { image, depth, distance_m, view, hidden })
+    Ok(Noted::new(SpectralFile { image, depth, distance_m, view, hidden, light }, notes))
 }
+
+/// Attributes of text that runs write into their files of irradiance, which [`read_exr_text`](crate::read_exr_text) reads.
+const TEXTS: [&str; 2] = ["illuminant", "lens"];
 
 /// What an EXR file holds, its samples and depths as they stand.
 pub(super) struct RawFile {
@@ -128,6 +142,8 @@ pub(super) struct AskedChannels<'a> {
     pub(super) depth: Option<&'a str>,
     /// The layer of red, green and blue.
     pub(super) colors: Option<&'a str>,
+    /// Attributes that whoever asks reads besides.
+    pub(super) texts: &'a [&'a str],
 }
 
 /// Reads an EXR file of bands or, where it has none, of red, green and blue.
@@ -140,10 +156,11 @@ pub(super) fn read_raw_exr(path: &Path, asked: AskedChannels<'_>) -> Result<RawF
     let hidden = layers.iter().position(|layer| layer.name == HIDDEN_LAYER && layer.has_bands());
     let hidden = hidden.filter(|_| layers.len() > 1).map(|index| layers.remove(index));
     let panorama = panorama_of(path, &layers, &mut notes);
-    let first = joined(path, layers, &mut notes)?;
+    let first = joined(path, layers, asked.texts, &mut notes)?;
     let ((rows, columns), position, attributes) = (first.size, first.position, first.attributes);
     let frame = head.frame_of(position);
     let view = attributes.view(columns, rows).map_err(|error| unreadable(path, error))?;
+    notes.extend(attributes.note_of_center(path));
     let mut channels = Stated::new("channel", first.planes);
     let bands = channels.take_all(|name| band_name::parse(name).is_some());
     let (image, prefix) = if bands.is_empty() {
@@ -184,7 +201,11 @@ pub(super) fn read_raw_exr(path: &Path, asked: AskedChannels<'_>) -> Result<RawF
                 "its layer 'hidden' lies elsewhere in the picture than its first, expected it there",
             ));
         }
-        Some(layer) => Some(hidden_of(path, layer, &mut notes)?),
+        Some(layer) => {
+            let kind = "attribute of the layer 'hidden'";
+            notes.extend(note_of(path, kind, &attributes.other_of(&layer.attributes)));
+            Some(hidden_of(path, layer, &mut notes)?)
+        }
         None => None,
     };
     let light = attributes.light.map_err(|reason| unreadable(path, format!("its sceneLight cannot be: {reason}")))?;
@@ -206,13 +227,26 @@ fn panorama_of(path: &Path, layers: &[RawLayer], notes: &mut Vec<String>) -> Opt
     }
 }
 
-/// Returns the first layer with bands, or the first, with the channels of others of the same samples; the names of others are told, as are
-/// those of parts whose bands are there already, and what headers state that nobody knows.
-fn joined(path: &Path, mut layers: Vec<RawLayer>, notes: &mut Vec<String>) -> Result<RawLayer, SceneError> {
-    let index = layers.iter().position(RawLayer::has_bands);
+/// Returns the layer with bands, or else that of the colors of a picture, with the channels of others of the same samples; of several the largest,
+/// of as large ones the first. The names of others are told, as are those of parts whose bands are there already, and what headers state that
+/// nobody knows.
+fn joined(
+    path: &Path,
+    mut layers: Vec<RawLayer>,
+    texts: &[&str],
+    notes: &mut Vec<String>,
+) -> Result<RawLayer, SceneError> {
+    let has_bands = layers.iter().any(RawLayer::has_bands);
+    let rank = |layer: &RawLayer| {
+        let is_picture = layer.name.is_empty() || is_called_picture(&layer.name);
+        let has_colors = !has_bands && layer.has_colors();
+        (layer.has_bands(), has_colors, has_colors && is_picture, layer.size.0 * layer.size.1)
+    };
+    // Of equals the last is the greatest: the first in the order turned round.
+    let index = (0..layers.len()).rev().max_by_key(|index| rank(&layers[*index]));
     let mut first = layers.remove(index.unwrap_or(0));
     let (mut unused, mut stated) = (vec![], first.attributes.others.clone());
-    if index.is_none() {
+    if !has_bands {
         first.name_channels();
     }
     for mut layer in layers {
@@ -227,12 +261,14 @@ fn joined(path: &Path, mut layers: Vec<RawLayer>, notes: &mut Vec<String>) -> Re
                 let reason = format!("its part '{}' states another emissiveUnits than the first", layer.name);
                 return Err(SceneError::Units { file: path.to_owned(), reason });
             }
+            let kind = "attribute of its further parts";
+            notes.extend(note_of(path, kind, &first.attributes.other_of(&layer.attributes)));
             stated.merge(layer.attributes.others.clone());
             layer.name_channels();
             first.planes.append(&mut layer.planes);
         }
     }
-    notes.extend(stated.note(path, exr_attributes::is_harmless));
+    notes.extend(stated.note(path, |name| is_harmless(name) || texts.contains(&name)));
     notes.extend(note_of(path, "part", &unused));
     Ok(first)
 }
@@ -265,31 +301,44 @@ fn hidden_of(path: &Path, layer: RawLayer, notes: &mut Vec<String>) -> Result<(S
     let image = image_of(path, &layer.attributes, bands)?;
     let z_m = channels.take("Z").ok_or_else(|| unreadable(path, "the layer 'hidden' has no channel 'Z'"))?;
     notes.extend(channels.note(path, |name| ["R", "G", "B"].contains(&name)));
-    let attributes = layer.attributes.others.note(path, exr_attributes::is_harmless);
+    let attributes = layer.attributes.others.note(path, is_harmless);
     notes.extend(attributes.map(|note| format!("{note} (of the layer 'hidden')")));
     Ok((image, RawDepth::in_file(path, "channel 'Z' of the layer 'hidden'".to_owned(), z_m, DepthKind::Axial)))
 }
+
+/// Planes of samples, each with the name of its channel.
+pub type NamedPlanes = Vec<(String, Array2<f32>)>;
 
 /// Reads every channel of an EXR file's first layer as single floats, by name.
 ///
 /// # Errors
 /// When the file is truncated, too large or no EXR.
-pub fn read_planes_exr(path: &Path) -> Result<Vec<(String, Array2<f32>)>, SceneError> {
-    Ok(read_planes_and_primaries_exr(path)?.0)
+pub fn read_planes_exr(path: &Path) -> Result<Noted<NamedPlanes>, SceneError> {
+    Ok(read_planes_and_primaries_exr(path)?.map(|(planes, _)| planes))
 }
 
 /// The channels of an EXR file by name, and the matrix from its primaries to linear sRGB.
-pub(super) type PlanesAndPrimaries = (Vec<(String, Array2<f32>)>, Option<[[f64; 3]; 3]>);
+pub(super) type PlanesAndPrimaries = (NamedPlanes, Option<[[f64; 3]; 3]>);
 
 /// Reads the same, with the matrix from the primaries that the file states to linear sRGB; none where they are those of sRGB.
-pub(super) fn read_planes_and_primaries_exr(path: &Path) -> Result<PlanesAndPrimaries, SceneError> {
+pub(super) fn read_planes_and_primaries_exr(path: &Path) -> Result<Noted<PlanesAndPrimaries>, SceneError> {
     let (head, mut layers) = read_layers(path)?;
     let has_colors = |planes: &[(String, Array2<f32>)]| planes.iter().any(|(name, _)| name == "R");
-    let layer = layers.swap_remove(0);
+    let layer = layers.remove(0);
     let own = head.chromaticities.filter(|_| has_colors(&layer.planes));
     let no_colors = || unreadable(path, "its chromaticities are no three primaries and a white");
     let matrix = own.map(|own| srgb_from(&own).ok_or_else(no_colors)).transpose()?;
-    Ok((layer.planes, matrix))
+    Ok(Noted::new((layer.planes, matrix), notes_on_planes_exr(path)?))
+}
+
+/// Returns what of the headers of an EXR file [`read_planes_exr`] does not use, a sentence each.
+pub(super) fn notes_on_planes_exr(path: &Path) -> Result<Vec<String>, SceneError> {
+    let mut parts = read_headers(path)?.into_iter();
+    let first = parts
+        .next()
+        .and_then(|(_, attributes)| attributes.others.note(path, |name| is_harmless(name) || TEXTS.contains(&name)));
+    let others: Vec<String> = parts.map(|(name, _)| name).collect();
+    Ok(first.into_iter().chain(note_of(path, "part", &others)).collect())
 }
 
 /// Returns the image of channels that are bands, its samples as they stand, in watts where they are light.
@@ -311,6 +360,9 @@ fn image_of(
         return units(format!(
             "it has channels of light ('{light}') and of reflectance ('{reflectance}'), expected those of one quantity"
         ));
+    }
+    if let Some((nm, name, _)) = bands.iter().find(|(nm, ..)| !PLAUSIBLE_NM.contains(nm)) {
+        return units(format!("its channel '{name}' lies at {nm} nm, which is no wavelength of light"));
     }
     bands.sort_by(|a, b| a.0.total_cmp(&b.0));
     if let Some(pair) = bands.windows(2).find(|pair| pair[0].0 == pair[1].0) {

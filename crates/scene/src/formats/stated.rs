@@ -71,19 +71,38 @@ impl<T> Stated<T> {
 
 /// What was read of a file, with what is to be said of it: the first cannot be had without a place for the second.
 #[must_use]
-#[derive(Debug)]
-pub(super) struct Noted<T> {
+#[derive(Clone, Debug, PartialEq)]
+pub struct Noted<T> {
     value: T,
     notes: Vec<String>,
 }
 
 impl<T> Noted<T> {
-    pub(super) fn new(value: T, notes: impl IntoIterator<Item = String>) -> Self {
+    /// Puts a value and the sentences on its file together.
+    pub fn new(value: T, notes: impl IntoIterator<Item = String>) -> Self {
         Self { value, notes: notes.into_iter().collect() }
     }
 
+    /// Returns another value of the same file.
+    pub(crate) fn map<U>(self, of: impl FnOnce(T) -> U) -> Noted<U> {
+        Noted { value: of(self.value), notes: self.notes }
+    }
+
+    /// Returns what is made of the value.
+    ///
+    /// # Errors
+    /// That of whoever makes it.
+    pub fn try_map<U, E>(self, of: impl FnOnce(T) -> Result<U, E>) -> Result<Noted<U>, E> {
+        Ok(Noted { value: of(self.value)?, notes: self.notes })
+    }
+
+    /// Returns what was read of a file that the program wrote itself and reads again, of which nothing is to be said.
+    pub fn of_own_file(self) -> T {
+        self.value
+    }
+
     /// Returns what was read, and puts what is to be said of it behind the notes of who asked.
-    pub(super) fn told_in(self, notes: &mut Vec<String>) -> T {
+    pub fn told_in(self, notes: &mut Vec<String>) -> T {
         notes.extend(self.notes);
         self.value
     }
@@ -131,6 +150,12 @@ pub(super) fn name_of(file: &Path) -> String {
 /// Returns the start of a text of a file, for a message.
 pub(super) fn short(text: &str) -> String {
     text.chars().filter(|c| !c.is_control()).take(MOST_CHARACTERS).collect()
+}
+
+/// Returns a number of a file for a message, however large or small.
+pub(super) fn shown(number: f64) -> String {
+    let is_usual = number == 0.0 || !number.is_finite() || (1e-4..1e9).contains(&number.abs());
+    if is_usual { number.to_string() } else { format!("{number:e}") }
 }
 
 #[cfg(test)]

@@ -10,7 +10,7 @@ use super::{
     tiff_bands::{AsGray, planes_of},
     tiff_directory::Directory,
     tiff_page::{Marked, Page, PageWords, SampleDepth, wavelengths_of},
-    unusable::{check_memory, unreadable},
+    unusable::{check_memory, said, unreadable},
 };
 use crate::SceneError;
 
@@ -104,7 +104,7 @@ struct Pages {
 }
 
 fn pages_of(path: &Path) -> Result<Pages, SceneError> {
-    let broken = |error: tiff::TiffError| unreadable(path, error.to_string().replace('\n', " "));
+    let broken = |error: tiff::TiffError| unreadable(path, said(error));
     let file = File::open(path).map_err(|error| unreadable(path, error))?;
     let length = file.metadata().map_err(|error| unreadable(path, error))?.len();
     let mut decoder = Decoder::new(BufReader::new(file)).map_err(broken)?.with_limits(Limits::default());
@@ -162,7 +162,7 @@ fn pages_of(path: &Path) -> Result<Pages, SceneError> {
 
 /// Returns the samples of all pages, a plane each.
 fn planes_of_pages(path: &Path, pages: &[(Page, u64)]) -> Result<Vec<Array2<f32>>, SceneError> {
-    let broken = |error: tiff::TiffError| unreadable(path, error.to_string().replace('\n', " "));
+    let broken = |error: tiff::TiffError| unreadable(path, said(error));
     let mut decoder = AsGray::open(path, pages).map_err(|error| unreadable(path, error))?;
     let mut planes = vec![];
     for (page, _) in pages {

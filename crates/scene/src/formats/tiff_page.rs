@@ -6,10 +6,16 @@ use std::{
 };
 
 use ndarray::Array2;
-use serde_json::Value;
-use tiff::{decoder::Decoder, tags::Tag};
+use serde_json::Value as Json;
+use tiff::{
+    decoder::{Decoder, ifd::Value},
+    tags::Tag,
+};
 
-use super::stated::{name_of, note_of};
+use super::{
+    picture_parts::differ,
+    stated::{name_of, note_of},
+};
 
 /// The name of a page.
 const PAGE_NAME: Tag = Tag::Unknown(285);
@@ -93,7 +99,17 @@ impl Page {
         let (name, descriptions) = (text(PAGE_NAME), text(Tag::ImageDescription).into_iter().collect());
         let no_data = text(Tag::GdalNodata).and_then(|text| text.trim().parse().ok());
         let tags = decoder.tag_iter().filter_map(|entry| entry.ok()).map(|(tag, _)| tag.to_u16());
-        let unknown = tags.filter(|tag| !HARMLESS.contains(tag)).collect();
+        let mut unknown: Vec<u16> = tags.filter(|tag| !HARMLESS.contains(tag)).collect();
+        let mut resolution = |tag| match decoder.find_tag(tag) {
+            Ok(Some(Value::Rational(over, under))) if over > 0 && under > 0 => Some(f64::from(over) / f64::from(under)),
+            _ => None,
+        };
+        if let (Some(across), Some(down)) = (resolution(Tag::XResolution), resolution(Tag::YResolution))
+            && differ(across, down)
+        {
+            // Pixels that are not square.
+            unknown.extend([Tag::XResolution.to_u16(), Tag::YResolution.to_u16()]);
+        }
         Ok(Self {
             index,
             size,
@@ -233,12 +249,12 @@ pub(super) fn wavelengths_of(pages: &[Page], n_planes: usize) -> Option<(Vec<f64
         return Some((list, vec![]));
     }
     let maps = pages.first()?.descriptions.iter().filter_map(|text| match serde_json::from_str(text) {
-        Ok(Value::Object(map)) => Some(map),
+        Ok(Json::Object(map)) => Some(map),
         _ => None,
     });
     let mut map = maps.into_iter().find(|map| WAVELENGTHS.iter().any(|key| map.contains_key(*key)))?;
     let list = WAVELENGTHS.iter().find_map(|key| map.remove(*key))?;
-    let list = list.as_array()?.iter().map(Value::as_f64).collect::<Option<Vec<f64>>>()?;
+    let list = list.as_array()?.iter().map(Json::as_f64).collect::<Option<Vec<f64>>>()?;
     // The shape of the array is written by tifffile.
     let left = map.into_iter().map(|(key, _)| key).filter(|key| !["shape", "axes"].contains(&key.as_str())).collect();
     (list.len() == n_planes).then_some((list, left))

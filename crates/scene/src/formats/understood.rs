@@ -114,9 +114,26 @@ pub(super) fn bands(grid: &WavelengthGrid) -> String {
     let (first, last) = (short(first), short(last));
     match grid.len() {
         1 => format!("1 band at {first} nm"),
-        n if most - least < 1e-6 => format!("{n} bands of {first}–{last} nm, {} nm apart", short(least)),
+        n if short(most) == short(least) => format!("{n} bands of {first}–{last} nm, {} nm apart", short(least)),
         n => format!("{n} bands of {first}–{last} nm, {} to {} nm apart", short(least), short(most)),
     }
+}
+
+/// Returns in a sentence how the bands of a file become those wanted, where they are others.
+pub(super) fn resampling_note(name: &str, own: &WavelengthGrid, wanted: Option<&WavelengthGrid>) -> Option<String> {
+    let wanted = wanted.filter(|wanted| *wanted != own)?;
+    Some(format!(
+        "{name}: {} become {}: spectra run in straight lines between the centers of bands, and a band wider than those of the file takes \
+         the mean over its width",
+        bands(own),
+        bands(wanted)
+    ))
+}
+
+/// Returns the mean luminance and the largest behind a semicolon; nothing where the bands are not seen.
+pub(super) fn brightness(image: &SpectralImage) -> String {
+    luminances(image)
+        .map_or_else(String::new, |[mean, most]| format!("; {} cd/m², up to {}", digits(mean), digits(most)))
 }
 
 /// Returns a length with the digits that tell.
@@ -147,7 +164,8 @@ fn luminances(image: &SpectralImage) -> Option<[f64; 2]> {
     Some([rows.iter().map(|(sum, _)| sum).sum::<f64>() / n, most.into()])
 }
 
-fn range(depth: &DepthMap) -> String {
+/// Returns the nearest and the farthest depth in words.
+pub(super) fn range(depth: &DepthMap) -> String {
     let (near, far) = depth.range_m();
     let (near, far) = (digits(near), if far.is_finite() { digits(far) } else { "∞".to_owned() });
     if near == far { format!("{near} m") } else { format!("{near}–{far} m") }

@@ -28,6 +28,21 @@ pub(crate) fn unreadable(path: &Path, reason: impl ToString) -> SceneError {
     SceneError::Unreadable { file: path.to_owned(), reason: reason.to_string() }
 }
 
+/// Returns an error of what was made of a file with the file's name.
+pub(crate) fn in_file(path: &Path, error: &SceneError) -> SceneError {
+    SceneError::Units { file: path.to_owned(), reason: error.to_string() }
+}
+
+/// Returns the start of what another crate says is wrong, in a line.
+pub(crate) fn said(error: impl ToString) -> String {
+    const MOST_CHARACTERS: usize = 200;
+    let text = error.to_string().replace(['\n', '\r'], " ");
+    match text.char_indices().nth(MOST_CHARACTERS) {
+        Some((end, _)) => format!("{}…", &text[..end]),
+        None => text,
+    }
+}
+
 /// Checks before a file is read that the memory it takes is allowed.
 pub(crate) fn check_memory(path: &Path, bytes: u64, length: u64) -> Result<(), SceneError> {
     memory::check(bytes, length).map_err(|reason| SceneError::TooLarge { file: path.to_owned(), reason })

@@ -1,4 +1,9 @@
-//! Units in which files state wavelengths.
+//! Units in which files state wavelengths, and the order of bands by them.
+
+use std::path::Path;
+
+use super::stated::{short, shown};
+use crate::SceneError;
 
 /// The speed of light times 1e9 nm per m, nm/s, and the energy of a photon times its wavelength, eV nm (CODATA 2018).
 const NM_PER_S: f64 = 2.997_924_58e17;
@@ -32,6 +37,76 @@ pub(super) fn in_nm(unit: &str, numbers: &[f64]) -> Option<Vec<f64>> {
     }
 }
 
+/// Returns a list whose unit nothing states as nm, where it can be of nm or of µm alone; `None` of all else, as of counted bands.
+pub(super) fn without_unit(numbers: &[f64]) -> Option<Vec<f64>> {
+    let all = |range: std::ops::Range<f64>| numbers.iter().all(|number| range.contains(number));
+    if !are_counted(numbers) && all(0.15..20.0) {
+        return in_nm("um", numbers);
+    }
+    all(150.0..20_000.0).then(|| numbers.to_vec())
+}
+
+/// Whether numbers count bands, from 0 or 1.
+pub(super) fn are_counted(numbers: &[f64]) -> bool {
+    numbers.len() > 1 && numbers.windows(2).all(|pair| pair[1] - pair[0] == 1.0) && [0.0, 1.0].contains(&numbers[0])
+}
+
+/// Returns the wavelengths, nm, of a list beside a cube, as its unit says or as [`without_unit`]; `None` of a list that counts bands.
+///
+/// # Errors
+/// When its unit is not known, or its numbers are no likely wavelengths.
+pub(super) fn listed_nm(name: &str, unit: Option<&str>, numbers: &[f64]) -> Result<Option<Vec<f64>>, String> {
+    const EXPECTED: &str = "or --scene-wavelengths-nm";
+    let Some(unit) = unit else {
+        if are_counted(numbers) {
+            return Ok(None);
+        }
+        let reason = || {
+            let shown = numbers.iter().take(3).map(|number| shown(*number)).collect::<Vec<_>>().join(", ");
+            format!("its '{}' ({shown}, …) has no unit and is no likely nm or µm: expected nm, {EXPECTED}", short(name))
+        };
+        return without_unit(numbers).map(Some).ok_or_else(reason);
+    };
+    let own = in_nm(unit, numbers)
+        .ok_or_else(|| format!("its '{}' are in '{}': expected {UNITS}, {EXPECTED}", short(name), short(unit)))?;
+    match own.iter().zip(numbers).find(|(nm, _)| !PLAUSIBLE_NM.contains(*nm)) {
+        Some((_, number)) => {
+            Err(format!("{} of its '{}' in {} is no wavelength of light", shown(*number), short(name), short(unit)))
+        }
+        None => Ok(Some(own)),
+    }
+}
+
+/// Returns these bands of a file, counted from 0, by ascending wavelength.
+///
+/// # Errors
+/// Names a band, counted from 1, that lies at no wavelength of light, or two that lie at one.
+pub(super) fn ascending(
+    path: &Path,
+    wavelengths_nm: &[f64],
+    bands: impl IntoIterator<Item = usize>,
+) -> Result<Vec<usize>, SceneError> {
+    let mut order: Vec<usize> = bands.into_iter().collect();
+    let wrong = |reason: String| SceneError::Units { file: path.to_owned(), reason };
+    if let Some(band) = order.iter().find(|band| !PLAUSIBLE_NM.contains(&wavelengths_nm[**band])) {
+        return Err(wrong(format!(
+            "its band {} lies at {} nm: expected a wavelength of light in nm, in the file or by --scene-wavelengths-nm",
+            band + 1,
+            shown(wavelengths_nm[*band])
+        )));
+    }
+    order.sort_by(|&a, &b| wavelengths_nm[a].total_cmp(&wavelengths_nm[b]));
+    match order.windows(2).find(|pair| wavelengths_nm[pair[0]] == wavelengths_nm[pair[1]]) {
+        Some(pair) => Err(wrong(format!(
+            "its bands {} and {} lie both at {} nm: expected a wavelength of its own for each",
+            pair[0] + 1,
+            pair[1] + 1,
+            wavelengths_nm[pair[0]]
+        ))),
+        None => Ok(order),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -52,5 +127,28 @@ mod tests {
             assert!((nm - 500.0).abs() < 1e-5, "{unit}: {nm}");
         }
         assert_eq!(in_nm("zorp", &[500.0]), None);
+    }
+
+    #[test]
+    fn lists_without_a_unit_are_nm_or_micrometres_or_no_wavelengths() {
+        let of = |unit, numbers: &[f64]| listed_nm("waves", unit, numbers);
+        assert_eq!(of(None, &[0.45, 0.55]), Ok(Some(vec![450.0, 550.0])));
+        assert_eq!(of(None, &[450.0, 550.0]), Ok(Some(vec![450.0, 550.0])));
+        assert_eq!(of(None, &[1.0, 2.0, 3.0]), Ok(None));
+        assert_eq!(of(Some("THz"), &[599.584_916]).map(|list| list.map(|list| list[0].round())), Ok(Some(500.0)));
+        for (unit, numbers) in [(None, [22_222.0, 15_384.0]), (Some("zorp"), [1.0, 2.0]), (Some("um"), [450.0, 550.0])]
+        {
+            assert!(of(unit, &numbers).unwrap_err().contains("'waves'"), "{unit:?}");
+        }
+    }
+
+    #[test]
+    fn bands_that_are_none_or_twice_are_named_as_they_stand_in_the_file() {
+        let of = |list: &[f64]| ascending(Path::new("a.hdr"), list, 0..list.len()).map_err(|error| error.to_string());
+        assert_eq!(of(&[600.0, 450.0, 500.0]), Ok(vec![1, 2, 0]));
+        assert!(of(&[600.0, 450.0, 600.0]).unwrap_err().contains("its bands 1 and 3 lie both at 600 nm"));
+        assert!(of(&[f64::NAN, 450.0]).unwrap_err().contains("its band 1 lies at NaN nm"));
+        // A band that is left out may be what it likes.
+        assert_eq!(ascending(Path::new("a"), &[f64::NAN, 450.0], [1]).unwrap(), [1]);
     }
 }

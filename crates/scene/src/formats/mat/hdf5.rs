@@ -8,6 +8,7 @@ use exr::prelude::f16;
 use hdf5_pure::{AttrValue, DType, Dataset, Datatype, DatatypeByteOrder, File, FloatingPointLayout, Group};
 
 use super::{
+    super::unusable::said,
     elements::{self, LIMIT_ARRAYS, LIMIT_DEPTH, Listed},
     packing::{Attribute, Value},
 };
@@ -249,7 +250,7 @@ fn numbers_of(dataset: &Dataset) -> Result<Vec<u8>, String> {
 
 fn broken(error: hdf5_pure::Error) -> String {
     let way = "expected one without links, which older programs read as well (h5repack --high=V18)";
-    format!("it is HDF5 that cannot be read ({error}): {way}")
+    format!("it is HDF5 that cannot be read ({}): {way}", said(error))
 }
 
 fn too_many() -> String {

@@ -17,7 +17,7 @@ use super::{
         reading::{FileQuantity, FileReading},
         stated::{name_of, note_of},
         unusable::unreadable,
-        wavelength_unit::{UNITS, in_nm},
+        wavelength_unit::{self, listed_nm},
     },
     container::{Content, MatArray, MatFile, WHOLE},
     elements::Listed,
@@ -178,8 +178,8 @@ fn cube_of(path: &Path, file: &MatFile, name: &str, reading: &FileReading) -> Re
         .map(|(_, n, [first, last])| {
             (0..*n).map(|i| first + (last - first) * i as f64 / (*n as f64 - 1.0)).collect::<Vec<f64>>()
         });
-    let stated = packing.wavelengths_nm(&array.sides, &WAVES).filter(|_| waves.is_none());
-    let own = waves.as_ref().map(|(_, list)| list.clone()).or(stated.map(<[f64]>::to_vec)).or(known);
+    let stated = packing.wavelengths_nm(&array.sides).filter(|_| waves.is_none());
+    let own = waves.as_ref().map(|(_, list)| list.clone()).or(stated.clone()).or(known);
     let n_bands = reading.wavelengths_nm.as_ref().or(own.as_ref()).map(Vec::len);
     let unit = UnitOf::read(packing.unit.as_deref());
     let percent = if matches!(unit, UnitOf::Percent) { 0.01 } else { 1.0 };
@@ -237,31 +237,21 @@ impl UnitOf {
     }
 }
 
-/// Returns the name of the list of wavelengths beside a cube of these sides, and the list, nm. One in an unknown unit is an error, unless
-/// wavelengths are told.
+/// Returns the name of the list of wavelengths beside a cube of these sides, and the list, nm; none where wavelengths are told and the list is no
+/// likely one.
 fn waves_of(file: &MatFile, cube: &str, sides: &[usize], is_told: bool) -> Result<Option<(String, Vec<f64>)>, String> {
     for list in WAVES {
         let Some(own) = file.listed.iter().find(|own| last_part(&own.name) == list && own.name != cube) else {
             continue;
         };
-        let numbers = file.array(&own.name)?.and_then(|array| array.list()).filter(|list| !list.is_empty());
-        let Some(mut numbers) = numbers else { continue };
-        if let Some(unit) = Packing::of(file.attributes_of(&own.name)).unit.filter(|_| sides.contains(&numbers.len())) {
-            numbers = match in_nm(&unit, &numbers) {
-                Some(numbers) => numbers,
-                None if is_told => continue,
-                None => {
-                    let unit: String = unit.chars().take(40).collect();
-                    return Err(format!(
-                        "its '{}' are in '{unit}': expected {UNITS}, or --scene-wavelengths-nm",
-                        own.name
-                    ));
-                }
-            };
-        }
-        // A list that counts bands, or of another length, is none of wavelengths.
-        let is_bands = sides.contains(&numbers.len()) && numbers.iter().all(|nm| *nm >= 100.0);
-        return Ok(is_bands.then(|| (own.name.clone(), numbers)));
+        let numbers = file.array(&own.name)?.and_then(|array| array.list());
+        let Some(numbers) = numbers.filter(|list| sides.contains(&list.len())) else { continue };
+        let unit = Packing::of(file.attributes_of(&own.name)).unit.or(list.ends_with("_nm").then(|| "nm".to_owned()));
+        return match listed_nm(&own.name, unit.as_deref(), &numbers) {
+            Ok(list) => Ok(list.map(|list| (own.name.clone(), list))),
+            Err(_) if is_told => Ok(None),
+            Err(reason) => Err(reason),
+        };
     }
     Ok(None)
 }
@@ -271,7 +261,7 @@ fn of_iset(path: &Path, file: &MatFile) -> Result<IsetScene, SceneError> {
     let wrong = |reason: String| unreadable(path, reason);
     let Raw { planes, wave_nm, light, depth_m, distance_m, horizontal_fov_deg } = Raw::of(file).map_err(wrong)?;
     let values = |reason| SceneError::Values { file: path.to_owned(), reason };
-    let order = ascending(&wave_nm);
+    let order = wavelength_unit::ascending(path, &wave_nm, 0..wave_nm.len())?;
     let grid = WavelengthGrid::new(order.iter().map(|&band| wave_nm[band]).collect()).map_err(values)?;
     let mut planes: Vec<Option<Array2<f32>>> = planes.into_iter().map(Some).collect();
     let planes = order.iter().filter_map(|&band| planes[band].take()).collect();

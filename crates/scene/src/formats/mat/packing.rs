@@ -1,6 +1,8 @@
 //! What the attributes of an array of HDF5 say of its numbers, by the conventions of netCDF ("Climate and Forecast", 8.1 and 2.5.1).
 
-/// Names of the list of wavelengths beside a cube, nm.
+use super::super::wavelength_unit::without_unit;
+
+/// Names of the list of wavelengths beside a cube.
 pub(in super::super) const WAVES: [&str; 9] =
     ["wave", "wavelength", "wavelengths", "wavelengths_nm", "waves", "lambda", "bands", "wl", "wlens"];
 
@@ -64,10 +66,10 @@ impl<'a> Packing<'a> {
     }
 
     /// Returns the list of wavelengths of so many bands.
-    pub(super) fn wavelengths_nm(&self, n_bands: &[usize], names: &[&str]) -> Option<&[f64]> {
+    pub(super) fn wavelengths_nm(&self, n_bands: &[usize]) -> Option<Vec<f64>> {
         self.attributes.iter().find_map(|own| match &own.value {
-            Value::Numbers(list) if names.contains(&own.name.as_str()) && n_bands.contains(&list.len()) => {
-                Some(list.as_slice()).filter(|list| list.iter().all(|nm| *nm >= 100.0))
+            Value::Numbers(list) if WAVES.contains(&own.name.as_str()) && n_bands.contains(&list.len()) => {
+                without_unit(list)
             }
             _ => None,
         })
@@ -85,19 +87,9 @@ impl<'a> Packing<'a> {
     }
 }
 
-/// Returns the metres of a unit of length.
-pub(super) fn length_m(unit: &str) -> Option<f64> {
-    Some(match unit.to_lowercase().as_str() {
-        "m" | "meter" | "meters" | "metre" | "metres" => 1.0,
-        "cm" | "centimeter" | "centimeters" | "centimetre" | "centimetres" => 1e-2,
-        "mm" | "millimeter" | "millimeters" | "millimetre" | "millimetres" => 1e-3,
-        _ => return None,
-    })
-}
-
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::{super::super::length_unit::length_m, *};
 
     #[test]
     fn packed_numbers_are_unpacked() {

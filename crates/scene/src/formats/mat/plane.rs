@@ -6,18 +6,25 @@ use ndarray::Array2;
 
 use super::{
     super::{
+        length_unit::{length_in_name, length_m},
         stated::{Noted, note_of},
         unusable::unreadable,
     },
     container::{MatFile, WHOLE},
     elements::Listed,
-    packing::{Packing, length_m},
+    packing::Packing,
 };
 use crate::SceneError;
 
 /// Names of arrays of depth, those of distances from the camera first.
-pub(in super::super) const DEPTHS: [&str; 10] =
-    ["distance", "depth_meters", "depth", "depths", "depthmap", "depth_map", "z", "dataset", "rawdepths", "disparity"];
+pub(in super::super) const DEPTHS: [&str; 9] =
+    ["distance", "depth", "depths", "depthmap", "depth_map", "z", "dataset", "rawdepths", "disparity"];
+
+/// Whether an array is called so, or so with a unit of length behind, as `depth_mm`.
+pub(in super::super) fn is_called(name: &str, wanted: &str) -> bool {
+    let bare = length_in_name(name).and_then(|_| name.rsplit_once(['_', '-', ' ', '.'])).map(|(bare, _)| bare);
+    [Some(name), bare].into_iter().flatten().any(|own| own.eq_ignore_ascii_case(wanted))
+}
 
 /// A plane of numbers.
 pub(in super::super) struct Plane {
@@ -43,7 +50,7 @@ pub(in super::super) fn read_plane(path: &Path, told: Option<&str>) -> Result<No
     let last = |own: &Listed| own.name.rsplit('/').next().unwrap_or_default().to_lowercase();
     let named = match told {
         Some(told) => planes.iter().find(|own| own.name == told),
-        None => DEPTHS.iter().find_map(|name| planes.iter().find(|own| last(own) == *name)),
+        None => DEPTHS.iter().find_map(|name| planes.iter().find(|own| is_called(&last(own), name))),
     };
     let chosen = match (named, &planes[..]) {
         (Some(named), _) => named,

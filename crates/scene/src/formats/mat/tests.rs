@@ -194,7 +194,7 @@ fn other_files_are_refused_in_a_sentence() {
             .concat()
     };
     check_refused(&with(&[500.0, 600.0], &[1, 3, 4], 12), "1 × 3 × 4, expected rows × columns × 2");
-    check_refused(&with(&[500.0, 500.0], &[1, 3, 2], 6), "ascending");
+    check_refused(&with(&[500.0, 500.0], &[1, 3, 2], 6), "bands 1 and 2 lie both at 500 nm");
     check_refused(&with(&[-500.0, 500.0], &[1, 3, 2], 6), "-500 nm");
     check_refused(&with(&[500.0, 600.0], &[1, 300, 2], 6), "600 numbers has 48 bytes");
     check_refused(&with(&[500.0, 600.0], &[u32::MAX, u32::MAX, u32::MAX], 6), "sides");

@@ -1,0 +1,168 @@
+//! What cameras write beside their pictures: Exif data (CIPA DC-008), whose fields are those of TIFF.
+
+use std::path::Path;
+
+use image::{ImageDecoder, ImageReader};
+
+/// The fields of a TIFF file or of Exif data, which are one.
+pub(crate) struct TiffFields<'a> {
+    bytes: &'a [u8],
+    is_big_endian: bool,
+}
+
+impl<'a> TiffFields<'a> {
+    pub(crate) fn new(bytes: &'a [u8]) -> Option<Self> {
+        let is_big_endian = bytes.starts_with(b"MM\0*");
+        (is_big_endian || bytes.starts_with(b"II*\0")).then_some(Self { bytes, is_big_endian })
+    }
+
+    pub(crate) fn number(&self, at: usize, n: usize) -> Option<usize> {
+        let bytes = self.bytes.get(at..at.checked_add(n)?)?;
+        let digits = |sum: usize, byte: &u8| sum << 8 | usize::from(*byte);
+        Some(if self.is_big_endian { bytes.iter().fold(0, digits) } else { bytes.iter().rev().fold(0, digits) })
+    }
+
+    pub(crate) fn first_directory(&self) -> Option<usize> {
+        self.number(4, 4)
+    }
+
+    /// Returns the place of the count of a field, behind which its value or the place of that lies.
+    pub(crate) fn field(&self, directory: usize, tag: usize) -> Option<usize> {
+        let n = self.number(directory, 2)?;
+        (0..n).map(|i| directory + 2 + 12 * i).find(|at| self.number(*at, 2) == Some(tag)).map(|at| at + 4)
+    }
+
+    /// Returns the directory that a field of another leads to.
+    fn directory(&self, directory: usize, tag: usize) -> Option<usize> {
+        self.number(self.field(directory, tag)? + 4, 4)
+    }
+
+    /// Returns the number of a field of a whole number or of a ratio.
+    fn value(&self, directory: usize, tag: usize) -> Option<f64> {
+        const SHORT: usize = 3;
+        const LONG: usize = 4;
+        const RATIONAL: usize = 5;
+        const FLOAT: usize = 11;
+        const DOUBLE: usize = 12;
+        let count = self.field(directory, tag)?;
+        match self.number(count.checked_sub(2)?, 2)? {
+            SHORT => self.number(count + 4, 2).map(|n| n as f64),
+            LONG => self.number(count + 4, 4).map(|n| n as f64),
+            RATIONAL => {
+                let place = self.number(count + 4, 4)?;
+                let (over, under) = (self.number(place, 4)? as f64, self.number(place.checked_add(4)?, 4)? as f64);
+                (under > 0.0).then(|| over / under)
+            }
+            FLOAT => self.number(count + 4, 4).map(|bits| f64::from(f32::from_bits(bits as u32))),
+            DOUBLE => self.number(self.number(count + 4, 4)?, 8).map(|bits| f64::from_bits(bits as u64)),
+            _ => None,
+        }
+    }
+}
+
+/// What the Exif data of a picture state of its light and its geometry.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Exif {
+    /// The focal length of the lens, mm.
+    pub focal_mm: Option<f64>,
+    /// That of a lens with the same field of view on film of 36 mm × 24 mm, as the diagonals have it (CIPA DCG-001), mm.
+    pub focal_on_film_mm: Option<f64>,
+    /// How far the subject is, m.
+    pub subject_distance_m: Option<f64>,
+    /// The exponent of the curve from codes to light.
+    pub gamma: Option<f64>,
+    is_adobe_rgb: bool,
+}
+
+/// The diagonal of a frame of 36 mm × 24 mm, mm.
+const FILM_DIAGONAL_MM: f64 = 43.266_615;
+
+impl Exif {
+    /// Returns what the Exif data of a PNG, JPEG or WebP file state; nothing of other files.
+    pub fn of(path: &Path) -> Self {
+        let reader = ImageReader::open(path).ok().and_then(|reader| reader.with_guessed_format().ok());
+        let bytes = reader.and_then(|reader| reader.into_decoder().ok()?.exif_metadata().ok().flatten());
+        bytes.map_or_else(Self::default, |bytes| Self::of_bytes(&bytes))
+    }
+
+    /// Returns what Exif data of these bytes state.
+    pub(crate) fn of_bytes(bytes: &[u8]) -> Self {
+        const EXIF_DIRECTORY: usize = 0x8769;
+        const INTEROPERABILITY_DIRECTORY: usize = 0xA005;
+        let Some(fields) = TiffFields::new(bytes) else { return Self::default() };
+        let Some(first) = fields.first_directory() else { return Self::default() };
+        let own = fields.directory(first, EXIF_DIRECTORY);
+        // Some writers put all fields into the first directory.
+        let number = |tag| own.and_then(|own| fields.value(own, tag)).or_else(|| fields.value(first, tag));
+        let above_0 = |tag| number(tag).filter(|v| v.is_finite() && *v > 0.0);
+        // No sRGB (`ColorSpace` 65535), and interoperability R03 (DCF 2.0, 2010, 4.2).
+        let is_other = number(0xA001) == Some(65_535.0);
+        let interoperability = own.and_then(|own| fields.directory(own, INTEROPERABILITY_DIRECTORY));
+        let index = interoperability.and_then(|directory| fields.field(directory, 1));
+        let is_r03 = index.is_some_and(|at| bytes.get(at + 4..at + 7) == Some(b"R03"));
+        Self {
+            focal_mm: above_0(0x920A),
+            focal_on_film_mm: above_0(0xA405),
+            subject_distance_m: above_0(0x9206),
+            gamma: above_0(0xA500),
+            is_adobe_rgb: is_other && is_r03,
+        }
+    }
+
+    /// Whether the codes are those of Adobe RGB.
+    pub fn is_adobe_rgb(self) -> bool {
+        self.is_adobe_rgb
+    }
+
+    /// Returns how wide a picture of so many columns and rows is by the focal length on film, degrees.
+    pub fn horizontal_fov_deg(self, columns: usize, rows: usize) -> Option<f64> {
+        let (columns, rows) = (columns as f64, rows as f64);
+        let width_mm = FILM_DIAGONAL_MM * columns / columns.hypot(rows);
+        self.focal_on_film_mm.map(|focal_mm| 2.0 * (0.5 * width_mm / focal_mm).atan().to_degrees())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn fields_of_a_camera_are_read_in_either_order() {
+        // A first directory with a pointer to the second at 26, which has a short, a ratio at 56 and a short again.
+        for big in [false, true] {
+            let n = |value: u32, n: usize| {
+                let all = value.to_be_bytes();
+                let mut bytes = all[4 - n..].to_vec();
+                if !big {
+                    bytes.reverse();
+                }
+                bytes
+            };
+            let short = |tag: u32, value: u32| [n(tag, 2), n(3, 2), n(1, 4), n(value, 2), n(0, 2)].concat();
+            let long = |tag: u32, kind: u32, value: u32| [n(tag, 2), n(kind, 2), n(1, 4), n(value, 4)].concat();
+            let head = if big { b"MM\0*".to_vec() } else { b"II*\0".to_vec() };
+            let bytes = [
+                head,
+                n(8, 4),
+                n(1, 2),
+                long(0x8769, 4, 26),
+                n(0, 4),
+                n(2, 2),
+                long(0x920A, 5, 56),
+                short(0xA405, 50),
+                n(0, 4),
+                n(333, 4),
+                n(10, 4),
+            ]
+            .concat();
+            let exif = Exif::of_bytes(&bytes);
+            assert_eq!((exif.focal_mm, exif.focal_on_film_mm, exif.gamma), (Some(33.3), Some(50.0), None));
+            // 36 mm at 50 mm.
+            let fov_deg = exif.horizontal_fov_deg(3000, 2000).unwrap();
+            assert!((fov_deg - 39.5978).abs() < 1e-3 && !exif.is_adobe_rgb(), "{fov_deg}");
+            for end in 0..bytes.len() {
+                Exif::of_bytes(&bytes[..end]);
+            }
+        }
+    }
+}

@@ -1,0 +1,45 @@
+//! What files of camera data call the models of lenses, and what else they share.
+
+use super::stated::short;
+
+/// Keys that change nothing of what a scene is.
+pub(super) const HARMLESS: [&str; 8] =
+    ["source", "name", "comment", "comments", "description", "note", "notes", "license"];
+/// What calibrations call the polynomial of `OpenCV`, or no distortion at all.
+const POLYNOMIALS: [&str; 12] = [
+    "OPENCV",
+    "PINHOLE",
+    "SIMPLE_PINHOLE",
+    "SIMPLE_RADIAL",
+    "RADIAL",
+    "PERSPECTIVE",
+    "PLUMB_BOB",
+    "RATIONAL_POLYNOMIAL",
+    "RADTAN",
+    "RADIAL_TANGENTIAL",
+    "BROWN_CONRADY",
+    "NONE",
+];
+/// What they call a fisheye by the angle.
+const FISHEYES: [&str; 5] = ["OPENCV_FISHEYE", "FISHEYE", "EQUIDISTANT", "EQUI", "KANNALA_BRANDT"];
+
+/// Returns whether a model is a fisheye; `None` of one that is not known.
+pub(super) fn is_fisheye(model: &str) -> Option<bool> {
+    let model = model.trim().trim_matches(['"', '\'']).to_uppercase().replace(['-', ' '], "_");
+    if model.is_empty() || POLYNOMIALS.contains(&model.as_str()) {
+        return Some(false);
+    }
+    FISHEYES.contains(&model.as_str()).then_some(true)
+}
+
+pub(super) fn unknown_model(model: &str) -> String {
+    format!("its camera model is '{}', expected PINHOLE, OPENCV or OPENCV_FISHEYE", short(model))
+}
+
+/// Checks that of a camera matrix nothing is left out: what must be 0, for it to be that of a camera whose rows and columns are at right angles.
+pub(super) fn check_matrix(name: &str, rest: &[f64]) -> Result<(), String> {
+    match rest.iter().all(|number| number.abs() < 1e-9) {
+        true => Ok(()),
+        false => Err(format!("its {name} has a skew or a last row other than 0, 0, 1, expected none")),
+    }
+}

@@ -1,0 +1,288 @@
+//! What files state twice, not at all, or by a number that stands for none; and what they are refused with.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use exr::prelude::{
+    AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, Text, WritableImage,
+};
+use ndarray::Array2;
+
+use super::{FileQuantity, FileReading, ReadOptions, kinds_tests::zip_of, npy::tests::npy, read_scene};
+use crate::{Scene, SceneError};
+
+const ROWS: usize = 2;
+const COLUMNS: usize = 3;
+
+/// A folder with a picture of gray.
+fn folder_with_picture() -> (tempfile::TempDir, PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("room.png");
+    let pixels = image::RgbImage::from_pixel(COLUMNS as u32, ROWS as u32, image::Rgb([99; 3]));
+    dioptric_pictures::save(&pixels.into(), &path).unwrap();
+    (folder, path)
+}
+
+fn options(reading: FileReading) -> ReadOptions {
+    ReadOptions { horizontal_fov_deg: Some(20.0), reading, ..ReadOptions::default() }
+}
+
+#[track_caller]
+fn check_noted(scene: &Scene, words: &[&str]) {
+    for word in words {
+        assert!(scene.notes.iter().any(|note| note.contains(word)), "{word}: {:?}", scene.notes);
+    }
+}
+
+#[track_caller]
+fn check_refused(read: Result<Scene, SceneError>, words: &[&str]) {
+    let message = read.expect_err("a refusal").to_string();
+    assert!(words.iter().all(|word| message.contains(word)) && !message.contains('\n'), "{message}");
+}
+
+/// Reads a file of depth beside a picture.
+fn with_depth(name: &str, bytes: &[u8], unit: Option<&str>) -> Result<Scene, SceneError> {
+    let (folder, picture) = folder_with_picture();
+    let depth = folder.path().join(name);
+    fs::write(&depth, bytes).unwrap();
+    let reading = FileReading { depth: Some(depth), depth_unit: unit.map(str::to_owned), ..FileReading::default() };
+    read_scene(&picture, &ReadOptions { fill_depth: Some("9".parse().unwrap()), ..options(reading) })
+}
+
+fn floats(values: &[f32]) -> Vec<u8> {
+    values.iter().flat_map(|v| v.to_le_bytes()).collect()
+}
+
+#[test]
+fn numbers_that_stand_for_none_do_so_in_every_type() {
+    let z_m = |name: &str, bytes: &[u8]| {
+        let scene = with_depth(name, bytes, Some("mm")).unwrap();
+        check_noted(&scene, &["have no depth; they get 9 m"]);
+        scene.depth.unwrap().z_m().clone()
+    };
+    let expected = ndarray::arr2(&[[2.0, 9.0, 3.0], [4.0, 5.0, 9.0]]);
+    let codes = [2000.0, 65_535.0, 3000.0, 4000.0, 5000.0, 0.0];
+    let ints = |values: [i32; 6]| values.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>();
+    assert_eq!(z_m("a.npy", &npy("<f4", false, "(2, 3)", &floats(&codes))), expected);
+    assert_eq!(z_m("a.npy", &npy("<i4", false, "(2, 3)", &ints(codes.map(|v| v as i32)))), expected);
+    for none in [-1, -9999, i32::MAX] {
+        let codes = [2000, none, 3000, 4000, 5000, 0];
+        assert_eq!(z_m("a.npy", &npy("<i4", false, "(2, 3)", &ints(codes))), expected, "{none}");
+    }
+    assert_eq!(z_m("a.txt", b"2000 nan 3000\n4000 5000 -1\n"), expected);
+    // Other numbers below 0 are no depths.
+    let turned = npy("<f4", false, "(2, 3)", &floats(&[-2.0, 3.0, 4.0, 5.0, 6.0, 7.0]));
+    check_refused(with_depth("a.npy", &turned, Some("m")), &["-2 m", "above 0"]);
+}
+
+#[test]
+fn names_of_depths_state_their_unit() {
+    let plane = npy("<f4", false, "(2, 3)", &floats(&[2000.0; 6]));
+    let archive = zip_of(&[("depth_mm", plane.clone())], false);
+    let z_m = |name: &str, bytes: &[u8], unit| with_depth(name, bytes, unit).unwrap().depth.unwrap().range_m();
+    assert_eq!(z_m("a.npz", &archive, None), (2.0, 2.0));
+    assert_eq!(z_m("a.npz", &archive, Some("mm")), (2.0, 2.0));
+    check_refused(with_depth("a.npz", &archive, Some("m")), &["a.npz", "states the unit"]);
+    assert_eq!(z_m("depth_mm.npy", &plane, None), (2.0, 2.0));
+    // A file may have been named by another.
+    assert_eq!(z_m("depth_mm.npy", &plane, Some("cm")), (20.0, 20.0));
+}
+
+#[test]
+fn comments_of_depths_are_named() {
+    let codes: Vec<u8> = [2000_u16; 6].iter().flat_map(|v| v.to_be_bytes()).collect();
+    let scene = with_depth("a.pgm", &[&b"P5\n# depth_scale 5000\n3 2\n65535\n"[..], &codes].concat(), None).unwrap();
+    check_noted(&scene, &["'comment 'depth_scale 5000''"]);
+    let scene = with_depth("a.txt", b"# depths in mm\n2 2 2\n2 2 2\n", None).unwrap();
+    check_noted(&scene, &["'depths in mm'"]);
+}
+
+/// The name of a layer, its rows and columns, and its channels with the number that they have everywhere.
+type LayerOf<'a> = (&'a str, (usize, usize), &'a [(&'a str, f32)]);
+
+/// Writes an EXR file of channels that are the same everywhere, of layers of so many samples.
+fn write_exr(path: &Path, layers: &[LayerOf<'_>]) {
+    let layers = layers.iter().map(|(name, size, channels)| {
+        let plane = |v: f32| FlatSamples::F32(vec![v; size.0 * size.1]);
+        let of = |(name, v): &(&str, f32)| {
+            // As other programs write it: a byte a byte of UTF-8.
+            AnyChannel::new(Text::from_bytes_unchecked(name.bytes().collect()), plane(*v))
+        };
+        let channels = channels.iter().map(of).collect();
+        Layer::new(
+            (size.1, size.0),
+            LayerAttributes::named(*name),
+            Encoding::FAST_LOSSLESS,
+            AnyChannels::sort(channels),
+        )
+    });
+    let layers: exr::image::Layers<AnyChannels<FlatSamples>> = layers.collect();
+    let window = exr::meta::attribute::IntegerBounds::from_dimensions((COLUMNS, ROWS));
+    Image::from_layers(exr::meta::header::ImageAttributes::new(window), layers).write().to_file(path).unwrap();
+}
+
+const FRONT: [(&str, f32); 4] = [("S0.450,0nm", 0.01), ("S0.550,0nm", 0.01), ("S0.650,0nm", 0.01), ("Z", 2.0)];
+
+/// Reads a scene with a layer of these channels behind.
+fn with_hidden(channels: &[(&str, f32)]) -> Result<Scene, SceneError> {
+    let folder = tempfile::tempdir().unwrap();
+    let [front, behind] = ["front.exr", "behind.exr"].map(|name| folder.path().join(name));
+    write_exr(&front, &[("", (ROWS, COLUMNS), &FRONT)]);
+    write_exr(&behind, &[("", (ROWS, COLUMNS), channels)]);
+    read_scene(&front, &ReadOptions { hidden: Some(behind), ..options(FileReading::default()) })
+}
+
+#[test]
+fn files_of_hidden_layers_say_what_scenes_say() {
+    let same = with_hidden(&[("S0.450,0nm", 0.01), ("S0.550,0nm", 0.01), ("S0.650,0nm", 0.01), ("Z", 4.0)]).unwrap();
+    check_noted(
+        &same,
+        &["behind.exr: behind the first surface, radiance, taken for W/m^2/sr/nm, 3 bands", "depth 4.00 m", "6 of 6"],
+    );
+    let shifted = with_hidden(&[("S0.457,0nm", 0.01), ("S0.557,0nm", 0.01), ("S0.657,0nm", 0.01), ("Z", 4.0)]).unwrap();
+    check_noted(&shifted, &["behind.exr: 3 bands of 457–657 nm, 100 nm apart become 3 bands of 450–650 nm"]);
+    let reflecting = with_hidden(&[("T.450,0nm", 0.5), ("T.550,0nm", 0.5), ("T.650,0nm", 0.5), ("Z", 4.0)]).unwrap();
+    check_noted(
+        &reflecting,
+        &["behind.exr: behind the first surface, reflectance, under a light of x, y 0.313, 0.329 and 1000 lx"],
+    );
+    let colors = with_hidden(&[("R", 1.0), ("G", 1.0), ("B", 1.0), ("Z", 4.0)]).unwrap();
+    check_noted(&colors, &["behind.exr: behind the first surface, linear colors as a display shows them"]);
+    let unknown = [("S0.450,0nm", 0.01), ("S0.550,0nm", 0.01), ("S0.650,0nm", 0.01), ("Z", f32::NAN)];
+    check_refused(with_hidden(&unknown), &["behind.exr", "nowhere a number"]);
+    check_refused(
+        with_hidden(&[("S0.450,0nm", 0.01), ("S0.480,0nm", 0.01), ("Z", 4.0)]),
+        &["behind.exr", "450–480 nm"],
+    );
+}
+
+/// What reflects behind a first surface whose light is known is under that light.
+#[test]
+fn what_lies_behind_is_under_the_light_on_the_first_surface() {
+    let folder = tempfile::tempdir().unwrap();
+    let [front, behind] = ["front.exr", "behind.exr"].map(|name| folder.path().join(name));
+    let reflecting = [("T.450,0nm", 0.5), ("T.550,0nm", 0.5), ("T.650,0nm", 0.5), ("Z", 2.0)];
+    write_exr(&front, &[("", (ROWS, COLUMNS), &reflecting)]);
+    write_exr(&behind, &[("", (ROWS, COLUMNS), &reflecting)]);
+    let light = Some(dioptric_spectrum::Illuminant::A);
+    let lit = ReadOptions { light, illuminance_lux: Some(300.0), ..options(FileReading::default()) };
+    let scene = read_scene(&front, &ReadOptions { hidden: Some(behind), ..lit }).unwrap();
+    let hidden = scene.hidden.as_ref().unwrap();
+    assert_eq!(hidden.radiance, scene.radiance);
+    check_noted(&scene, &["front.exr: reflectance, under a light of x, y 0.448, 0.407 and 300 lx"]);
+}
+
+#[test]
+fn parts_and_names_of_exr_files_are_those_of_the_picture() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.exr");
+    let colors = [("R", 1.0), ("G", 1.0), ("B", 1.0)];
+    let dark = [("R", 0.1), ("G", 0.1), ("B", 0.1)];
+    write_exr(&path, &[("thumb", (1, 2), &dark), ("beauty", (ROWS, COLUMNS), &colors)]);
+    let scene = read_scene(&path, &ReadOptions::default()).unwrap();
+    assert_eq!((scene.rows(), scene.columns()), (ROWS, COLUMNS));
+    check_noted(&scene, &["its part 'thumb' is not used"]);
+    write_exr(&path, &[("", (ROWS, COLUMNS), &[&colors[..], &[("Tiefe_ü.V", 2.0)]].concat())]);
+    let reading = FileReading { depth_variable: Some("Tiefe_ü.V".to_owned()), ..FileReading::default() };
+    assert_eq!(read_scene(&path, &options(reading)).unwrap().depth.unwrap().range_m(), (2.0, 2.0));
+}
+
+/// A JPEG picture with Exif data of a focal length, turned by a quarter, and what is said of it.
+#[cfg(feature = "jpeg")]
+#[test]
+fn focal_lengths_of_cameras_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.jpg");
+    let gray: image::DynamicImage = image::RgbImage::from_pixel(30, 20, image::Rgb([99; 3])).into();
+    let bytes = dioptric_pictures::encode(&gray, image::ImageFormat::Jpeg).unwrap();
+    let field = |tag: u16, value: u32| [&tag.to_le_bytes()[..], &[3, 0, 1, 0, 0, 0], &value.to_le_bytes()].concat();
+    let exif = [&b"Exif\0\0II*\0\x08\0\0\0\x02\0"[..], &field(0x0112, 6), &field(0xA405, 50), &[0; 4]].concat();
+    let segment = [&[0xff, 0xe1][..], &(exif.len() as u16 + 2).to_be_bytes(), &exif].concat();
+    fs::write(&path, [&bytes[..2], &segment, &bytes[2..]].concat()).unwrap();
+    let scene = read_scene(&path, &options(FileReading::default())).unwrap();
+    // Of a diagonal of 43.27 mm the short side is 24 mm, at 50 mm 27.0°.
+    check_noted(
+        &scene,
+        &[
+            "it is turned upright",
+            "a focal length of 50 mm on 35 mm film, with which it would be 27.0° wide (--fov-deg)",
+        ],
+    );
+}
+
+#[test]
+fn wavelengths_of_arrays_are_in_the_unit_that_is_stated() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.h5");
+    let nm = [450.0, 550.0, 650.0];
+    let read = |unit: Option<&str>, waves: &[f64]| {
+        let mut file = hdf5_pure::FileBuilder::new();
+        file.create_dataset("cube").with_data(&[0.5; 18]).with_shape(&[2, 3, 3]);
+        let list = file.create_dataset("wavelengths").with_data(waves).with_shape(&[3]);
+        if let Some(unit) = unit {
+            list.set_attr("units", hdf5_pure::AttrValue::String(unit.to_owned()));
+        }
+        fs::write(&path, file.finish().unwrap()).unwrap();
+        let reading = FileReading {
+            quantity: Some(FileQuantity::Radiance),
+            axes: Some("yxb".to_owned()),
+            ..FileReading::default()
+        };
+        read_scene(&path, &options(reading))
+    };
+    for (unit, of) in [
+        (None, (|nm| nm) as fn(f64) -> f64),
+        (None, |nm| nm * 1e-3),
+        (Some("nm"), |nm| nm),
+        (Some("um"), |nm| nm * 1e-3),
+        (Some("angstrom"), |nm| nm * 10.0),
+        (Some("m"), |nm| nm * 1e-9),
+        (Some("cm-1"), |nm| 1e7 / nm),
+        (Some("THz"), |nm| 299_792.458 / nm),
+        (Some("eV"), |nm| 1_239.841_984 / nm),
+    ] {
+        let scene = read(unit, &nm.map(of)).unwrap_or_else(|error| panic!("{unit:?}: {error}"));
+        for (found, expected) in scene.radiance.grid().centers_nm().iter().zip(nm) {
+            assert!((found - expected).abs() < 1e-6, "{unit:?}: {found}");
+        }
+    }
+    check_refused(read(Some("zorp"), &nm), &["a.h5", "'wavelengths' are in 'zorp'", "--scene-wavelengths-nm"]);
+    check_refused(read(Some("um"), &nm), &["a.h5", "no wavelength of light"]);
+    check_refused(read(None, &[45.0, 55.0, 65.0]), &["a.h5", "'wavelengths' (45, 55, 65, …) has no unit"]);
+    check_refused(read(None, &[450.0, 450.0, 650.0]), &["a.h5", "bands 1 and 2 lie both at 450 nm"]);
+}
+
+#[test]
+fn bands_of_folders_are_refused_by_the_names_of_their_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, rows: u32| {
+        let plane = image::ImageBuffer::from_pixel(3, rows, image::Luma([9_u8]));
+        dioptric_pictures::save(&plane.into(), &folder.path().join(name)).unwrap();
+    };
+    write("a_450.png", 2);
+    write("b_450.png", 2);
+    check_refused(read_scene(folder.path(), &ReadOptions::default()), &["a_450.png and b_450.png are both of 450 nm"]);
+    fs::remove_file(folder.path().join("b_450.png")).unwrap();
+    write("b_500.png", 4);
+    let words = ["b_500.png", "it is 3 × 4 samples, but a_450.png 3 × 2"];
+    check_refused(read_scene(folder.path(), &ReadOptions::default()), &words);
+}
+
+/// Depths that nobody has measured make no layer, those that are known lie where they are.
+#[test]
+fn samples_without_a_layer_behind_are_counted() {
+    let folder = tempfile::tempdir().unwrap();
+    let [front, behind] = ["front.exr", "behind.exr"].map(|name| folder.path().join(name));
+    write_exr(&front, &[("", (ROWS, COLUMNS), &FRONT)]);
+    let plane = |v: f32| Array2::from_elem((ROWS, COLUMNS), v);
+    let mut z = plane(4.0);
+    z[(0, 0)] = f32::NAN;
+    let own = plane(0.01);
+    let planes = [("S0.450,0nm", &own), ("S0.550,0nm", &own), ("S0.650,0nm", &own), ("Z", &z)];
+    crate::write_planes_exr(&behind, &planes, crate::ExrSamples::Single).unwrap();
+    let scene = read_scene(&front, &ReadOptions { hidden: Some(behind), ..options(FileReading::default()) }).unwrap();
+    check_noted(&scene, &["known of 5 of 6 samples"]);
+    assert_eq!(scene.hidden.unwrap().depth.z_m()[(0, 0)], 2.0);
+}
