@@ -1,4 +1,5 @@
 //! Ghosts drawn on a film, against the table of ghosts and closed forms.
+#![expect(clippy::unwrap_used, reason = "a helper of tests fails by panicking")]
 
 use dioptric_forward::{Film, GhostFilm, GhostSources};
 use dioptric_optics::{

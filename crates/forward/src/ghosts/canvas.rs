@@ -199,7 +199,7 @@ mod tests {
     #[test]
     fn beams_side_by_side_are_even() {
         let film = Film::centered(200, 200, 10.0);
-        for side_px in [0.9, 3.3, 17.0] {
+        for side_px in [0.9_f64, 3.3, 17.0] {
             let side_mm = 0.01 * side_px;
             let turn = DVec2::from_angle(0.3);
             let n = (1.0 / side_mm).ceil() as i32;

@@ -59,9 +59,9 @@ impl Capture {
     }
 
     /// Returns about what two surfaces of the lens reflect to the film over what it images there, for far points of equal brightness in three
-    /// fields; none where ghosts of the lens are not followed.
+    /// fields, at three wavelengths; none where ghosts of the lens are not followed.
     pub fn veil(&self) -> Option<f64> {
-        ghosts::veil(&self.lens.reference, &self.place)
+        ghosts::veil(&self.lens.lens, &self.place, self.grid().range_nm())
     }
 
     /// What is white on the film.

@@ -187,6 +187,12 @@ impl Chain<'_> {
 
     /// Images the scene through the pupil, or the part of it that a photodiode sees.
     pub(super) fn imaged(&self, inputs: &IrradianceInputs) -> Result<Irradiance, PipelineError> {
+        if inputs.reflections == LensReflections::Ghosts {
+            // A lens whose ghosts are not followed is told before the work.
+            let film = &inputs.plan.bank.film;
+            let film_distance_mm = self.film(film, &inputs.scene)?.film_distance_mm;
+            self.lens(&film.lens)?.reference.ghost_beams(film_distance_mm)?;
+        }
         let plan = self.plan(&inputs.plan, &inputs.scene)?;
         let resolved = self.scene(&inputs.scene)?;
         let place = self.film(&inputs.plan.bank.film, &inputs.scene)?;

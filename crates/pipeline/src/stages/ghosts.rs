@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use dioptric_forward::{GhostDetail, GhostFilm, GhostSources, ImagingPlan, Source};
-use dioptric_optics::{GhostRequest, MonoLens, ObjectPoint, glam::DVec2};
+use dioptric_optics::{GhostRequest, Lens, ObjectPoint, glam::DVec2};
 use dioptric_scene::Scene;
 use dioptric_spectrum::Cancel;
 use ndarray::Array2;
@@ -28,8 +28,6 @@ impl Ghosts {
         (lens, place): (Arc<ResolvedLens>, Arc<FilmPlace>),
         (quality, n_photodiodes): (Quality, usize),
     ) -> Result<Self, PipelineError> {
-        // A lens whose ghosts are not followed is told before the work.
-        lens.reference.ghost_beams(place.film_distance_mm)?;
         let sources = GhostSources::of_scene(plan, &Source::of_scene(scene)?, detail(quality))?;
         Ok(Self { sources, lens, place, share: (n_photodiodes as f32).recip() })
     }
@@ -61,25 +59,27 @@ fn detail(quality: Quality) -> GhostDetail {
 }
 
 /// Rays of each point of the estimate of what is left out, and where on the film its images lie, of the half diagonal.
-const VEIL_RAYS: usize = 800;
+const VEIL_RAYS: usize = 400;
 const VEIL_PLACES: [f64; 3] = [0.0, 0.5, 0.9];
 
-/// Returns what surfaces reflect to a film over what the lens images there, for far points of equal brightness in three fields; none where
-/// ghosts of the lens are not followed.
-pub(super) fn veil(lens: &MonoLens, place: &FilmPlace) -> Option<f64> {
-    let film = place.film();
-    // A square about the image wherever that lies: as much as a film's length beside it each way.
-    let film_half_mm = Some(DVec2::splat(film.half_diagonal_mm()));
-    let focal_mm = lens.first_order().efl_mm.abs();
-    let at = |share: f64| -> Option<[f64; 2]> {
-        let point = ObjectPoint::far((share * film.half_diagonal_mm() / focal_mm).atan(), DVec2::Y);
-        let film_distance_mm = place.film_distance_mm;
-        let rim_z_mm = lens.front_rim_z_mm();
-        let request = GhostRequest { point, film_distance_mm, n_rays: VEIL_RAYS, rim_z_mm, film_half_mm };
-        let found = lens.ghosts(&request).ok()?;
-        Some([found.pairs.iter().map(|ghost| ghost.light.power_on_film).sum(), found.direct.power])
-    };
-    let sums = VEIL_PLACES.iter().map(|&share| at(share)).collect::<Option<Vec<_>>>()?;
-    let [ghosts, direct] = [0, 1].map(|i| sums.iter().map(|sum| sum[i]).sum::<f64>());
-    (direct > 0.0).then_some(ghosts / direct)
+/// Returns what surfaces reflect to a film over what the lens images there, for far points of equal brightness in three fields, at the wavelengths
+/// that halve the thirds of a range; none where ghosts of the lens are not followed.
+pub(super) fn veil(lens: &Lens, place: &FilmPlace, (first_nm, last_nm): (f64, f64)) -> Option<f64> {
+    let half_diagonal_mm = place.film().half_diagonal_mm();
+    // A square about the image wherever that lies.
+    let film_half_mm = Some(DVec2::splat(half_diagonal_mm));
+    let mut sums = [0.0; 2];
+    for third in 0..3 {
+        let lens = lens.at(first_nm + (last_nm - first_nm) * (f64::from(third) + 0.5) / 3.0).ok()?;
+        let (film_distance_mm, rim_z_mm) = (place.film_distance_mm, lens.front_rim_z_mm());
+        for share in VEIL_PLACES {
+            let angle_rad = (share * half_diagonal_mm / lens.first_order().efl_mm.abs()).atan();
+            let point = ObjectPoint::far(angle_rad, DVec2::Y);
+            let request = GhostRequest { point, film_distance_mm, n_rays: VEIL_RAYS, rim_z_mm, film_half_mm };
+            let found = lens.ghosts(&request).ok()?;
+            sums[0] += found.pairs.iter().map(|ghost| ghost.light.power_on_film).fold(0.0, |sum, power| sum + power);
+            sums[1] += found.direct.power;
+        }
+    }
+    (sums[1] > 0.0).then_some(sums[0] / sums[1])
 }
