@@ -16,6 +16,8 @@ const LEAST_SHIFT_PX: f64 = 0.05;
 pub(super) const SAME_FOCAL: f64 = 1e-3;
 /// The least focal length of a picture, in its widths: one of 178°.
 const LEAST_FOCAL_WIDTHS: f64 = 0.01;
+/// The largest, likewise: telescopes have a thousandth of that.
+const MOST_FOCAL_WIDTHS: f64 = 1e6;
 
 /// How many times as far apart as columns the rows of a picture may be.
 const LIKELY_STRETCHES: std::ops::RangeInclusive<f64> = 0.05..=20.0;
@@ -78,6 +80,13 @@ impl CameraFile {
         }
         let fx_px = self.focal(0, width)?.unwrap_or(f64::NAN);
         let fy_px = self.focal(1, height)?;
+        if fx_px > MOST_FOCAL_WIDTHS * width as f64 {
+            let reason = format!(
+                "its focal length of {} px would make a picture of {width} samples narrower than a ten thousandth of a degree",
+                shown(fx_px)
+            );
+            return Err(unreadable(&self.file, reason));
+        }
         if fx_px < LEAST_FOCAL_WIDTHS * width as f64 {
             let reason = format!(
                 "its focal length of {} px would make a picture of {width} samples wider than 178°: expected it in samples",

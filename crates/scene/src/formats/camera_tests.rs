@@ -130,6 +130,7 @@ fn camera_file_that_does_not_fit_is_refused_by_name() {
         (GOOD, 100, 100, "741 × 500"),
         (GOOD, 1, 800, "741 × 500"),
         (&GOOD.replace("994.978", "-1"), 500, 741, "focal"),
+        (&GOOD.replace("994.978", "1e300"), 500, 741, "1e300 px would make"),
         (&GOOD.replace("fy_px\": 994.978", "fy_px\": 1e-9"), 500, 741, "times as wide as high"),
         (&GOOD.replace("width", "wide"), 500, 741, "width"),
         (&GOOD.replace("fx_px", "fx_pix"), 500, 741, "fx_px"),

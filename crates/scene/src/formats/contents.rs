@@ -135,8 +135,11 @@ impl Contents {
         }
     }
 
-    /// Refuses what was said of the file and does not apply to it.
+    /// Refuses a file without samples, and what was said of the file and does not apply to it.
     pub(super) fn check_heeds(&self, path: &Path, options: &ReadOptions) -> Result<(), SceneError> {
+        if [self.size().0, self.size().1].contains(&0) {
+            return Err(unreadable(path, "it has no samples"));
+        }
         let reading = &options.reading;
         let given = [
             ("a factor on its numbers (--scale)", reading.scale.is_some(), self.heeds == Heeds::Nothing),
@@ -291,9 +294,9 @@ impl Cube {
             }
         }
         // What a file says of its numbers holds where nothing else is said.
-        let is_own_reflectance = self.quantity == Some(FileQuantity::Reflectance) && reading.quantity.is_none();
-        if is_own_reflectance && told.is_some() {
-            return units("it holds reflectances by its unit, which --unit contradicts");
+        let says_light = told.is_some() || reading.quantity.is_some_and(|told| told != FileQuantity::Reflectance);
+        if self.quantity == Some(FileQuantity::Reflectance) && says_light {
+            return units("it holds reflectances, which --quantity or --unit contradicts");
         }
         let quantity = reading.quantity.or(self.quantity);
         match (quantity, told.or(self.unit.as_ref().map(|(unit, _)| *unit))) {

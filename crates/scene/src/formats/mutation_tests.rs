@@ -21,7 +21,7 @@ use super::{
 };
 
 /// No file of these sizes takes as long.
-const LONGEST: Duration = Duration::from_secs(20);
+const LONGEST: Duration = Duration::from_secs(60);
 
 /// Numbers that are rarely looked for in a text.
 const ABSURD: [&str; 14] = [

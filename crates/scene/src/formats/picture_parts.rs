@@ -49,7 +49,7 @@ const MOST_BYTES: u64 = 65_536;
 /// # Errors
 /// When the file cannot be opened, or is a JPEG file without an end, whose missing pixels decoders make up.
 pub(super) fn notes_on_parts(path: &Path) -> Result<Vec<String>, SceneError> {
-    Ok(note_of(path, "part", &unknown_parts(path)?).into_iter().chain(note_on_exif(path)).collect())
+    Ok(note_of(path, "part", &unknown_parts(path)?).into_iter().chain(note_on_exif(path, true)).collect())
 }
 
 /// Returns what of a picture's statements [`read_picture_samples`](crate::read_picture_samples) does not use, a sentence each.
@@ -62,7 +62,8 @@ pub fn notes_on_samples(path: &Path) -> Result<Vec<String>, SceneError> {
     }
     let is_turned = orientation_of(path) != Orientation::NoTransforms;
     let note = || format!("{}: its pixels are counted as stored, not turned as its orientation says", name_of(path));
-    Ok(is_turned.then(note).into_iter().chain(notes_on_parts(path)?).collect())
+    let parts = note_of(path, "part", &unknown_parts(path)?);
+    Ok(is_turned.then(note).into_iter().chain(parts).chain(note_on_exif(path, false)).collect())
 }
 
 /// Returns the orientation that a picture states.
@@ -72,8 +73,8 @@ pub(super) fn orientation_of(path: &Path) -> Orientation {
     decoder.and_then(|mut decoder| decoder.orientation().ok()).unwrap_or(Orientation::NoTransforms)
 }
 
-/// Returns what the Exif data state of light and geometry that is not used.
-fn note_on_exif(path: &Path) -> Option<String> {
+/// Returns what the Exif data state of light, and of geometry where that counts, that is not used.
+fn note_on_exif(path: &Path, of_scene: bool) -> Option<String> {
     let exif = Exif::of(path);
     let (mut columns, mut rows) = size_of(path).ok()?;
     if orientation_of(path).to_exif() > 4 {
@@ -84,9 +85,9 @@ fn note_on_exif(path: &Path) -> Option<String> {
         format!("{mm} mm on 35 mm film, with which it would be {fov_deg:.1}° wide (--fov-deg)")
     });
     let stated: Vec<String> = [
-        exif.focal_mm.map(|mm| format!("a focal length of {mm} mm")),
-        on_film.map(|words| format!("a focal length of {words}")),
-        exif.subject_distance_m.map(|m| format!("a distance of {m} m (--depth-m)")),
+        exif.focal_mm.filter(|_| of_scene).map(|mm| format!("a focal length of {mm} mm")),
+        on_film.filter(|_| of_scene).map(|words| format!("a focal length of {words}")),
+        exif.subject_distance_m.filter(|_| of_scene).map(|m| format!("a distance of {m} m (--depth-m)")),
         exif.gamma.map(|gamma| format!("a gamma of {gamma}")),
     ]
     .into_iter()

@@ -165,6 +165,11 @@ fn of_exr(path: &Path, options: &ReadOptions) -> Result<Contents, SceneError> {
     let view = view.map(|view| CameraData::of_view(path, view));
     let (image, what, heeds) = match image {
         RawImage::Spectral { image, is_unit_stated } => {
+            if image.quantity() == Quantity::Irradiance {
+                let reason =
+                    "it holds the irradiance on a film, which is no scene: `dioptric sense` exposes a sensor to it";
+                return Err(SceneError::Units { file: path.to_owned(), reason: reason.to_owned() });
+            }
             let is_light = image.quantity() != Quantity::Reflectance;
             let says_other = match reading.quantity {
                 Some(FileQuantity::Reflectance) => is_light,

@@ -254,6 +254,22 @@ fn wavelengths_of_arrays_are_in_the_unit_that_is_stated() {
     check_refused(read(None, &[450.0, 450.0, 650.0]), &["a.h5", "bands 1 and 2 lie both at 450 nm"]);
 }
 
+/// What a file says of its numbers cannot be contradicted.
+#[test]
+fn reflectances_of_a_file_are_no_light() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.csv");
+    fs::write(&path, "nm,a\n450,0.1\n550,0.2\n").unwrap();
+    let quantity = Some(FileQuantity::Radiance);
+    check_refused(
+        read_scene(&path, &options(FileReading { quantity, ..FileReading::default() })),
+        &["a.csv", "--quantity"],
+    );
+    let unit = Some("W/m^2/sr/nm".to_owned());
+    check_refused(read_scene(&path, &options(FileReading { unit, ..FileReading::default() })), &["a.csv", "--unit"]);
+    assert!(read_scene(&path, &options(FileReading::default())).is_ok());
+}
+
 #[test]
 fn bands_of_folders_are_refused_by_the_names_of_their_files() {
     let folder = tempfile::tempdir().unwrap();
