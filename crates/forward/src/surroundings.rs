@@ -5,9 +5,9 @@ use ndarray::{Array2, s};
 
 use crate::{
     Film,
-    places::{APART, Places, SceneRaster, UNSEEN},
+    places::{Places, SceneRaster, UNSEEN},
     points::Point,
-    raster::{Level, Raster},
+    raster::{BLOCK, Level, Raster},
     tile::film_pixels,
 };
 
@@ -52,7 +52,7 @@ impl Surroundings<'_> {
             let step_mm = pixels.x_mm(1.0) - pixels.x_mm(0.0);
             let mut places = Places::default();
             // The film has its own picture; what lies to the right of it is looked up from a point on that is as one from the left is.
-            let after = (m + columns) / APART * APART;
+            let after = (m + columns) / BLOCK as usize * BLOCK as usize;
             for (row, line) in wide.chunks_exact_mut(wide_columns).enumerate() {
                 let y_mm = pixels.y_mm((first_row + row as i64) as f64);
                 let is_beside = (m..m + rows).contains(&row);

@@ -14,21 +14,11 @@ use crate::{
     pupil::Outline,
     pupil_division::PupilDivision,
     station::{Station, SurveyedLens},
+    survey::{AREA_OVER_RADIUS, DIM, Lattice, MOST_AREA_HALVINGS, MOST_OFF_SR, N_AZIMUTHS},
 };
 
-/// Intervals along the radius to begin with, and how often they are halved at most.
-const N_RADIAL: usize = 4;
-const MOST_HALVINGS: usize = 4;
-/// How far irradiances between stations may be off, over the largest.
-const MOST_OFF_SR: f64 = 1e-3;
-/// About how many azimuths are looked at, of all sectors together, and how many of a sector at least and at most.
-const N_AZIMUTHS: usize = 24;
+/// How many of the azimuths that are looked at lie in a sector, at least and at most.
 const N_OF_SECTOR: (usize, usize) = (2, 8);
-/// Radii and, at least, azimuths at which shares are tabulated.
-const N_TABLE_RADII: usize = 65;
-const N_TABLE_AZIMUTHS: usize = 96;
-/// Irradiances below this share of the largest are darkness.
-const DARK: f64 = 1e-6;
 
 /// Stations of one sector: at radii, each at azimuths evenly from +x on.
 #[derive(Debug)]
@@ -47,24 +37,24 @@ struct Ring {
 }
 
 impl BladedSurvey {
-    /// Surveys the film up to a radius; `round_sr` has the irradiances of the round lens, by the distance from the axis.
+    /// Surveys the film; `round_sr` has the irradiances of the round lens, by the distance from the axis.
     pub(crate) fn new(
         lens: &SurveyedLens<'_>,
         n_blades: usize,
-        reach_mm: f64,
+        lattice: Lattice,
         round_sr: &(dyn Fn(f64) -> f64 + Sync),
     ) -> Self {
         let n_of_sector = N_AZIMUTHS.div_ceil(n_blades).clamp(N_OF_SECTOR.0, N_OF_SECTOR.1);
         let mut survey = Self { n_blades, n_of_sector, rings: Vec::new() };
         let middle = lens.station(DVec2::ZERO, None);
-        let even = (0..=N_RADIAL).map(|i| reach_mm * i as f64 / N_RADIAL as f64).collect::<Vec<_>>();
+        let even = (0..=lattice.n_steps).map(|i| lattice.step_mm * i as f64).collect::<Vec<_>>();
         let seeds = vec![middle.outline(); n_of_sector];
         survey.rings = even.iter().map(|&radius_mm| survey.ring(lens, radius_mm, &seeds, round_sr)).collect();
         let largest_sr = survey.rings.iter().map(|ring| round_sr(ring.radius_mm)).fold(0.0, f64::max);
         survey.settle_darkness(largest_sr, round_sr);
         // Halve the intervals whose middle was not foreseen.
-        let mut open: Vec<f64> = even[..N_RADIAL].to_vec();
-        for _ in 0..MOST_HALVINGS {
+        let mut open: Vec<f64> = even[..lattice.n_steps].to_vec();
+        for _ in 0..MOST_AREA_HALVINGS {
             let mut next = Vec::new();
             for from_mm in std::mem::take(&mut open) {
                 let below = survey.rings.partition_point(|ring| ring.radius_mm <= from_mm) - 1;
@@ -74,11 +64,10 @@ impl BladedSurvey {
                     low.stations.iter().zip(&high.stations).map(|(a, b)| a.outline().or(b.outline())).collect();
                 let found = survey.ring(lens, radius_mm, &seeds, round_sr);
                 let here_sr = round_sr(radius_mm);
-                let is_foreseen = found
-                    .shares
-                    .iter()
-                    .zip(low.shares.iter().zip(&high.shares))
-                    .all(|(found, (a, b))| (found - 0.5 * (a + b)).abs() * here_sr <= MOST_OFF_SR * largest_sr);
+                let is_foreseen =
+                    found.shares.iter().zip(low.shares.iter().zip(&high.shares)).all(|(found, (a, b))| {
+                        (found - 0.5 * (a + b)).abs() * here_sr <= AREA_OVER_RADIUS * MOST_OFF_SR * largest_sr
+                    });
                 if !is_foreseen {
                     next.extend([low.radius_mm, radius_mm]);
                 }
@@ -105,10 +94,10 @@ impl BladedSurvey {
         Ring { radius_mm, shares: stations.iter().map(share).collect(), stations }
     }
 
-    /// Gives rings in darkness, of which no share is known, those of the ring within.
+    /// Gives rings in darkness or nearly so, of which no share is known, those of the ring within.
     fn settle_darkness(&mut self, largest_sr: f64, round_sr: &dyn Fn(f64) -> f64) {
         for i in 1..self.rings.len() {
-            if round_sr(self.rings[i].radius_mm) <= DARK * largest_sr {
+            if round_sr(self.rings[i].radius_mm) <= DIM * largest_sr {
                 self.rings[i].shares = self.rings[i - 1].shares.clone();
             }
         }
@@ -121,14 +110,14 @@ impl BladedSurvey {
     }
 
     /// Returns the share of the round lens's light over the film about its axis.
-    pub(crate) fn share_map(&self, axis_mm: DVec2, reach_mm: f64) -> ShareMap {
-        self.tabulated(axis_mm, reach_mm, &|_, _| 1.0)
+    pub(crate) fn share_map(&self, axis_mm: DVec2, lattice: Lattice) -> ShareMap {
+        self.tabulated(axis_mm, lattice, &|_, _| 1.0)
     }
 
     /// Returns the same of a part of the pupil.
     pub(crate) fn part_share_map(
         &self,
-        (axis_mm, reach_mm): (DVec2, f64),
+        (axis_mm, lattice): (DVec2, Lattice),
         mesh: Mesh,
         (division, part): (&PupilDivision, usize),
     ) -> ShareMap {
@@ -152,7 +141,7 @@ impl BladedSurvey {
             let found = found.collect();
             known.push(found);
         }
-        self.tabulated(axis_mm, reach_mm, &|(ring, fraction), azimuth| {
+        self.tabulated(axis_mm, lattice, &|(ring, fraction), azimuth| {
             let n = self.n_blades * self.n_of_sector;
             let (below, u) = (azimuth.floor() as usize, azimuth.fract());
             let at = |ring: &[f64]| ring[below % n] * (1.0 - u) + ring[(below + 1) % n] * u;
@@ -161,12 +150,13 @@ impl BladedSurvey {
     }
 
     /// Tabulates shares, times a factor by the ring below, the place between it and the next, and the azimuth counted in those of stations.
-    fn tabulated(&self, axis_mm: DVec2, reach_mm: f64, factor: &dyn Fn((usize, f64), f64) -> f64) -> ShareMap {
+    fn tabulated(&self, axis_mm: DVec2, lattice: Lattice, factor: &dyn Fn((usize, f64), f64) -> f64) -> ShareMap {
         let n = self.n_blades * self.n_of_sector;
-        let finer = N_TABLE_AZIMUTHS.div_ceil(n);
-        let step_mm = reach_mm / (N_TABLE_RADII - 1) as f64;
-        let mut table = Vec::with_capacity(N_TABLE_RADII * n * finer);
-        for i in 0..N_TABLE_RADII {
+        // Between those of stations, at least four times as many.
+        let finer = (4 * N_AZIMUTHS).div_ceil(n);
+        let (step_mm, n_radii) = lattice.table_radii();
+        let mut table = Vec::with_capacity(n_radii * n * finer);
+        for i in 0..n_radii {
             let radius_mm = step_mm * i as f64;
             let above = self.rings.partition_point(|ring| ring.radius_mm <= radius_mm).clamp(1, self.rings.len() - 1);
             let [low, high] = [above - 1, above].map(|k| &self.rings[k]);

@@ -7,32 +7,33 @@ use std::sync::LazyLock;
 pub(crate) const LANES: usize = 8;
 /// Bits of a place within a pixel.
 pub(crate) const PLACE_BITS: u32 = 16;
-/// Bits of those by which a profile's rows are distinguished; between rows it is read in proportion.
+/// Bits of sixteenths: of a pixel by which a profile's rows are distinguished, between which it is read in proportion, and of a doubling of variances
+/// by which profiles are, a hundred kilobytes. What a stroke has above its profile widens its even part.
 pub(crate) const ROW_BITS: u32 = 4;
-const ROWS: usize = 1 << ROW_BITS;
-/// Pixels of a row of a profile, and the one in which its step begins.
-const WIDTH: usize = 24;
-const MIDDLE: i32 = 11;
 
-/// For places of a step from one side of a pixel to the other: the share of what lies beyond it on pixels in a row,
-/// where the step is a normal distribution's.
-pub(crate) struct BlurredEdgeTable([[f32; WIDTH]; ROWS + 1]);
+/// For places of a step from one side of a pixel to the other, sixteenths apart: the share of what lies beyond it on three times as many pixels in a row as are drawn
+/// together, where the step is a normal distribution's. It begins in the last pixel before their middle.
+pub(crate) struct BlurredEdgeTable([[f32; 3 * LANES]; (1 << ROW_BITS) + 1]);
 
 /// A share that no picture shows. Products with less are soon below the least of normal numbers, which takes many times as long.
 const NOTHING: f64 = 1e-12;
 
 /// Profiles by variance, up to 1 pixel².
 static PROFILES: LazyLock<Vec<BlurredEdgeTable>> =
-    LazyLock::new(|| (0..N_PROFILES).map(|number| BlurredEdgeTable::new(variance_of(number))).collect());
+    LazyLock::new(|| (0..=profile_number(1.0)).map(|number| BlurredEdgeTable::new(variance_of(number))).collect());
 
 /// What is added to variances before they are compared, pixels²: of the narrowest Gaussians, pixels see little.
 const PART_OF_A_PIXEL: f32 = 0.0625;
-/// Sixteen profiles to each doubling of the sum: a hundred kilobytes. What a stroke has above its profile widens its even part.
-const PER_DOUBLING_BITS: u32 = 4;
-const DROPPED_BITS: u32 = f32::MANTISSA_DIGITS - 1 - PER_DOUBLING_BITS;
-/// The number that the bits of the part alone would have.
-const FIRST: usize = (PART_OF_A_PIXEL.to_bits() >> DROPPED_BITS) as usize;
-const N_PROFILES: usize = ((1.0 + PART_OF_A_PIXEL).to_bits() >> DROPPED_BITS) as usize - FIRST + 1;
+
+/// Returns the leading bits of a sum of a variance and that part, which are those of its logarithm.
+#[inline(always)]
+const fn leading_bits(sum: f32) -> u32 {
+    sum.to_bits() >> dropped_bits()
+}
+
+const fn dropped_bits() -> u32 {
+    f32::MANTISSA_DIGITS - 1 - ROW_BITS
+}
 
 pub(crate) fn profiles() -> &'static [BlurredEdgeTable] {
     &PROFILES
@@ -41,28 +42,28 @@ pub(crate) fn profiles() -> &'static [BlurredEdgeTable] {
 /// Returns the variance of the next profile below one in pixels².
 #[inline(always)]
 pub(crate) fn variance_below(variance: f32) -> f32 {
-    // The leading bits are those of the logarithm.
     let sum = variance.clamp(0.0, 1.0) + PART_OF_A_PIXEL;
-    f32::from_bits(sum.to_bits() >> DROPPED_BITS << DROPPED_BITS) - PART_OF_A_PIXEL
+    f32::from_bits(leading_bits(sum) << dropped_bits()) - PART_OF_A_PIXEL
 }
 
 /// Returns the number of the profile of a variance that there is.
 #[inline(always)]
 pub(crate) fn profile_number(variance: f32) -> usize {
-    ((variance + PART_OF_A_PIXEL).to_bits() >> DROPPED_BITS) as usize - FIRST
+    (leading_bits(variance + PART_OF_A_PIXEL) - leading_bits(PART_OF_A_PIXEL)) as usize
 }
 
 /// Returns the variance of the profile of a number.
 fn variance_of(number: usize) -> f32 {
-    f32::from_bits(((FIRST + number) << DROPPED_BITS) as u32) - PART_OF_A_PIXEL
+    f32::from_bits((leading_bits(PART_OF_A_PIXEL) + number as u32) << dropped_bits()) - PART_OF_A_PIXEL
 }
 
 impl BlurredEdgeTable {
     fn new(variance: f32) -> Self {
+        let row_px = 1.0 / f64::from(1 << ROW_BITS);
         // Reading between two rows widens a little. The sharpest step is next to none for a row.
-        let sigma = (f64::from(variance) - 1.0 / (6.0 * (ROWS * ROWS) as f64)).max(1e-4).sqrt();
+        let sigma = (f64::from(variance) - row_px * row_px / 6.0).max(1e-4).sqrt();
         Self(std::array::from_fn(|row| {
-            let step = f64::from(MIDDLE) + row as f64 / ROWS as f64;
+            let step = f64::from(step_begins()) + row as f64 * row_px;
             let beyond = |pixel: usize| sigma * normal_integral((pixel as f64 - step) / sigma);
             let held = |pixel: usize| Some(beyond(pixel + 1) - beyond(pixel)).filter(|held| *held > NOTHING);
             std::array::from_fn(|pixel| held(pixel).unwrap_or_default() as f32)
@@ -73,9 +74,9 @@ impl BlurredEdgeTable {
     /// whole number of rows apart.
     #[inline(always)]
     pub(crate) fn add_between(&self, (near, far): (i32, i32), base: i32, value: f32, pixels: &mut [f32; LANES]) {
-        const IN_ROW: i32 = (1 << (PLACE_BITS - ROW_BITS)) - 1;
         // Both sides are as far behind a row.
-        let after = value * ((near & IN_ROW) as f32 * (1.0 / (IN_ROW + 1) as f32));
+        let row = 1 << (PLACE_BITS - ROW_BITS);
+        let after = value * ((near & (row - 1)) as f32 * (1.0 / row as f32));
         let before = value - after;
         let ((n0, n1), (f0, f1)) = (self.rows(near, base), self.rows(far, base));
         for i in 0..LANES {
@@ -86,10 +87,15 @@ impl BlurredEdgeTable {
     /// Returns what eight pixels, from `base` on, hold of steps at the row before a place and at that after.
     #[inline(always)]
     fn rows(&self, place: i32, base: i32) -> (&[f32], &[f32]) {
-        let row = ((place >> (PLACE_BITS - ROW_BITS)) as usize) % ROWS;
-        let first = ((base - (place >> PLACE_BITS) + MIDDLE) as usize) % (WIDTH - LANES);
+        let row = ((place >> (PLACE_BITS - ROW_BITS)) as usize) % (1 << ROW_BITS);
+        let first = ((base - (place >> PLACE_BITS) + step_begins()) as usize) % (2 * LANES);
         (&self.0[row][first..first + LANES], &self.0[row + 1][first..first + LANES])
     }
+}
+
+/// The pixel of a profile in which its step begins.
+const fn step_begins() -> i32 {
+    (3 * LANES / 2) as i32 - 1
 }
 
 /// Returns the integral of the normal distribution's share below z, up to z: z Φ(z) + φ(z), by functions that have the same
@@ -104,7 +110,7 @@ mod tests {
 
     #[test]
     fn a_sharp_step_covers_what_is_beyond_it_and_a_soft_one_as_much() {
-        for number in [0, 30, N_PROFILES - 1] {
+        for number in [0, 30, profiles().len() - 1] {
             let profile = &profiles()[number];
             for place in [0, 1 << 14, 3 << 14] {
                 let (row, _) = profile.rows(place, -3);
@@ -129,7 +135,7 @@ mod tests {
 
     #[test]
     fn a_variance_finds_the_profile_below_it() {
-        assert_eq!((variance_of(0), variance_of(N_PROFILES - 1)), (0.0, 1.0));
+        assert_eq!((variance_of(0), variance_of(profiles().len() - 1)), (0.0, 1.0));
         for variance in [0.0f32, 0.004, 0.01, 0.1, 0.5, 0.72, 0.99, 1.0] {
             let below = variance_below(variance);
             assert!((0.0..=(variance + PART_OF_A_PIXEL) / 16.0).contains(&(variance - below)), "{variance} {below}");

@@ -13,8 +13,6 @@ use crate::{
 /// Step of a direction cosine at the stop for difference quotients: their truncation, of order its square, and their rounding, 1e-16 over it, are below
 /// 1e-9 of the derivative.
 const STOP_STEP: f64 = 1e-5;
-/// The radius that holds 95 % of an even disc over its rms radius: r² = 0.95 R², and the mean square is R²/2.
-pub(crate) const RIM_OVER_RMS: f64 = 1.378_404_875_209_022;
 
 /// A ray in front of the lens.
 ///
@@ -315,9 +313,9 @@ impl Bundle {
         // An erect picture moves the other way.
         let sign = (beside - at_focus).signum();
         Moments {
-            blur_mm: sign * RIM_OVER_RMS * at_focus,
-            blur_mm_per_dioptre: sign * RIM_OVER_RMS * (beside - at_focus) / STEP_DIOPTRES,
-            residue_mm: RIM_OVER_RMS * (whole - at_focus * at_focus).max(0.0).sqrt(),
+            blur_mm: sign * rim_over_rms() * at_focus,
+            blur_mm_per_dioptre: sign * rim_over_rms() * (beside - at_focus) / STEP_DIOPTRES,
+            residue_mm: rim_over_rms() * (whole - at_focus * at_focus).max(0.0).sqrt(),
         }
     }
 }
@@ -344,6 +342,11 @@ impl Frame {
     fn turn_back(&self, place_mm: DVec2) -> DVec2 {
         DVec2::new(self.turn.x, -self.turn.y).rotate(place_mm)
     }
+}
+
+/// Returns the radius that holds 95 % of an even disc over its rms radius: r² = 0.95 R², and the mean square is R²/2.
+pub(crate) fn rim_over_rms() -> f64 {
+    f64::sqrt(2.0 * 0.95)
 }
 
 /// Returns the lens without its obscurations; `None` if it has none.

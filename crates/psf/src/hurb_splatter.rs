@@ -20,14 +20,9 @@ use crate::{
 
 /// A cell this many standard deviations across, both ways, is drawn as a polygon.
 const POLYGON: f64 = 8.0;
-/// A Gaussian whose wide axis is below this, in pixels, is not drawn.
-const NARROW: f64 = 0.12;
-/// The same where cells are at least this wide, pixels, in a blur of many pixels.
-const NARROW_CELL: f64 = 0.5;
-const PART_OF_A_PIXEL: f64 = 0.2;
-/// The same where they are wider than a pixel.
-const WIDE_CELL: f64 = 1.0;
-const PART_OF_A_WIDE_CELL: f64 = 0.25;
+/// Of cells wider than so many pixels, the least wide axis of a Gaussian that is drawn, pixels: the cells of a blur lie side by side, and what one loses to its
+/// neighbor it gets back.
+const NARROW: [(f64, f64); 3] = [(0.0, 0.12), (0.5, 0.2), (1.0, 0.25)];
 /// How many standard deviations from the picture a cell is left out.
 const FAR: f64 = 5.0;
 /// Variance, pixels², that a pixel's own size adds when the need for subdivision is judged.
@@ -326,12 +321,9 @@ impl Looks {
     /// Whether bending is so small beside the cell that it is drawn as it is.
     #[inline(always)]
     fn is_still(&self, i: usize) -> bool {
-        // Cells of a blur lie side by side: what one loses to its neighbor it gets back.
-        let narrow = match self.out2[i].min(self.around2[i]) {
-            side2 if side2 > WIDE_CELL * WIDE_CELL => PART_OF_A_WIDE_CELL,
-            side2 if side2 > NARROW_CELL * NARROW_CELL => PART_OF_A_PIXEL,
-            _ => NARROW,
-        };
+        let side2 = self.out2[i].min(self.around2[i]);
+        let of_side = |narrow: f64, (side, of_side): (f64, f64)| if side2 > side * side { of_side } else { narrow };
+        let narrow = NARROW.into_iter().fold(NARROW[0].1, of_side);
         self.wide2[i] < narrow * narrow || self.out_in_sigmas2[i].min(self.around_in_sigmas2[i]) > POLYGON * POLYGON
     }
 

@@ -26,6 +26,9 @@ pub struct Kernel {
 }
 
 impl Kernel {
+    /// The share of a point's light that is not worth a sample.
+    pub const NEGLIGIBLE: f64 = 1e-7;
+
     /// Returns the kernel of these samples, odd × odd, that is about the middle of the middle one.
     pub fn centered(samples: Array2<f32>, pitch_um: f64) -> Self {
         Self { samples, kept_share: 1.0, pitch_um, middle_px: IVec2::ZERO, lambda_n_px: 0.0, edge_px: 0.0 }

@@ -25,7 +25,6 @@ mod mesh;
 mod metrics;
 mod model;
 mod narrow_gaussian;
-pub mod paper;
 mod part_image;
 mod point_image;
 mod power;

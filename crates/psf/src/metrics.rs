@@ -20,9 +20,6 @@ pub struct Picture {
     pitch_um: f64,
 }
 
-/// A direction this near to an axis, rad, is along it: a right angle in radians is not exact.
-const ON_AXIS: f64 = 1e-12;
-
 /// A sampled profile across a point spread function.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Profile {
@@ -134,11 +131,12 @@ impl Picture {
     pub fn optical_transfer(&self, direction_rad: f64, cycles_per_mm: f64) -> (f64, f64) {
         let along = DVec2::from_angle(direction_rad);
         let wave = along * (2.0 * PI * cycles_per_mm * 1e-3);
-        // Along rows or columns a pixel's phase is that of its column or row.
-        if along.y.abs() < ON_AXIS {
+        // Along rows or columns a pixel's phase is that of its column or row. A right angle in radians is not exact.
+        let rounding = f64::EPSILON.sqrt();
+        if along.y.abs() < rounding {
             return transform(&self.column_sums, |column| self.at_um(0, column).x * wave.x);
         }
-        if along.x.abs() < ON_AXIS {
+        if along.x.abs() < rounding {
             return transform(&self.row_sums, |row| self.at_um(row, 0).y * wave.y);
         }
         // A pixel's phase is the sum of its column's and its row's.

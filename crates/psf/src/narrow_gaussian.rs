@@ -9,27 +9,21 @@ use glam::DVec2;
 
 use crate::{
     blurred_edge::{BlurredEdgeTable, LANES, PLACE_BITS, ROW_BITS, profile_number, variance_below},
-    power::{Powers, exp2},
-    splat::Splat,
+    power::{MOST_PRODUCTS, Powers, exp2},
+    splat::{FAR, Splat},
 };
 
 /// The finest subdivision of a pixel along a Gaussian. What is shorter than its samples allow is lengthened to
 /// 0.12 pixels, which on pixels makes next to no difference.
 const FINEST: f64 = 5.0;
 /// A Gaussian has this many samples a standard deviation of its length, or more.
-const SAMPLES_PER_SIGMA: f64 = 0.6;
+pub(crate) const SAMPLES_PER_SIGMA: f64 = 0.6;
 /// From one sample to the next a Gaussian moves across by its width over this, or less.
 const SAMPLES_PER_WIDTH: f64 = 0.4;
 /// How many standard deviations of its length are drawn; what lies beyond, 3·10⁻⁴, is spread over the rest.
 const REACH: f64 = 3.6;
-/// What is held within the reach.
-const INSIDE: f64 = 0.999_681_782_819_684_9;
-/// Places further than this from the picture, in pixels, are not seen.
-const FAR: f64 = 1e4;
-/// Samples between two computations of the exponential: products carry its error, which grows to 5·10⁻⁵.
-const MOST_SAMPLES: usize = 32;
-/// The largest even width, in sixteenths of a pixel.
-const WIDEST: f64 = 80.0;
+/// The height of the normal distribution over what is held within the reach, 0.999 68.
+const NORM: f64 = 0.399_069_271_099_632_4;
 
 /// Rows of pixels in single precision, each longer at both ends so that eight pixels may run over the edge.
 pub(crate) struct PaddedRows {
@@ -82,18 +76,18 @@ struct NarrowGaussian {
     powers: Powers,
 }
 
-/// How many numbers a stroke has.
-const NUMBERS: usize = 17;
+/// One of each of the numbers of a stroke.
+type OfEach<T> = [T; 17];
 
 /// Eight strokes, each of their numbers side by side. The compiler makes vectors of their setup: nothing in it branches.
-pub(crate) struct NarrowGaussians([[f32; LANES]; NUMBERS]);
+pub(crate) struct NarrowGaussians(OfEach<[f32; LANES]>);
 
 impl NarrowGaussians {
     /// Returns the strokes of splats on a picture of so many rows and columns.
     #[inline(always)]
     pub(crate) fn new(splats: &[Splat; LANES], size: (usize, usize)) -> Self {
         let size = (size.0 as f32, size.1 as f32);
-        let mut numbers = [[0.0; LANES]; NUMBERS];
+        let mut numbers: OfEach<[f32; LANES]> = OfEach::default();
         for i in 0..LANES {
             for (of_all, number) in numbers.iter_mut().zip(NarrowGaussian::new(&splats[i], size).into_numbers()) {
                 of_all[i] = number;
@@ -106,7 +100,7 @@ impl NarrowGaussians {
     #[inline(always)]
     pub(crate) fn add(&self, n: usize, profiles: &[BlurredEdgeTable], rows: &mut PaddedRows, columns: &mut PaddedRows) {
         for i in 0..n {
-            let mut numbers = [0.0; NUMBERS];
+            let mut numbers: OfEach<f32> = OfEach::default();
             for (number, of_all) in numbers.iter_mut().zip(&self.0) {
                 *number = of_all[i];
             }
@@ -131,12 +125,12 @@ impl NarrowGaussian {
         let n_lines = if is_along_x { n_columns } else { n_rows };
 
         // Choose the samples to a line from the length and from how far the profile moves across (eq. 16).
-        const LEAST: f64 = SAMPLES_PER_SIGMA * SAMPLES_PER_SIGMA / (FINEST * FINEST);
-        let total_along = whole.xx.max(whole.yy).max(LEAST);
+        let least = SAMPLES_PER_SIGMA * SAMPLES_PER_SIGMA / (FINEST * FINEST);
+        let total_along = whole.xx.max(whole.yy).max(least);
         let soft = |slope: f64| (soft_across - 2.0 * slope * splat.covariance.xy + slope * slope * soft_along).max(0.0);
         let slope = whole.xy / (total_along + 1.0 / 12.0);
         let needed = (SAMPLES_PER_SIGMA * SAMPLES_PER_SIGMA)
-            .max(SAMPLES_PER_WIDTH * SAMPLES_PER_WIDTH * slope * slope * total_along / soft(slope).max(LEAST));
+            .max(SAMPLES_PER_WIDTH * SAMPLES_PER_WIDTH * slope * slope * total_along / soft(slope).max(least));
         let divisions = (needed / total_along).sqrt().ceil().clamp(1.0, FINEST);
         // Add the variance of a sample's box: samples are then box integrals to fourth order (eqs. 10 to 12).
         let step_variance = 1.0 / (12.0 * divisions * divisions);
@@ -145,18 +139,19 @@ impl NarrowGaussian {
         let sigma = (total_along + step_variance).sqrt();
         // The profile across: the even width that the side leaves (eq. 14)…
         let width = (side.1 - slope * side.0).abs();
-        const SIXTEENTHS: f64 = (1 << ROW_BITS) as f64;
+        let rows = f64::from(1 << ROW_BITS);
+        // It reaches to both sides of the eight pixels less those before the middle.
+        let widest = rows * f64::from(LANES as i32 - pixels_before());
         // … and the conditional variance (eq. 13). The table has widths of whole sixteenths and some variances: what is
         // beyond those widens the even width, so that the whole variance is kept (eq. 15).
-        let least = (SIXTEENTHS * width).floor().clamp(1.0, WIDEST) / SIXTEENTHS;
+        let least = (rows * width).floor().clamp(1.0, widest) / rows;
         let rest = soft(slope) + slope * slope * step_variance + (width * width - least * least) / 12.0;
         let softness = variance_below(rest as f32);
         let square = least * least + 12.0 * (rest - f64::from(softness)).max(0.0);
-        let sixteenths = (SIXTEENTHS * square.sqrt() + 0.5).floor().clamp(1.0, WIDEST);
-        let drawn = sixteenths / SIXTEENTHS;
+        let sixteenths = (rows * square.sqrt() + 0.5).floor().clamp(1.0, widest);
+        let drawn = sixteenths / rows;
         // The energy of the sample in the middle (eq. 11), over the width that it is spread on.
         let corner = (at.0.floor(), at.1.floor());
-        const NORM: f64 = 0.398_942_280_401_432_7 / INSIDE;
         let mut stroke = Self {
             along_x: if is_along_x { 1.0 } else { 0.0 },
             corner: (corner.0 as f32, corner.1 as f32),
@@ -203,25 +198,27 @@ impl NarrowGaussian {
     fn add(mut self, profiles: &[BlurredEdgeTable], film: &mut PaddedRows) {
         let profile = &profiles[profile_number(self.softness)];
         let half = (self.sixteenths as i32) << (PLACE_BITS - ROW_BITS - 1);
-        let across = (self.slope / self.divisions * ONE) as i32;
+        let across = fixed(self.slope / self.divisions);
+        let half_a_pixel = 1 << (PLACE_BITS - 1);
         let margin = self.corner.1 as i32 + LANES as i32;
         let (divisions, n) = (self.divisions as u32, (self.end - self.first) as usize);
         // Where the line begins, and how many samples are left of it.
         let mut left = ((self.line + 1.0) * self.divisions - self.first) as u32;
         let mut line = self.line as usize * film.stride;
-        for done in (0..n).step_by(MOST_SAMPLES) {
+        for done in (0..n).step_by(MOST_PRODUCTS) {
             let from = self.first + done as f32;
             if done > 0 {
                 self.powers = self.powers_from(from);
             }
-            let mut place = ((self.at.1 + self.slope * self.along(from)) * ONE) as i32 - HALF_A_PIXEL;
-            for _ in done..n.min(done + MOST_SAMPLES) {
+            // It is the pixel that a place is in, half a pixel before it.
+            let mut place = fixed(self.at.1 + self.slope * self.along(from)) - half_a_pixel;
+            for _ in done..n.min(done + MOST_PRODUCTS) {
                 let (middle, value) = (place, self.powers.next());
                 place += across;
-                let base = (middle >> PLACE_BITS) - BEFORE;
+                let base = (middle >> PLACE_BITS) - pixels_before();
                 let sums = &mut film.sums[line..][..film.stride];
                 if let Some(pixels) = sums.get_mut((base + margin) as usize..).and_then(<[f32]>::first_chunk_mut) {
-                    let sides = (middle + HALF_A_PIXEL - half, middle + HALF_A_PIXEL + half);
+                    let sides = (middle + half_a_pixel - half, middle + half_a_pixel + half);
                     profile.add_between(sides, base, value, pixels);
                 }
                 left -= 1;
@@ -231,7 +228,7 @@ impl NarrowGaussian {
     }
 
     #[inline(always)]
-    fn into_numbers(self) -> [f32; NUMBERS] {
+    fn into_numbers(self) -> OfEach<f32> {
         let Self { along_x, corner, at, divisions, peak, fall, slope, softness, sixteenths, first, line, end, powers } =
             self;
         let Powers { value, ratio, change } = powers;
@@ -242,7 +239,7 @@ impl NarrowGaussian {
     }
 
     #[inline(always)]
-    fn from_numbers(numbers: [f32; NUMBERS]) -> Self {
+    fn from_numbers(numbers: OfEach<f32>) -> Self {
         let [
             along_x,
             line_of_corner,
@@ -267,7 +264,13 @@ impl NarrowGaussian {
     }
 }
 
-/// Pixels that are drawn before the one in the middle. It is the pixel that a place is in, half a pixel before it.
-const BEFORE: i32 = 3;
-const HALF_A_PIXEL: i32 = 1 << (PLACE_BITS - 1);
-const ONE: f32 = (1 << PLACE_BITS) as f32;
+/// Pixels that are drawn before the one in the middle.
+const fn pixels_before() -> i32 {
+    LANES as i32 / 2 - 1
+}
+
+/// Returns a place in parts of a pixel.
+#[inline(always)]
+fn fixed(px: f32) -> i32 {
+    (px * (1 << PLACE_BITS) as f32) as i32
+}

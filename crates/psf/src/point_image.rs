@@ -7,7 +7,7 @@ use ndarray::Array2;
 
 use crate::{
     ImageSettings, Kernel, ModelUse, PsfError,
-    bundle::RIM_OVER_RMS,
+    bundle::rim_over_rms,
     hurb_splatter::bending,
     pupil::Outline,
     render::{Layout, wave_energies},
@@ -103,7 +103,7 @@ impl PointImage {
         let spots = Spots { mesh, nodes, energies };
         let centroid_mm = spots.centroid_mm();
         let spots = spots.about(centroid_mm);
-        let blur_radius_mm = RIM_OVER_RMS * signed_rms_mm(&spots, &targets);
+        let blur_radius_mm = rim_over_rms() * signed_rms_mm(&spots, &targets);
         let rms_radius_mm = spots.rms_mm();
         Some(Self { lens, point, settings, spots, centroid_mm, blur_radius_mm, rms_radius_mm })
     }
@@ -124,7 +124,7 @@ impl PointImage {
     /// The radius, mm, that holds 95 % of the light of an even disc of the rms radius of the rays: of the blur and of what aberrations leave
     /// in focus.
     pub fn spread_mm(&self) -> f64 {
-        RIM_OVER_RMS * self.rms_radius_mm
+        rim_over_rms() * self.rms_radius_mm
     }
 
     /// How far from the centroid the farthest ray lands, mm.

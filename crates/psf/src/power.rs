@@ -18,6 +18,9 @@ pub(crate) fn exp2(x: f32) -> f32 {
     f32::from_bits(if x > -126.0 { bits } else { 0 })
 }
 
+/// The most products between two computations of a power: they carry its error, which grows to 5·10⁻⁵.
+pub(crate) const MOST_PRODUCTS: usize = 32;
+
 /// `(ln 2)^k / k!`, the highest first.
 const TERMS: [f32; 7] = {
     let mut terms = [1.0_f32; 7];

@@ -12,9 +12,8 @@ const N_POINTS: usize = 4000;
 const N_ROUNDS: usize = 60;
 /// How far a part reaches from its center, over the farthest that any point lies from the nearest center.
 const REACH: f64 = 1.3;
-/// Rings and azimuths of the sum over the disc that gives the centroid of a part.
+/// Rings, and azimuths of half a turn, of the sum over the disc that gives the centroid of a part.
 const N_RINGS: usize = 400;
-const N_AZIMUTHS: usize = 800;
 
 /// Parts of a pupil. At each place their shares sum to 1.
 ///
@@ -139,8 +138,8 @@ impl PupilDivision {
         let (mut sum, mut weight) = (DVec2::ZERO, 0.0);
         for ring in 0..N_RINGS {
             let radius = (ring as f64 + 0.5) / N_RINGS as f64;
-            for azimuth in 0..N_AZIMUTHS {
-                let at = polar(DVec2::ZERO, radius, TAU * (azimuth as f64 + 0.5) / N_AZIMUTHS as f64);
+            for azimuth in 0..2 * N_RINGS {
+                let at = polar(DVec2::ZERO, radius, 0.5 * TAU * (azimuth as f64 + 0.5) / N_RINGS as f64);
                 let share = radius * self.share(part, at);
                 sum += share * at;
                 weight += share;

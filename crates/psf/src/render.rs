@@ -17,10 +17,8 @@ use crate::{
 
 /// Half the side of the largest window, pixels.
 const MOST_PIXELS: f64 = 600.0;
-/// Of what the window of a diffracted picture holds, the share that is kept when the window is trimmed.
+/// Of what the window of a diffracted picture holds, the share that is kept when the window is trimmed; of one without tails, all but what is negligible.
 const KEPT_OF_TAILS: f64 = 0.999;
-/// The same of a picture without tails: all but rounding.
-const KEPT_OF_RAYS: f64 = 1.0 - 1e-7;
 /// How far diffraction's tails are followed beyond the geometric picture, in units of λN.
 const TAILS: f64 = 12.0;
 /// The largest range of phases, radians, at which a kernel is wave optics alone; at twice that there is none.
@@ -148,7 +146,7 @@ impl<'a> Layout<'a> {
 
     /// Returns drawn energies of the window as a kernel, trimmed to what matters.
     pub(crate) fn kernel(&self, energies: &Array2<f64>, pitch_um: f64) -> Kernel {
-        let kept = if self.lambda_n_px > 0.0 { KEPT_OF_TAILS } else { KEPT_OF_RAYS };
+        let kept = if self.lambda_n_px > 0.0 { KEPT_OF_TAILS } else { 1.0 - Kernel::NEGLIGIBLE };
         let kernel = Kernel::centered(trim(energies, kept), pitch_um).faded_out(self.lambda_n_px, self.radius);
         Kernel { middle_px: self.middle_px, ..kernel }
     }

@@ -11,8 +11,8 @@ use multiversion::multiversion;
 
 use crate::{
     blurred_edge::{BlurredEdgeTable, LANES, profiles},
-    narrow_gaussian::{NarrowGaussians, PaddedRows},
-    power::exp2,
+    narrow_gaussian::{NarrowGaussians, PaddedRows, SAMPLES_PER_SIGMA},
+    power::{MOST_PRODUCTS, exp2},
     raster::Raster,
 };
 
@@ -36,9 +36,9 @@ impl Splat {
     /// less where Gaussians overlap.
     #[inline(always)]
     fn is_broad(&self) -> bool {
-        const LEAST: f64 = 0.36;
+        let least = SAMPLES_PER_SIGMA * SAMPLES_PER_SIGMA;
         let Covariance { xx, xy, yy } = self.covariance;
-        xx.min(yy) >= LEAST && (xx - LEAST) * (yy - LEAST) >= xy * xy
+        xx.min(yy) >= least && (xx - least) * (yy - least) >= xy * xy
     }
 
     /// Returns the covariance with the side's.
@@ -141,19 +141,11 @@ struct Block {
     from_y: f32,
 }
 
-/// The numbers of the lanes.
-const COUNT: [f32; LANES] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
-/// Beyond this power of 2 nothing is deposited.
-const LEAST: f32 = (-0.5 * REACH * REACH * std::f64::consts::LOG2_E) as f32;
-/// That power: the least value over the peak.
-const EDGE: f32 = 3.354_626_3e-4;
-/// What is held within the reach.
-const INSIDE: f64 = 1.0 - 3.354_626_279_025_118_5e-4;
+/// The least value over the peak that is deposited, at the reach; as much of the light lies beyond.
+const EDGE: f64 = 3.354_626_279_025_118_5e-4;
 /// Places further than this from the picture, in pixels, are not seen.
-const FAR: f64 = 1e5;
-/// Rows between two computations of the exponential, at most: products carry its error, which grows to 5·10⁻⁵.
-const MOST_ROWS: f32 = 32.0;
-/// The same in standard deviations: what comes within reach there begins above 2⁻¹¹⁰, which single precision holds.
+pub(crate) const FAR: f64 = 1e4;
+/// Rows in standard deviations between two computations of the exponential: what comes within reach there begins above 2⁻¹¹⁰, which single precision holds.
 const MOST_SIGMAS: f32 = 8.0;
 
 impl Sampled {
@@ -174,7 +166,7 @@ impl Sampled {
         Self {
             corner: (corner.x as i32, corner.y as i32),
             at: (within.x as f32, within.y as f32),
-            peak: (splat.energy / (std::f64::consts::TAU * INSIDE * determinant.sqrt())) as f32,
+            peak: (splat.energy / (std::f64::consts::TAU * (1.0 - EDGE) * determinant.sqrt())) as f32,
             fall_x: (-0.5 * std::f64::consts::LOG2_E * per_xx) as f32,
             fall_y: (-0.5 * std::f64::consts::LOG2_E / variance_y) as f32,
             shear: (c.xy * per_xx) as f32,
@@ -208,13 +200,13 @@ impl Sampled {
         let (y_from, y_to) = (self.shear * from_x, self.shear * to_x);
         // What the exponent leaves for dy at the column nearest to the middle.
         let nearest = from_x.max(-to_x).max(0.0);
-        let reach_y = ((self.fall_x * nearest * nearest - LEAST).max(0.0) * (2.0 / std::f32::consts::LOG2_E)).sqrt()
-            * self.sigma_y;
+        let left = REACH * REACH + f64::from(self.fall_x * nearest * nearest) * (2.0 / std::f64::consts::LOG2_E);
+        let reach_y = (left.max(0.0) as f32).sqrt() * self.sigma_y;
         let corner = self.corner.1;
         let first = corner.saturating_add(floor(self.at.1 + y_from.min(y_to) - reach_y)).max(0);
         let end = corner.saturating_add(floor(self.at.1 + y_from.max(y_to) + reach_y)).saturating_add(1);
         let end = end.min(rows.n_lines as i32);
-        let most = (MOST_SIGMAS * self.sigma_y).clamp(2.0, MOST_ROWS) as i32;
+        let most = (MOST_SIGMAS * self.sigma_y).clamp(2.0, MOST_PRODUCTS as f32) as i32;
         let mut row = first;
         while row < end {
             let n = most.min(end - row);
@@ -228,8 +220,8 @@ impl Sampled {
     #[inline(always)]
     fn add_block(&self, rows: &mut PaddedRows, block: Block) {
         let (mut values, mut ratios) = ([0.0; LANES], [0.0; LANES]);
-        for ((value, ratio), count) in values.iter_mut().zip(&mut ratios).zip(COUNT) {
-            let dx = block.from_x + count;
+        for (i, (value, ratio)) in values.iter_mut().zip(&mut ratios).enumerate() {
+            let dx = block.from_x + i as f32;
             let dy = block.from_y - self.shear * dx;
             *value = exp2(self.fall_x * (dx * dx) + self.fall_y * (dy * dy));
             *ratio = exp2(self.fall_y * (1.0 + 2.0 * dy));
@@ -240,7 +232,7 @@ impl Sampled {
             for (((sum, value), ratio), peak) in
                 sums.iter_mut().zip(&mut values).zip(&mut ratios).zip([self.peak; LANES])
             {
-                *sum += if *value >= EDGE { *value * peak } else { 0.0 };
+                *sum += if *value >= EDGE as f32 { *value * peak } else { 0.0 };
                 *value *= *ratio;
                 *ratio *= change;
             }

@@ -114,11 +114,11 @@ pub(crate) fn cell_areas(mesh: Mesh, outline: &Outline) -> Vec<f64> {
 /// Returns how much of each cell of an outline's mesh obscurations leave clear: of 8 × 8 rays through it. `passed` says of places of the
 /// outline's plane which rays get through the lens, with its obscurations or without.
 pub(crate) fn clear_shares(mesh: Mesh, outline: &Outline, passed: &dyn Fn(&[DVec2], bool) -> Vec<bool>) -> Vec<f64> {
-    const N: usize = CLEAR_ACROSS;
+    let n = CLEAR_ACROSS;
     let rho = |j: usize| outline.rho[(2 * j) % outline.rho.len()];
     let place = |ring: usize, j: usize, k: usize| {
-        let middle = |i: usize| (i as f64 + 0.5) / N as f64;
-        let (out, around) = (middle(k / N), middle(k % N));
+        let middle = |i: usize| (i as f64 + 0.5) / n as f64;
+        let (out, around) = (middle(k / n), middle(k % n));
         let [inner, outer] = [ring, ring + 1].map(|ring| mesh.share(ring as f64).powi(2));
         // Even in area.
         let share = (inner + (outer - inner) * out).sqrt();
@@ -131,15 +131,15 @@ pub(crate) fn clear_shares(mesh: Mesh, outline: &Outline, passed: &dyn Fn(&[DVec
         };
         polar(outline.center, share * (rho(j) + (rho(j + 1) - rho(j)) * around), azimuth)
     };
-    let places: Vec<DVec2> = mesh.cells().flat_map(|(ring, j)| (0..N * N).map(move |k| place(ring, j, k))).collect();
+    let places: Vec<DVec2> = mesh.cells().flat_map(|(ring, j)| (0..n * n).map(move |k| place(ring, j, k))).collect();
     let n_passed = |passed: &[bool]| passed.iter().filter(|passed| **passed).count() as f64;
     let mut shares: Vec<f64> =
-        passed(&places, true).chunks(N * N).map(|cell| n_passed(cell) / (N * N) as f64).collect();
+        passed(&places, true).chunks(n * n).map(|cell| n_passed(cell) / (n * n) as f64).collect();
     // Rims end some rays of the outermost cells, whose areas have that already.
     let outermost = mesh.n_cells() - mesh.n_azimuths;
-    let whole = passed(&places[outermost * N * N..], false);
-    for (share, cell) in shares[outermost..].iter_mut().zip(whole.chunks(N * N)) {
-        *share = (*share * (N * N) as f64 / n_passed(cell).max(1.0)).min(1.0);
+    let whole = passed(&places[outermost * n * n..], false);
+    for (share, cell) in shares[outermost..].iter_mut().zip(whole.chunks(n * n)) {
+        *share = (*share * (n * n) as f64 / n_passed(cell).max(1.0)).min(1.0);
     }
     shares
 }

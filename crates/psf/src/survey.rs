@@ -17,32 +17,71 @@ use crate::{
     symmetry::Symmetry,
 };
 
-/// Intervals along a radius to begin with, and how often they are halved at most.
-const N_RADIAL: usize = 12;
+/// How often steps along a radius, and those of what is sampled over an area, are halved at most.
 const MOST_HALVINGS: usize = 9;
-/// Points along each side of the first grid over a film, and how often its steps are halved at most.
-const N_GRID: usize = 13;
-const MOST_GRID_HALVINGS: usize = 3;
-/// How far what lies between samples may be off: directions, by the place on the film, over the reach, and irradiances, over the largest.
-const MOST_OFF: f64 = 1e-6;
-const MOST_OFF_SR: f64 = 1e-4;
-/// The same for a grid, which is sampled as a whole.
-const MOST_OFF_ON_GRID: f64 = 1e-5;
-const MOST_OFF_SR_ON_GRID: f64 = 1e-3;
-/// The place on the radius, over its length, that stands for the axis.
-const NEXT_TO_AXIS: f64 = 1e-4;
+pub(crate) const MOST_AREA_HALVINGS: usize = 3;
+/// How far what lies between samples may be off: directions, by the place on the film, over a step, and irradiances, over the largest.
+const MOST_OFF: f64 = 1e-5;
+pub(crate) const MOST_OFF_SR: f64 = 1e-4;
+/// So many times as far where an area is sampled, and not a radius.
+pub(crate) const AREA_OVER_RADIUS: f64 = 10.0;
+/// The place on the radius, over a step, that stands for the axis.
+const NEXT_TO_AXIS: f64 = 1e-3;
 /// Points with less of the largest irradiance do not tell how directions go on beyond the light.
-const DIM: f64 = 1e-3;
+pub(crate) const DIM: f64 = 1e-3;
 /// Over how much of the lit radius the slope is taken with which directions go on beyond it.
 const RIM: f64 = 0.1;
-/// Radii and directions at which the share of a part of a pupil is tabulated.
-const N_SHARE_RADII: usize = 65;
-const N_SHARE_AZIMUTHS: usize = 32;
+/// About how many directions from the axis are looked at: of the film of a lens with blades, and for the share of a part of a pupil.
+pub(crate) const N_AZIMUTHS: usize = 24;
+
+/// The distances from the axis of a lens at which its film is looked at first: whole steps, a power of two of mm, whatever is asked for.
+///
+/// The stations of a wide survey are those of a narrow one and more, so that both say the same of the film that they share: the light of a
+/// pixel does not depend on how far beside the film a scene is looked at.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Lattice {
+    pub(crate) step_mm: f64,
+    pub(crate) n_steps: usize,
+}
+
+impl Lattice {
+    /// Least steps in the height of a picture seen at a tangent of 1, and the most that reach from the axis outwards: beyond, they are twice as wide.
+    pub(crate) const STEPS_OF_SCALE: usize = 16;
+    const MOST_STEPS: usize = 64;
+    /// Steps beyond what is asked for: how a curve goes on is told by those.
+    const BESIDE: usize = 2;
+    /// Entries of tables in a step: of directions and irradiances along a radius, and of shares over an area.
+    pub(crate) const ENTRIES: usize = 128;
+    const SHARES: usize = 8;
+
+    /// Returns that of a film up to a distance from the axis, before which a lens has a picture of this height at a tangent of 1.
+    pub(crate) fn over(reach_mm: f64, scale_mm: f64) -> Self {
+        let mut step_mm = (scale_mm / Self::STEPS_OF_SCALE as f64).log2().floor().exp2();
+        while reach_mm > step_mm * (Self::MOST_STEPS - Self::BESIDE) as f64 {
+            step_mm *= 2.0;
+        }
+        Self { step_mm, n_steps: (reach_mm / step_mm).ceil().max(1.0) as usize + Self::BESIDE }
+    }
+
+    /// Returns the same film in steps twice as wide.
+    pub(crate) fn coarser(self) -> Self {
+        Self { step_mm: 2.0 * self.step_mm, n_steps: self.n_steps.div_ceil(2) }
+    }
+
+    pub(crate) fn reach_mm(self) -> f64 {
+        self.step_mm * self.n_steps as f64
+    }
+
+    /// Returns the radii of a table of shares: how far apart they are, mm, and how many.
+    pub(crate) fn table_radii(self) -> (f64, usize) {
+        (self.step_mm / Self::SHARES as f64, self.n_steps * Self::SHARES + 1)
+    }
+}
 
 /// The film of the centered lens up to some distance from its axis.
 #[derive(Debug)]
 pub(crate) struct Survey {
-    pub(crate) reach_mm: f64,
+    pub(crate) lattice: Lattice,
     /// Of the lens where it stands.
     pub(crate) map: Arc<FilmMap>,
     /// Along +x by distance from the axis, or over a grid of so many columns, rows from the bottom up.
@@ -57,26 +96,27 @@ pub(crate) struct Survey {
 }
 
 impl Survey {
-    /// Surveys the film up to `reach_mm` from the axis of the centered lens.
-    pub(crate) fn new(lens: &SurveyedLens<'_>, reach_mm: f64) -> Self {
+    /// Surveys the film of the centered lens; stations along a radius that another survey has are not traced again.
+    pub(crate) fn new(lens: &SurveyedLens<'_>, lattice: Lattice, known: Option<&Self>) -> Self {
+        let known = known.map_or(&[][..], |survey| &survey.stations);
         let (map, stations, n_columns, bladed) = match (lens.symmetry, lens.round_job) {
             (Symmetry::Axis, _) => {
-                let radius = Radius::survey(lens, reach_mm);
-                (FilmMap::from(radius.map(reach_mm)), radius.stations, None, None)
+                let radius = Radius::survey(lens, lattice, known);
+                (FilmMap::from(radius.map(lattice)), radius.stations, None, None)
             }
             (Symmetry::Blades(n_blades), Some(job)) => {
-                let radius = Radius::survey(&SurveyedLens { job, ..*lens }, reach_mm);
+                let radius = Radius::survey(&SurveyedLens { job, ..*lens }, lattice, known);
                 let round_sr = |radius_mm: f64| radius.irradiance_sr.at(radius_mm).max(0.0);
-                let bladed = BladedSurvey::new(lens, n_blades, reach_mm, &round_sr);
-                (FilmMap::from(radius.map(reach_mm)), radius.stations, None, Some(bladed))
+                let bladed = BladedSurvey::new(lens, n_blades, lattice.coarser(), &round_sr);
+                (FilmMap::from(radius.map(lattice)), radius.stations, None, Some(bladed))
             }
             _ => {
-                let (map, stations, n) = surveyed_grid(lens, reach_mm);
+                let (map, stations, n) = surveyed_grid(lens, lattice.coarser());
                 (FilmMap::from(map), stations, Some(n), None)
             }
         };
         // Of a grid the first one's points say it well enough.
-        let stride = n_columns.map_or(1, |n| (n - 1) / (N_GRID - 1));
+        let stride = n_columns.map_or(1, |n| (n - 1) / (2 * lattice.coarser().n_steps));
         let is_told =
             |i: usize| n_columns.is_none_or(|n| (i / n).is_multiple_of(stride) && (i % n).is_multiple_of(stride));
         let told: Vec<&Station> =
@@ -92,10 +132,10 @@ impl Survey {
         let axis_mm = decenter.axis_mm();
         let map = map.about(axis_mm, axis_tan);
         let map = match &bladed {
-            Some(bladed) => map.with_share(bladed.share_map(axis_mm, reach_mm)),
+            Some(bladed) => map.with_share(bladed.share_map(axis_mm, lattice)),
             None => map,
         };
-        Self { reach_mm, map: Arc::new(map), stations, n_columns, bladed, axis_mm, moments }
+        Self { lattice, map: Arc::new(map), stations, n_columns, bladed, axis_mm, moments }
     }
 
     /// Returns the outline of what is seen from a station near a point, if light is.
@@ -121,9 +161,9 @@ impl Survey {
             let fraction = ((radius_mm - from) / (to - from)).clamp(0.0, 1.0);
             return mixed([(self.moments[above - 1], 1.0 - fraction), (self.moments[above], fraction)]);
         }
-        let n = N_GRID;
-        let step_mm = 2.0 * self.reach_mm / (n - 1) as f64;
-        let place = ((from_axis_mm + self.reach_mm) / step_mm).clamp(DVec2::ZERO, DVec2::splat((n - 1) as f64));
+        let grid = self.lattice.coarser();
+        let n = 2 * grid.n_steps + 1;
+        let place = ((from_axis_mm + grid.reach_mm()) / grid.step_mm).clamp(DVec2::ZERO, DVec2::splat((n - 1) as f64));
         let below = place.floor().min(DVec2::splat((n - 2) as f64));
         let (f, at) = (place - below, below.y as usize * n + below.x as usize);
         mixed([
@@ -137,10 +177,10 @@ impl Survey {
     /// Returns the map of a part of the pupil: the directions of the whole, and its share of the irradiances.
     pub(crate) fn part_map(&self, mesh: Mesh, division: &PupilDivision, part: usize) -> FilmMap {
         if let Some(bladed) = &self.bladed {
-            let shares = bladed.part_share_map((self.axis_mm, self.reach_mm), mesh, (division, part));
+            let shares = bladed.part_share_map((self.axis_mm, self.lattice), mesh, (division, part));
             return FilmMap::clone(&self.map).with_share(shares);
         }
-        let n_directions = if self.n_columns.is_some() { 2 } else { N_SHARE_AZIMUTHS };
+        let n_directions = if self.n_columns.is_some() { 2 } else { N_AZIMUTHS };
         let turn = |i: usize| DVec2::from_angle(TAU * i as f64 / n_directions as f64);
         let cell_shares: Vec<Vec<f64>> = (0..n_directions).map(|i| division.cell_shares(part, mesh, turn(i))).collect();
         // Of each station, as if it lay in each direction from the axis; in darkness that of the nearest light.
@@ -182,8 +222,8 @@ impl Survey {
             let mix = |i: usize| shares_of(lit[below].1, i) * (1.0 - fraction) + shares_of(lit[above].1, i) * fraction;
             (0..n_directions).map(mix).collect()
         };
-        let step_mm = self.reach_mm / (N_SHARE_RADII - 1) as f64;
-        let shares = (0..N_SHARE_RADII).flat_map(|i| at_radius(step_mm * i as f64)).collect();
+        let (step_mm, n_radii) = self.lattice.table_radii();
+        let shares = (0..n_radii).flat_map(|i| at_radius(step_mm * i as f64)).collect();
         FilmMap::clone(&self.map).with_share(ShareMap::new(self.axis_mm, step_mm, n_directions, shares))
     }
 }
@@ -209,6 +249,7 @@ fn nearest_known(stations: &[&Station], known: &[Option<Moments>]) -> Vec<Moment
 
 /// Stations along a radius, and what they say by distance from the axis.
 struct Radius {
+    step_mm: f64,
     stations: Vec<Station>,
     half_tan: EvenCurve,
     irradiance_sr: MonotoneCurve,
@@ -216,16 +257,19 @@ struct Radius {
 
 impl Radius {
     /// Traces stations until what lies between them is known, on all threads.
-    fn survey(lens: &SurveyedLens<'_>, reach_mm: f64) -> Self {
-        let station = |radius_mm: f64, seed: Option<&Outline>| lens.station(DVec2::X * radius_mm, seed);
+    fn survey(lens: &SurveyedLens<'_>, Lattice { step_mm, n_steps }: Lattice, known: &[Station]) -> Self {
+        let station = |radius_mm: f64, seed: Option<&Outline>| {
+            let known = known.iter().find(|station| station.place_mm.x == radius_mm).cloned();
+            known.unwrap_or_else(|| lens.station(DVec2::X * radius_mm, seed))
+        };
         // From the axis outwards, each from the last.
         let mut stations: Vec<Station> = Vec::new();
-        for i in 0..=N_RADIAL {
-            let share = if i == 0 { NEXT_TO_AXIS } else { i as f64 / N_RADIAL as f64 };
+        for i in 0..=n_steps {
+            let steps = if i == 0 { NEXT_TO_AXIS } else { i as f64 };
             let seed = stations.iter().rev().find_map(Station::outline);
-            stations.push(station(reach_mm * share, seed));
+            stations.push(station(step_mm * steps, seed));
         }
-        let mut radius = Self::of(stations);
+        let mut radius = Self::of(stations, step_mm);
         // Halve the intervals that held a station which was not foreseen.
         let mut open: Vec<[f64; 2]> =
             radius.stations.windows(2).map(|pair| [0, 1].map(|i| pair[i].place_mm.x)).collect();
@@ -237,7 +281,7 @@ impl Radius {
             let between = |&[from, to]: &[f64; 2]| {
                 let at_mm = 0.5 * (from + to);
                 let found = station(at_mm, radius.seed(at_mm));
-                let is_foreseen = radius.foresees(&found, reach_mm, largest_sr);
+                let is_foreseen = radius.foresees(&found, largest_sr);
                 (found, is_foreseen)
             };
             let found: Vec<(Station, bool)> = open.par_iter().map(between).collect();
@@ -248,7 +292,7 @@ impl Radius {
             let mut stations = radius.stations;
             stations.extend(found.into_iter().map(|(station, _)| station));
             stations.sort_by(|a, b| a.place_mm.x.total_cmp(&b.place_mm.x));
-            radius = Self::of(stations);
+            radius = Self::of(stations, step_mm);
             open = next;
             if open.is_empty() {
                 break;
@@ -257,13 +301,14 @@ impl Radius {
         radius
     }
 
-    fn of(stations: Vec<Station>) -> Self {
+    fn of(stations: Vec<Station>, step_mm: f64) -> Self {
         let largest_sr = stations.iter().map(|station| station.irradiance_sr).fold(0.0, f64::max);
         let bright = stations.iter().filter(|station| station.irradiance_sr > DIM * largest_sr);
         let half_tans: Vec<(f64, f64)> =
             bright.filter_map(|station| Some((station.place_mm.x, station.half_tan?.x / station.place_mm.x))).collect();
         let irradiances = stations.iter().map(|station| (station.place_mm.x, station.irradiance_sr)).collect();
-        Self { half_tan: EvenCurve::new(half_tans), irradiance_sr: MonotoneCurve::new(irradiances), stations }
+        let (half_tan, irradiance_sr) = (EvenCurve::new(half_tans), MonotoneCurve::new(irradiances));
+        Self { step_mm, stations, half_tan, irradiance_sr }
     }
 
     fn seed(&self, radius_mm: f64) -> Option<&Outline> {
@@ -273,19 +318,19 @@ impl Radius {
     }
 
     /// Whether a station is as those about it say.
-    fn foresees(&self, station: &Station, reach_mm: f64, largest_sr: f64) -> bool {
+    fn foresees(&self, station: &Station, largest_sr: f64) -> bool {
         let radius_mm = station.place_mm.x;
         let off_sr = (self.irradiance_sr.at(radius_mm) - station.irradiance_sr).abs();
         let is_dim = station.irradiance_sr <= DIM * largest_sr;
         let direction = station.half_tan.filter(|_| !is_dim);
         let is_foreseen = direction.is_none_or(|half_tan| {
             let per_mm = self.half_tan.at(radius_mm);
-            (per_mm * radius_mm - half_tan.x).abs() <= MOST_OFF * reach_mm * per_mm.abs()
+            (per_mm * radius_mm - half_tan.x).abs() <= MOST_OFF * self.step_mm * per_mm.abs()
         });
         is_foreseen && off_sr <= MOST_OFF_SR * largest_sr
     }
 
-    fn map(&self, reach_mm: f64) -> RadialMap {
+    fn map(&self, lattice: Lattice) -> RadialMap {
         let last_mm = self.half_tan.x.last().copied().unwrap_or(0.0);
         let half_tan = |radius_mm: f64| self.half_tan.at(radius_mm) * radius_mm;
         // Beyond the light directions go on with the slope of the last part of it, in angle.
@@ -300,7 +345,8 @@ impl Radius {
             }
             false => None,
         };
-        RadialMap::from_half_tans(reach_mm, half_tan_at, |radius_mm| self.irradiance_sr.at(radius_mm).max(0.0))
+        let table = (lattice.reach_mm(), lattice.n_steps * Lattice::ENTRIES);
+        RadialMap::from_half_tans(table, half_tan_at, |radius_mm| self.irradiance_sr.at(radius_mm).max(0.0))
     }
 }
 
@@ -397,11 +443,11 @@ impl MonotoneCurve {
 /// Surveys a square of film, with ever finer grids where what lies between their points was not foreseen; returns the number of columns too.
 ///
 /// Beyond the circle in the square nobody asks; there, as in darkness, directions go on.
-fn surveyed_grid(lens: &SurveyedLens<'_>, reach_mm: f64) -> (PlaneMap, Vec<Station>, usize) {
-    let focus_dioptres = lens.focus_dioptres;
+fn surveyed_grid(lens: &SurveyedLens<'_>, lattice: Lattice) -> (PlaneMap, Vec<Station>, usize) {
+    let (focus_dioptres, reach_mm) = (lens.focus_dioptres, lattice.reach_mm());
     let place_mm =
         |n: usize, i: usize| DVec2::new((i % n) as f64, (i / n) as f64) * (2.0 * reach_mm / (n - 1) as f64) - reach_mm;
-    let asked_mm = reach_mm * (1.0 + 2.0 * 2f64.sqrt() / (N_GRID - 1) as f64);
+    let asked_mm = reach_mm + std::f64::consts::SQRT_2 * lattice.step_mm;
     let traced = |place_mm: DVec2, seed: Option<&Outline>| match place_mm.length() <= asked_mm {
         true => lens.station(place_mm, seed),
         false => Station::new(place_mm, None, focus_dioptres),
@@ -415,14 +461,15 @@ fn surveyed_grid(lens: &SurveyedLens<'_>, reach_mm: f64) -> (PlaneMap, Vec<Stati
             half_tans.into_iter().zip(stations).map(|(half_tan, station)| (half_tan, station.irradiance_sr)).collect();
         PlaneMap::new(reach_mm, n, &nodes)
     };
-    let mut n = N_GRID;
+    let n_first = 2 * lattice.n_steps + 1;
+    let mut n = n_first;
     let middle = traced(DVec2::ZERO, None);
     let mut stations: Vec<Station> =
         (0..n * n).into_par_iter().map(|i| traced(place_mm(n, i), middle.outline())).collect();
     let mut map = map_of(&stations, n);
     // Whether each point was as the coarser grid says.
     let mut are_foreseen = vec![false; n * n];
-    for _ in 0..MOST_GRID_HALVINGS {
+    for _ in 0..MOST_AREA_HALVINGS {
         let finer = 2 * n - 1;
         let largest_sr = stations.iter().map(|station| station.irradiance_sr).fold(0.0, f64::max);
         let is_foreseen = |station: &Station| {
@@ -430,7 +477,8 @@ fn surveyed_grid(lens: &SurveyedLens<'_>, reach_mm: f64) -> (PlaneMap, Vec<Stati
             let chief = station.bundle.as_ref().filter(|bundle| bundle.irradiance_sr > DIM * largest_sr);
             let off_mm =
                 chief.map_or(0.0, |bundle| map.place_of(bundle.chief(focus_dioptres)).distance(station.place_mm));
-            off_sr <= MOST_OFF_SR_ON_GRID * largest_sr && off_mm <= MOST_OFF_ON_GRID * reach_mm
+            off_sr <= AREA_OVER_RADIUS * MOST_OFF_SR * largest_sr
+                && off_mm <= AREA_OVER_RADIUS * MOST_OFF * lattice.step_mm
         };
         let found: Vec<(Station, bool)> = (0..finer * finer)
             .into_par_iter()
@@ -456,7 +504,7 @@ fn surveyed_grid(lens: &SurveyedLens<'_>, reach_mm: f64) -> (PlaneMap, Vec<Stati
                 // The first two grids look everywhere; what is left is beside light that they found.
                 let at_mm = place_mm(finer, i);
                 let seed = about().find_map(|k| stations[k].outline());
-                let station = match n == N_GRID || seed.is_some() {
+                let station = match n == n_first || seed.is_some() {
                     true => traced(at_mm, seed),
                     false => Station::new(at_mm, None, focus_dioptres),
                 };

@@ -17,14 +17,12 @@ use crate::{
     pupil::Outline,
     render::{Layout, wave_energies},
     station::SurveyedLens,
-    survey::Survey,
+    survey::{Lattice, N_AZIMUTHS, Survey},
     symmetry::Symmetry,
 };
 
 /// Bytes of bundles that are kept for each wavelength.
 const MOST_KEPT_BYTES: usize = 2 << 20;
-/// Steps per doubling in which the reach of a survey grows.
-const REACH_STEPS: f64 = 4.0;
 /// How far beyond the film that was surveyed kernels go by its survey, as a multiple of its reach.
 const FAR_BEYOND: f64 = 1.5;
 /// Radii, over the film's distance, at which light is looked for before anything else is done.
@@ -40,6 +38,8 @@ pub(crate) struct Shared {
     settings: ImageSettings,
     wavelengths_nm: Vec<f64>,
     reference: MonoLens,
+    /// The height of the picture of what is seen at a tangent of 1, mm: the focal length, about.
+    scale_mm: f64,
     /// The depth in focus at the reference wavelength.
     focus_dioptres: f64,
     colors: Mutex<HashMap<u64, Arc<Color>>>,
@@ -83,7 +83,10 @@ impl Shared {
         let center_z_mm = reference.projection_center_z_mm();
         let focus_mm = reference.object_distance_mm_for(settings.film_distance_mm);
         let focus_dioptres = focus_mm.map_or(0.0, |distance_mm| 1e3 / (distance_mm + center_z_mm));
+        let scale_mm = reference.film_scale_mm(settings.film_distance_mm).abs();
         let shared = Self {
+            // Of an afocal lens, or film in a pupil, what else there is.
+            scale_mm: if scale_mm.is_normal() { scale_mm } else { settings.film_distance_mm },
             lens: lens.clone(),
             symmetry: Symmetry::of(&centered),
             centered,
@@ -157,8 +160,7 @@ impl Shared {
 
     /// Fails if no light reaches the film about its middle.
     fn check_light(&self, color: &Color) -> Result<(), PsfError> {
-        const N_DIRECTIONS: usize = 16;
-        let n_directions = if self.symmetry == Symmetry::Axis { 1 } else { N_DIRECTIONS };
+        let n_directions = if self.symmetry == Symmetry::Axis { 1 } else { N_AZIMUTHS };
         let directions =
             (0..n_directions).map(|i| DVec2::from_angle(std::f64::consts::TAU * i as f64 / n_directions as f64));
         let mut probes = directions
@@ -222,14 +224,14 @@ impl Shared {
 
     fn survey(&self, color: &Color, reach_mm: f64) -> Arc<Survey> {
         // Of a lens moved sideways, as far from its axis.
-        let reach_mm = reach_mm + self.decenter.mm().length();
-        let reach_mm = ((REACH_STEPS * reach_mm.max(1e-3).log2()).ceil() / REACH_STEPS).exp2();
-        let known = |surveys: &[Arc<Survey>]| surveys.iter().find(|survey| survey.reach_mm == reach_mm).cloned();
+        let lattice = Lattice::over(reach_mm + self.decenter.mm().length(), self.scale_mm);
+        let known = |surveys: &[Arc<Survey>]| surveys.iter().find(|survey| survey.lattice == lattice).cloned();
         if let Some(survey) = known(&locked(&color.surveys)) {
             return survey;
         }
         // Threads that ask at once get the same, whoever is first.
-        let survey = Arc::new(Survey::new(&self.surveyed(color), reach_mm));
+        let last = locked(&color.surveys).last().cloned();
+        let survey = Arc::new(Survey::new(&self.surveyed(color), lattice, last.as_deref()));
         let mut surveys = locked(&color.surveys);
         known(&surveys).unwrap_or_else(|| {
             surveys.push(survey.clone());

@@ -1,11 +1,10 @@
 //! Figure 1: the point spread functions of the paper's two-element lens over field and depth.
 
-use dioptric_psf::{
-    CountingFilm, FrontGrid, Picture, PsfError,
-    paper::{FIGURE_3_FILM_MM, counted_psfs, film_center_mm, two_element_lens},
-};
+use dioptric_psf::{CountingFilm, FrontGrid, Picture, PsfError};
 use glam::{DVec2, DVec3};
 use ndarray::Array2;
+
+use super::paper::{FIGURE_3_FILM_MM, counted_psfs, film_center_mm, two_element_lens};
 
 /// Depths of the points, mm before the last vertex.
 pub const DEPTHS_MM: [f64; 4] = [2000.0, 4000.0, 8000.0, 16000.0];

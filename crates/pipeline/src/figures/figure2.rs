@@ -2,11 +2,10 @@
 
 use dioptric_diffraction::{Hurb, WaveQuality, WaveWindow, WindowCenter, airy, wave_psf};
 use dioptric_optics::{Lens, ObjectPoint, glam::DVec2};
-use dioptric_psf::{
-    Profile, PsfError,
-    paper::{FIGURE_2_FILM_MM, Figure2},
-};
+use dioptric_psf::{Profile, PsfError};
 use rayon::prelude::*;
+
+use super::paper::{FIGURE_2_FILM_MM, Figure2};
 
 /// A line spread function at each of several wavelengths.
 #[derive(Clone, Debug)]

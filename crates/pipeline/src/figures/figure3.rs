@@ -3,13 +3,13 @@
 use std::sync::Arc;
 
 use dioptric_forward::{Film, Settings, Source, render};
-use dioptric_psf::paper::{FIGURE_3_FILM_MM, figure_3_psfs, figure_3_rms_um, two_element_lens};
 use dioptric_psf::{FilmMap, FilmQuery, Kernel, LensImage};
 use dioptric_scene::{Target, View};
 use dioptric_spectrum::{Quantity, SpectralImage, WavelengthGrid};
 use glam::DVec2;
 use ndarray::Array2;
 
+use super::paper::{FIGURE_3_FILM_MM, figure_3_psfs, figure_3_rms_um, two_element_lens};
 use crate::PipelineError;
 
 /// Distances of the targets, mm before the last vertex.

@@ -4,3 +4,4 @@ pub mod figure1;
 pub mod figure2;
 pub mod figure3;
 pub mod figure4;
+pub mod paper;

@@ -4,11 +4,7 @@ use glam::{DMat2, DVec2, DVec3};
 use multiversion::multiversion;
 
 use super::{FieldsAlong, LEAST_COSINE};
-
-/// Entries of each table.
-const N_ENTRIES: usize = 2049;
-/// Of the last entry, how much of the tangent of half the angle must be added by the one before for directions to go on from there.
-const LEAST_RISE: f64 = 1e-9;
+use crate::survey::Lattice;
 
 /// From the distance from an axis to the direction seen there, and to the irradiance.
 ///
@@ -91,20 +87,19 @@ impl RadialMap {
         irradiance_sr: impl Fn(f64) -> f64,
     ) -> Self {
         Self::from_half_tans(
-            reach_mm,
+            (reach_mm, Lattice::STEPS_OF_SCALE * Lattice::ENTRIES),
             |radius_mm| tan_at(radius_mm).map(|tan| tan / (1.0 + tan.hypot(1.0))),
             |radius_mm| tan_at(radius_mm).map_or(0.0, &irradiance_sr),
         )
     }
 
-    /// Tabulates a lens by tan(θ/2) and irradiance, sr, at distances from the axis, mm; where there is no direction, or from where on
+    /// Tabulates a lens over so many intervals by tan(θ/2) and irradiance, sr, at distances from the axis, mm; where there is no direction, or from where on
     /// directions turn back, they go on straight in tan(θ/2).
     pub(crate) fn from_half_tans(
-        reach_mm: f64,
+        (reach_mm, last): (f64, usize),
         half_tan_at: impl Fn(f64) -> Option<f64>,
         irradiance_sr: impl Fn(f64) -> f64,
     ) -> Self {
-        let last = N_ENTRIES - 1;
         let entries_per_mm = last as f64 / reach_mm;
         let radius_mm = |entry: f64| entry / entries_per_mm;
         // At the axis the ratio is 0/0; a thousandth of the first step stands for it.
@@ -117,7 +112,8 @@ impl RadialMap {
         for entry in 1..=last {
             let found = if goes_on { half_tan_at(radius_mm(entry as f64)) } else { None };
             let half_tan = found.map(|half_tan| half_tan * first.signum());
-            let is_rising = |half_tan: &f64| *half_tan - half_tan_before > LEAST_RISE * half_tan.abs();
+            // By more than rounding.
+            let is_rising = |half_tan: &f64| *half_tan - half_tan_before > f64::EPSILON.sqrt() * half_tan.abs();
             let half_tan = half_tan.filter(is_rising).unwrap_or_else(|| {
                 goes_on = false;
                 half_tan_before + rise
@@ -146,7 +142,7 @@ impl RadialMap {
 
     /// Tabulates the inverse.
     fn invert(&mut self) {
-        let last = N_ENTRIES - 1;
+        let last = self.half_tan_per_mm.values.len() - 1;
         let sign = self.last_half_tan.signum();
         self.entries_per_half_tan = last as f64 / self.last_half_tan.abs();
         let mut values = vec![1.0 / self.half_tan_per_mm.values[0]];

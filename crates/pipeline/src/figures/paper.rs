@@ -4,13 +4,9 @@
 
 use dioptric_diffraction::Hurb;
 use dioptric_optics::{Beam, Interface, Lens, MonoLens, ObjectPoint, RayBatch, Surface};
+use dioptric_psf::{CountingFilm, FrontGrid, Picture, Profile, PsfError, mean_place_mm, trace_as_authors};
 use glam::{DVec2, DVec3};
 use ndarray::Array2;
-
-use crate::{
-    CountingFilm, FrontGrid, Picture, Profile, PsfError,
-    count::{mean_place_mm, trace_as_authors},
-};
 
 /// The film of Figures 1 and 3, mm behind the last vertex.
 pub const FIGURE_3_FILM_MM: f64 = 51.8145;
@@ -141,7 +137,7 @@ impl Figure2 {
         let lens = Lens::thin(50.0, self.diameter_mm)?.at(wavelength_nm)?;
         let grid = FrontGrid { n_across, jitter_seed: Some(seed) };
         let mut rays = grid.rays(&lens, DVec3::new(0.0, 0.0, -2000.0));
-        let bending = crate::AuthorsBending { model, seed: seed.wrapping_add(1) };
+        let bending = dioptric_psf::AuthorsBending { model, seed: seed.wrapping_add(1) };
         trace_as_authors(&lens, &mut rays, FIGURE_2_FILM_MM, Some(bending));
         let film = CountingFilm { n_pixels: self.n_pixels, side_mm: 1e-3 * self.side_um(), center_mm: DVec2::ZERO };
         let counts = film.count(lens.landed(&rays, FIGURE_2_FILM_MM));
