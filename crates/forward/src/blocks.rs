@@ -10,12 +10,9 @@ use rayon::prelude::*;
 use crate::{
     Border, Film,
     places::SceneRaster,
-    raster::{Level, Raster},
+    raster::{BLOCK, Level, Raster},
     surface::LayerCoordinates,
 };
-
-/// Pixels along a side of a block.
-pub(crate) const BLOCK: i64 = 8;
 
 /// Samples of the scene beside what a block looks at that are looked at too: lateral color between the bands that are looked up.
 const SLACK: f64 = 2.0;
@@ -155,7 +152,6 @@ fn block(
     scene: &SceneRaster,
     (maps, surfaces): (&[&FilmMap], &[&LayerCoordinates]),
 ) -> Block {
-    const PARTS: [f64; 3] = [0.0, 0.5, 1.0];
     let nothing = Block { layers: (u16::MAX, 0), density: [1; 2] };
     let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
     let mut density = [0.0_f64; 2];
@@ -168,8 +164,9 @@ fn block(
             );
             map.field_tan(place).map(|tan| scene.position_of(tan.x, tan.y))
         };
+        // Its corners, the middles of its sides and its own.
         let grid: Vec<Option<[f64; 2]>> =
-            PARTS.iter().flat_map(|down| PARTS.map(|across| looks(*down, across))).collect();
+            (0..9).map(|i| looks(0.5 * f64::from(i / 3), 0.5 * f64::from(i % 3))).collect();
         for [row, column] in grid.iter().flatten().copied() {
             (low, high) = ([low[0].min(row), low[1].min(column)], [high[0].max(row), high[1].max(column)]);
         }

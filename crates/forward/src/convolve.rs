@@ -5,8 +5,8 @@ use std::{cell::RefCell, collections::HashMap, rc::Rc, sync::Arc};
 use dioptric_fft::{Complex, Fft, Planner, RealToComplex};
 use multiversion::multiversion;
 
-/// Rows transformed together, so that the transpose writes whole cache lines.
-const BATCH: usize = 8;
+/// Rows transformed or turned together, so that the transpose writes whole cache lines.
+pub(crate) const BATCH: usize = 8;
 
 /// Returns the smallest size of at least `n` whose transform is fast: a multiple of 4 with the factors 2 and 3, or of 8 with one of 5, 7 and 11 besides. Others are up to
 /// four times as slow a sample (docs/PERFORMANCE.md).

@@ -1,5 +1,6 @@
 //! Layers laid one behind the other until every pixel is covered.
 
+use dioptric_psf::Kernel;
 use ndarray::{Array2, Zip};
 
 use crate::rectangle::Rectangle;
@@ -30,8 +31,6 @@ struct Open {
     layer: u16,
 }
 
-/// Coverage below which a layer has nothing: a sample that is blurred over a thousand pixels has more.
-const LEAST_OF_LAYER: f32 = 2e-7;
 /// A pixel with less coverage in all stays dark.
 const LEAST_COVERAGE: f32 = 1e-5;
 
@@ -65,8 +64,8 @@ impl Composite {
         for ((sums, pixels), (light, alpha)) in sums.zip(pixels).zip(layers) {
             let pixels = sums.iter_mut().zip(pixels);
             for ((sum, open), (light, alpha)) in pixels.zip(light.iter().zip(alpha)) {
-                if *alpha <= LEAST_OF_LAYER {
-                    // Nothing but rounding errors of transforms.
+                if *alpha <= 2.0 * Kernel::NEGLIGIBLE as f32 {
+                    // Nothing but what kernels leave out on two sides, and rounding errors of transforms.
                     continue;
                 }
                 let taken = alpha.min(open.part);

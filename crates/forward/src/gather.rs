@@ -377,16 +377,15 @@ fn convolve(
 
 /// Whether sums take less time than transforms of rectangles of this size for so many sources.
 fn is_better_direct(kernels: &TileKernels, n_out: usize, n_sources: usize, (rows, columns): (usize, usize)) -> bool {
-    // Nanoseconds measured on one core: a product in a sum, and a value of a transform beside what is in proportion to its logarithm.
-    const PRODUCT_NS: f64 = 0.09;
-    const VALUE_NS: [f64; 2] = [2.5, 0.45];
+    // Products in a sum that take as long, measured on one core, as a value of a transform, beside what is in proportion to its logarithm.
+    const OF_VALUE: [f64; 2] = [28.0, 5.0];
     let n = (rows * columns) as f64;
-    let transform_ns = n * (VALUE_NS[0] + VALUE_NS[1] * n.log2());
+    let transform = n * (OF_VALUE[0] + OF_VALUE[1] * n.log2());
     let n_terms = kernels.terms.len() as f64;
     let pairs = n_sources.div_ceil(2) as f64;
-    let transforms_ns = transform_ns * (0.5 * n_terms + pairs * (1.0 + n_terms));
+    let transforms = transform * (0.5 * n_terms + pairs * (1.0 + n_terms));
     let n_sums = if kernels.changes_across() { 2.0 } else { 1.0 };
-    n_sums * (kernels.at.len() * n_out) as f64 * PRODUCT_NS < transforms_ns
+    n_sums * ((kernels.at.len() * n_out) as f64) < transforms
 }
 
 /// Gathers by sums over the kernel of each row.

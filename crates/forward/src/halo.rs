@@ -5,7 +5,7 @@
 
 use std::{collections::BTreeMap, f64::consts::PI};
 
-use dioptric_psf::{FilmQuery, LensImage};
+use dioptric_psf::{FilmQuery, Kernel, LensImage};
 use glam::DVec2;
 use multiversion::multiversion;
 use ndarray::Array2;
@@ -18,18 +18,10 @@ use crate::{
     surroundings::{Surroundings, beside},
 };
 
-/// A share of the light beyond the window that is not worth spreading: kernels leave out as little on each side.
-const NEGLIGIBLE: f64 = 1e-6;
-
-/// What an edge bends beyond a circle, times its radius over λN.
-const BENT: f64 = 2.0 / (PI * PI);
-
 /// Distance, in pixels of a raster, over which a halo passes to the next one of wider pixels.
 const PASSES_OVER: [f64; 2] = [3.0, 4.5];
 /// Distance at which the halo begins on the first raster, in its pixels, or more; where that is less than on the film's own, that is the first.
 const FIRST: f64 = 1.25;
-/// The variance each way by which rasters blur what they bring: splines to wider pixels and back, and their own pixels between, in square pixels.
-const BLUR: f64 = 2.0 * 0.25 + 1.0 / 12.0;
 /// Points along each side of a pixel at which the halo is looked up.
 const POINTS: usize = 8;
 /// Pixels beside the middle that the halo of one raster reaches.
@@ -61,7 +53,8 @@ impl Beyond {
         }
         let fade_px = kernel.fade_px().map(|px| px.max(LEAST_RADIUS));
         let share = 1.0 - kernel.kept_share;
-        let bent = BENT * kernel.lambda_n_px * Fade(fade_px).inverse();
+        // An edge bends 2 / π² λN over its radius beyond a circle.
+        let bent = 2.0 / (PI * PI) * kernel.lambda_n_px * Fade(fade_px).inverse();
         Self { share, fade_px: fade_px.map(|px| factor * px), steep: (1.0 - bent / share).clamp(0.0, 1.0) }
     }
 
@@ -131,7 +124,7 @@ impl Halos {
             let fraction = (band - lower) as f64 / (upper - lower).max(1) as f64;
             let beyond = Beyond::between(*below, *above, fraction);
             let (rows, columns) = (film.rows + 2 * beside(film), film.columns + 2 * beside(film));
-            (beyond.share > NEGLIGIBLE).then(|| Halo::new(beyond, (rows, columns)))
+            (beyond.share > Kernel::NEGLIGIBLE).then(|| Halo::new(beyond, (rows, columns)))
         };
         Self { of_bands: (0..n_bands).into_par_iter().map(halo).collect() }
     }
@@ -274,13 +267,14 @@ impl RasterPart {
         };
         let raw: [[f64; REACH + 2]; REACH + 2] =
             std::array::from_fn(|down| std::array::from_fn(|right| energy(right, down)));
-        // Less half the variance of the blur times the second differences, so that it is blurred back to what it is.
+        // Less half the variance of the blur times the second differences, so that it is blurred back to what it is: of splines to wider pixels and back, and of pixels between.
+        let blur = 2.0 * 0.25 + 1.0 / 12.0;
         let sharp = |right: usize, down: usize| {
             let beside = raw[down][right.abs_diff(1)]
                 + raw[down][right + 1]
                 + raw[down.abs_diff(1)][right]
                 + raw[down + 1][right];
-            raw[down][right] + 0.5 * BLUR * (4.0 * raw[down][right] - beside)
+            raw[down][right] + 0.5 * blur * (4.0 * raw[down][right] - beside)
         };
         Self(std::array::from_fn(|down| std::array::from_fn(|right| sharp(right, down) as f32)))
     }

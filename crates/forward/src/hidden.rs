@@ -34,8 +34,8 @@ struct Term {
 pub(crate) struct EdgeRule<'a> {
     /// Difference of distances between neighbors that is a depth edge.
     pub(crate) jump: f32,
-    /// Largest radius, in samples of the scene, of the blur at a distance.
-    pub(crate) reach: &'a (dyn Fn(f32) -> f32 + Sync),
+    /// How far, in samples of the scene, beyond an edge between a near and a far distance the bundles of the film go.
+    pub(crate) reach: &'a (dyn Fn(f32, f32) -> f32 + Sync),
 }
 
 impl Fill {
@@ -122,8 +122,7 @@ pub(crate) fn reach_of_edges(
                 if inside(r, c) {
                     let other = distances[(r as usize, c as usize)];
                     if other - distance > rule.jump {
-                        let radius = f32::max((rule.reach)(distance), (rule.reach)(other)) + 2.0;
-                        *reach = reach.max(radius);
+                        *reach = reach.max((rule.reach)(distance, other) + 2.0);
                     }
                 }
             }
@@ -326,7 +325,7 @@ mod tests {
     use super::*;
 
     fn rule(jump: f32) -> EdgeRule<'static> {
-        EdgeRule { jump, reach: &|_| 6.0 }
+        EdgeRule { jump, reach: &|_, _| 6.0 }
     }
 
     #[test]

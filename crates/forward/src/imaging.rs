@@ -41,9 +41,6 @@ pub(crate) const USUAL_BYTES: usize = 256 << 20;
 /// Work on a group of tiles in one band over that of a kernel, about in proportion to their time.
 const GROUP_UNITS: u64 = 8;
 
-/// Lateral color and distortion move the edge of what is seen by less than this, over the reach of the film.
-const BEYOND: f64 = 1.05;
-
 /// A plan for one lens, or for one part of a pupil: all but the lens, which each method takes.
 pub(crate) struct Imaging {
     pub(crate) spec: ImagingSpec,
@@ -79,7 +76,7 @@ impl Imaging {
         let layers = &scene.layers;
         let widest_px = (0..layers.len()).map(|layer| layers.radius_px_at(layer as f32)).fold(0.0, f64::max);
         let margin_px = reach_px(widest_px).ceil() as usize;
-        let reach_mm = BEYOND * (film.half_diagonal_mm() + 1.5e-3 * film.pitch_um * margin_px as f64);
+        let reach_mm = film.half_diagonal_mm() + 1.5e-3 * film.pitch_um * margin_px as f64;
 
         // Look which layers lie where.
         let wavelengths_nm = grid.centers_nm();
@@ -140,6 +137,11 @@ impl Imaging {
     pub(crate) fn points_unseen(&self) -> (usize, usize) {
         let behind = self.points.iter().flatten().filter(|point| point.is_behind()).count();
         (behind, self.points.iter().filter(|point| point.is_none()).count())
+    }
+
+    /// The part of the film from which rays pass behind all surfaces that are known.
+    pub(crate) fn unknown_fraction(&self) -> f64 {
+        self.visible.as_ref().map_or(0.0, |visible| visible.unknown_fraction)
     }
 
     /// Keeps at most so many bytes of kernels from now on.

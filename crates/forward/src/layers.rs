@@ -5,6 +5,8 @@ use glam::DVec2;
 
 /// A change of blur radius between neighbors that counts as an edge of depth, pixels.
 pub(crate) const DEPTH_EDGE_PX: f32 = 3.0;
+/// Blur radius up to which something is in focus, pixels: what a point becomes is aberrations and pixels then.
+pub(crate) const IN_FOCUS_PX: f32 = 1.0;
 
 /// The depths at which the scene is blurred, nearest first.
 ///

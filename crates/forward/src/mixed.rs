@@ -10,7 +10,7 @@ use ndarray::Array2;
 use rayon::prelude::*;
 
 use crate::{
-    layers::{DEPTH_EDGE_PX, Layers},
+    layers::{DEPTH_EDGE_PX, IN_FOCUS_PX, Layers},
     occluded::Distances,
 };
 
@@ -37,8 +37,6 @@ struct Mixed {
     end: u32,
 }
 
-/// Up to this radius of blur a sample is in focus, pixels.
-const SHARP_PX: f64 = 1.0;
 /// How far around a sample others of its own side are looked for.
 const AROUND: usize = 2;
 
@@ -48,7 +46,9 @@ impl MixedSamples {
     pub(crate) fn find(distances: &Distances, layers: &Layers, cancel: &Cancel) -> Result<Self, Cancelled> {
         let (front, jump) = (&distances.front, DEPTH_EDGE_PX);
         // What is in focus keeps its outline, mixtures and all: pixels of a sharp picture show both sides too.
-        let is_sharp = |at: (usize, usize)| layers.radius_px_at(layers.coordinate_of_distance(front[at])) <= SHARP_PX;
+        let is_sharp = |at: (usize, usize)| {
+            layers.radius_px_at(layers.coordinate_of_distance(front[at])) <= f64::from(IN_FOCUS_PX)
+        };
         let (rows, columns) = front.dim();
         let near = |row: usize, column: usize, by: usize| {
             let lines = row.saturating_sub(by)..(row + by + 1).min(rows);
@@ -63,7 +63,7 @@ impl MixedSamples {
             let mut found = vec![];
             for at in (0..columns).map(|column| (row, column)).filter(|&at| is_beside_edge(at) && !is_sharp(at)) {
                 let (row, column) = at;
-                if near(row, column, 1).any(|other| distances.is_known_behind(other, jump)) {
+                if near(row, column, 1).any(|other| distances.is_known_behind(other)) {
                     continue;
                 }
                 let own = near(row, column, AROUND).filter(|&other| !is_apart(at, other) && !is_beside_edge(other));

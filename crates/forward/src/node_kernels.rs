@@ -11,9 +11,6 @@ use crate::{
     symmetry::{Mirror, Node, Symmetry},
 };
 
-/// The part of a kernel's light that is left out on each side of it.
-const LEFT_OUT: f64 = 1e-7;
-
 /// What a film point gathers, on samples of some width: of sum 1, about that point.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct NodeKernel {
@@ -118,6 +115,18 @@ impl NodeKernel {
         Self { at, samples: mirror.restored(&self.samples, (at.rows, at.columns)) }
     }
 
+    /// Returns what it leaves of fine gratings, along rows or columns: the rms contrast over all that samples hold, the finest counting the most, from 1 for a point to 0.
+    pub(crate) fn left_of_detail(&self) -> f64 {
+        let (by_row, by_column) = sums_of_lines(&self.samples, self.at.columns);
+        // Half the sum of squared differences is the mean over frequencies of squared contrasts times sin² (Parseval).
+        let left = |sums: Vec<f64>| {
+            let next = sums.iter().skip(1).chain([&0.0]);
+            let steps = sums.iter().zip(next).map(|(sum, next)| (sum - next).powi(2));
+            (0.5 * (steps.sum::<f64>() + sums[0].powi(2))).sqrt()
+        };
+        left(by_row).max(left(by_column))
+    }
+
     /// Returns the variances of the light, down and across, in samples².
     pub(crate) fn variances(&self) -> [f64; 2] {
         let (by_row, by_column) = sums_of_lines(&self.samples, self.at.columns);
@@ -150,7 +159,7 @@ fn lit_part(sums: &[f64], sum: f64) -> (usize, usize) {
         let mut left_out = 0.0;
         let is_dark = |part: &&f64| {
             left_out += **part;
-            left_out <= LEFT_OUT * sum
+            left_out <= Kernel::NEGLIGIBLE * sum
         };
         sums.take_while(is_dark).count()
     };
@@ -226,19 +235,13 @@ impl LayerKernels {
 
 /// Returns the largest magnitude of the edge spread functions, along rows and columns, of a kernel.
 pub(crate) fn edge_spread_peak(kernel: &[f32], width: usize) -> f64 {
-    let mut by_column = vec![0.0_f64; width];
-    let (mut down, mut peak) = (0.0_f64, 0.0_f64);
-    for line in kernel.chunks_exact(width) {
-        for (sum, &value) in by_column.iter_mut().zip(line) {
-            *sum += f64::from(value);
-        }
-        down += line.iter().map(|&value| f64::from(value)).sum::<f64>();
-        peak = peak.max(down.abs());
-    }
-    let mut right = 0.0;
-    for sum in by_column {
-        right += sum;
-        peak = peak.max(right.abs());
-    }
-    peak
+    let (by_row, by_column) = sums_of_lines(kernel, width);
+    let peak = |sums: Vec<f64>| {
+        let mut edge = 0.0_f64;
+        sums.iter().fold(0.0_f64, |peak, sum| {
+            edge += sum;
+            peak.max(edge.abs())
+        })
+    };
+    peak(by_row).max(peak(by_column))
 }

@@ -34,11 +34,8 @@ pub(crate) struct Guesses {
     places: Vec<(u32, u32)>,
 }
 
-/// How much farther than the first surface something must lie to be known as behind it, of a jump of depth: roundings.
-const LEAST_BEHIND: f32 = 0.05;
-
-/// A change of blur radius between neighbors from which on an edge shows what is known to lie behind it, pixels: far less than what a guess
-/// takes for an edge, since what is known does no harm beside a slope.
+/// A change of blur radius between neighbors from which on an edge shows what is known to lie behind it, half that far at least, pixels: far less than what a
+/// guess takes for an edge, since what is known does no harm beside a slope.
 const KNOWN_EDGE_PX: f32 = 0.5;
 
 /// Where the samples of a scene lie, in pixels of blur radius behind the nearest.
@@ -59,8 +56,8 @@ impl Distances {
     }
 
     /// Whether it is known what lies behind a sample.
-    pub(crate) fn is_known_behind(&self, at: (usize, usize), jump: f32) -> bool {
-        self.behind.as_ref().is_some_and(|behind| behind[at] > self.front[at] + LEAST_BEHIND * jump)
+    pub(crate) fn is_known_behind(&self, at: (usize, usize)) -> bool {
+        self.behind.as_ref().is_some_and(|behind| behind[at] > self.front[at] + 0.5 * KNOWN_EDGE_PX)
     }
 }
 
@@ -72,25 +69,25 @@ impl OccludedSamples {
         scene_per_film: f64,
         cancel: &Cancel,
     ) -> Result<Self, Cancelled> {
-        let reach =
-            |distance: f32| layers.radius_px_at(layers.coordinate_of_distance(distance)) as f32 * scene_per_film as f32;
+        // A pixel looks past an edge as far within as the near side is blurred. On the other side of the focus rays go on inwards: they see as far as both blurs together.
+        let radius_px = |distance: f32| layers.radius_px_at(layers.coordinate_of_distance(distance)) as f32;
+        let reach = |near: f32, far: f32| radius_px(near).max(radius_px(far)).max(far - near) * scene_per_film as f32;
         let rule = EdgeRule { jump: DEPTH_EDGE_PX, reach: &reach };
         let Distances { front, behind } = distances;
         let size = front.dim();
         if let Some(known) = behind {
-            let known_rule = EdgeRule { jump: rule.jump.min(KNOWN_EDGE_PX), reach: rule.reach };
+            let known_rule = EdgeRule { jump: KNOWN_EDGE_PX, reach: rule.reach };
             let reach = reach_of_edges(front, &known_rule, cancel)?;
             let fill = Fill::find(front, &rule, cancel)?;
             let is_guessed = |row: usize, column: usize| {
-                !distances.is_known_behind((row, column), rule.jump) && !fill.distances[(row, column)].is_nan()
+                !distances.is_known_behind((row, column)) && !fill.distances[(row, column)].is_nan()
             };
             let place = |row: usize, column: usize| {
                 if is_guessed(row, column) {
                     return layers.coordinate_of_distance(fill.distances[(row, column)]);
                 }
                 let distance = known[(row, column)];
-                let shows =
-                    reach[row * size.1 + column] > 0.0 && distance > front[(row, column)] + 0.5 * known_rule.jump;
+                let shows = reach[row * size.1 + column] > 0.0 && distances.is_known_behind((row, column));
                 if shows { layers.coordinate_of_distance(distance) } else { f32::NAN }
             };
             let layer_coordinates = LayerCoordinates::new(plane_of(size, cancel, place)?, cancel)?;

@@ -4,13 +4,10 @@ use dioptric_psf::{FieldsAlong, FilmMap};
 use dioptric_scene::View;
 use multiversion::multiversion;
 
-use crate::Border;
+use crate::{Border, raster::BLOCK};
 
 /// Stands for the square of a point that looks at nothing.
 pub(crate) const UNSEEN: u32 = u32::MAX;
-
-/// Points from one at which the map is looked up to the next; between them positions follow cubics.
-const APART: usize = 8;
 
 /// The samples of a scene, the directions that they are seen in, and what lies beyond its edges.
 #[derive(Clone, Copy, Debug)]
@@ -95,9 +92,10 @@ impl Places {
         (first_mm, step_mm, y_mm): (f64, f64, f64),
     ) {
         // One look-up before the first point and two behind the last.
-        let n_looked_up = n.div_ceil(APART) + 3;
+        let apart = BLOCK as usize;
+        let n_looked_up = n.div_ceil(apart) + 3;
         self.x_mm.clear();
-        self.x_mm.extend((0..n_looked_up).map(|i| first_mm + step_mm * APART as f64 * (i as f64 - 1.0)));
+        self.x_mm.extend((0..n_looked_up).map(|i| first_mm + step_mm * apart as f64 * (i as f64 - 1.0)));
         map.along(&self.x_mm, y_mm, &mut self.seen);
         let FieldsAlong { tan_x, tan_y, .. } = &self.seen;
         self.positions.iter_mut().for_each(Vec::clear);
@@ -118,12 +116,13 @@ impl Places {
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2", "aarch64+neon"))]
 fn locate(scene: &SceneRaster, places: &mut Places) {
     let Places { first, down, across, light, positions: [rows, columns], .. } = places;
-    let chunks = first.chunks_mut(APART).zip(down.chunks_mut(APART));
-    let chunks = chunks.zip(across.chunks_mut(APART).zip(light.chunks_mut(APART)));
+    let apart = BLOCK as usize;
+    let chunks = first.chunks_mut(apart).zip(down.chunks_mut(apart));
+    let chunks = chunks.zip(across.chunks_mut(apart).zip(light.chunks_mut(apart)));
     for (i, ((first, down), (across, light))) in chunks.enumerate() {
         let (row, column) = (Cubic::through(&rows[i..]), Cubic::through(&columns[i..]));
         for k in 0..first.len() {
-            let at = k as f64 / APART as f64;
+            let at = k as f64 / apart as f64;
             let (row, column) = (row.at(at), column.at(at));
             if !(row.abs() < 1e9 && column.abs() < 1e9) {
                 (first[k], down[k], across[k], light[k]) = (UNSEEN, 0.0, 0.0, 0.0);

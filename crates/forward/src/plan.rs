@@ -69,6 +69,15 @@ impl ImagingPlan {
         self.views.first().scene.narrow_fraction
     }
 
+    /// The part of the film from which some rays pass behind all surfaces that are known or guessed: the first one and what a second layer holds.
+    ///
+    /// What they would see there is not imaged: the light of such a pixel is that of its other rays.
+    pub fn unknown_fraction(&self) -> f64 {
+        let (sum, n) =
+            self.views.imagings().iter().fold((0.0, 0.0), |(sum, n), part| (sum + part.unknown_fraction(), n + 1.0));
+        sum / n
+    }
+
     /// How many of the points beside the scene lie behind its first surface, and how many where no point of the film looks.
     pub fn points_unseen(&self) -> (usize, usize) {
         self.views.first().points_unseen()

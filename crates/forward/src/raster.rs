@@ -2,6 +2,9 @@
 
 use crate::Film;
 
+/// Pixels along a side of a block, over which places in the scene are interpolated.
+pub(crate) const BLOCK: i64 = 8;
+
 /// The width of a raster's samples: pixels of the film times a power of two.
 ///
 /// −1 is half a pixel, 0 a pixel, 1 two pixels. Blur that is wide is imaged on wide samples, detail below a pixel on narrow ones.
@@ -11,8 +14,14 @@ pub(crate) struct Level(pub(crate) i8);
 impl Level {
     /// The film's own pixels.
     pub(crate) const PIXEL: Self = Self(0);
-    /// Half of them.
+    /// Halves of them, and eighths: the finest.
     pub(crate) const HALF: Self = Self(-1);
+    pub(crate) const EIGHTH: Self = Self(-3);
+
+    /// The finest parts of pixels of which each is as wide as a sample of a scene, or wider, where so many lie along a pixel.
+    pub(crate) fn of_density(density: usize) -> Self {
+        Self(-(density.ilog2() as i8))
+    }
 
     /// Pixels of the film from one sample to the next.
     pub(crate) fn step_px(self) -> f64 {
@@ -93,7 +102,7 @@ mod tests {
     fn samples_of_all_levels_lie_symmetrically() {
         for (rows, columns) in [(4, 6), (5, 7)] {
             let film = Film::centered(rows, columns, 2.0);
-            for level in [Level::HALF, Level::PIXEL, Level(1), Level(3)] {
+            for level in [Level::EIGHTH, Level::HALF, Level::PIXEL, Level(1), Level(3)] {
                 let raster = Raster::new(&film, level);
                 // The mirror image of a column is one too.
                 let mirrored = raster.column_before(-raster.across_px(2));

@@ -52,9 +52,20 @@ impl<'a> Ray<'a> {
         }
         if self.last.layer < layer {
             // A surface in it may be too small to have been met: what lies before it is passed.
-            self.paths.iter_mut().for_each(|path| path.pass(layer, f32::NAN, |_| f32::NAN));
+            self.pass_to(layer);
         }
         self.reaches(layer)
+    }
+
+    /// Whether it ends in any of the surfaces that it has passed.
+    pub(crate) fn ends(mut self) -> bool {
+        self.pass_to(self.last.layer + 2);
+        self.paths.iter().any(|path| path.ends != usize::MAX)
+    }
+
+    /// Passes what lies before a layer in which there is nothing.
+    fn pass_to(&mut self, layer: usize) {
+        self.paths.iter_mut().for_each(|path| path.pass(layer, f32::NAN, |_| f32::NAN));
     }
 
     /// Whether it reaches a layer.

@@ -26,13 +26,14 @@ pub fn render(
     progress: &(dyn Fn(f64) + Sync),
     sink: &mut Sink<'_>,
 ) -> Result<(), ForwardError> {
-    const PLANNED: f64 = 0.05;
     let spec = ImagingSpec { film: *film, grid: source.radiance.grid().clone(), settings: *settings };
     source.light().check(source.geometry().size(), &spec.grid)?;
     let cancel = Cancel::new();
     let framed = Framed { lens, center_mm: film.center_mm };
     let lens: &dyn LensImage = if film.is_centered() { lens } else { &framed };
     progress(0.0);
-    let views = Views::of(lens, &source.geometry(), &spec, (progress, (0.0, PLANNED)), &cancel)?;
-    views.stream_from(0, lens, &source.light(), &Watch { progress, range: (PLANNED, 1.0), cancel: &cancel }, sink)
+    // Planning takes about as long as a band.
+    let planned = 1.0 / (1 + spec.grid.len()) as f64;
+    let views = Views::of(lens, &source.geometry(), &spec, (progress, (0.0, planned)), &cancel)?;
+    views.stream_from(0, lens, &source.light(), &Watch { progress, range: (planned, 1.0), cancel: &cancel }, sink)
 }

@@ -16,9 +16,6 @@ use crate::{
     work::plane_of,
 };
 
-/// How far the film is surveyed at first, over half its diagonal: most blurs take light from no farther.
-const SURVEYED: f64 = 1.12;
-
 /// A scene laid in layers of depth by the blur of a lens.
 pub(crate) struct SceneLayers {
     pub(crate) layers: Layers,
@@ -47,8 +44,8 @@ impl SceneLayers {
         film.check()?;
         settings.check()?;
         scene.check()?;
-        // What is asked of the lens is asked of one survey of its film, a little wider than the picture.
-        let map = lens.film_map(grid.centers_nm()[grid.len() / 2], SURVEYED * film.half_diagonal_mm());
+        // What is asked of the lens is asked of one survey of its film.
+        let map = lens.film_map(grid.centers_nm()[grid.len() / 2], film.half_diagonal_mm());
         let (near_m, far_m) = scene.depth.range_m();
         let (pitch_mm, places_mm) = (1e-3 * film.pitch_um, places_over(lens, film));
         let blurs = Blurs { lens, pitch_mm, places_mm: &places_mm, wavelengths_nm: grid.centers_nm() };

@@ -9,10 +9,9 @@ use rayon::prelude::*;
 
 use crate::{
     Border, Film,
-    blocks::BLOCK,
     layers::DEPTH_EDGE_PX,
     places::{SceneRaster, folded},
-    raster::{Level, Raster},
+    raster::{BLOCK, Level, Raster},
     rectangle::Rectangle,
     scene_layers::SceneLayers,
     tile::film_pixels,

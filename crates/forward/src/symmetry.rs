@@ -2,7 +2,7 @@
 
 use dioptric_psf::LensImage;
 
-use crate::rectangle::Rectangle;
+use crate::{convolve::BATCH, rectangle::Rectangle};
 
 /// A point of the film at which a lens's kernel is computed: pixels to the right of the film's middle and below it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -170,8 +170,6 @@ impl Turned {
         (to, to_stride): (&mut [B], usize),
         put: impl Fn(&mut B, A),
     ) {
-        /// Rows that become columns together.
-        const BATCH: usize = 8;
         let row_at = |row: usize| &from[if self.flips_rows { rows - 1 - row } else { row } * from_stride..][..columns];
         if !self.swaps {
             for (row, to) in to.chunks_mut(to_stride).take(rows).enumerate() {

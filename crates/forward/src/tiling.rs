@@ -22,17 +22,15 @@ use crate::{
     work::Work,
 };
 
-/// The least side of a tile, in samples of its raster.
+/// The least side of a tile, in samples of its raster, on which blurs have radii of up to four times as many.
 const LEAST_TILE: i32 = 16;
-/// The same over the radius of what a point becomes there.
-const LEAST_OF_BLUR: f64 = 0.25;
-/// The largest side of a tile, pixels.
-const LARGEST_TILE_PX: i32 = 2048;
 /// How far kernels reach beyond the radius that holds 95 % of a blur: twice as far, and some pixels.
 const REACH: (f64, f64) = (2.0, 8.0);
 /// Standard deviations of kernels, pixels, between which detail below a pixel is imaged as such: below, points stay points; above, none of it is left, nor of what it is
 /// folded to on pixels.
 const FINE_BLUR_PX: Range<f64> = 0.05..4.0;
+/// What a kernel on parts of pixels may leave of fine gratings: a Gaussian of 1.2 samples leaves it. Of more, finer parts are taken.
+const LEFT_OF_DETAIL: f64 = 0.2;
 
 /// A lens before a film, whose layers of depth are imaged.
 #[derive(Clone, Copy)]
@@ -191,7 +189,7 @@ impl Rule<'_> {
         let LayeredLens { film, .. } = self.lens;
         let sharpest = self.spread_px(layer, Node { right: 0, down: 0 });
         let pixels = self.level_for(sharpest).pixels() as i32;
-        let mut tiles = Tile::over(film, (self.settings.tile_px as i32 * pixels).min(LARGEST_TILE_PX));
+        let mut tiles = Tile::over(film, self.settings.tile_px as i32 * pixels);
         let mut known = LayerKernels::new(symmetry, BTreeMap::new());
         let mut made = LayerTiles::default();
         while !tiles.is_empty() {
@@ -228,7 +226,7 @@ impl Rule<'_> {
                             .filter(|tile| tile.pixels(film).is_some()),
                     );
                 } else {
-                    self.take(layer, group, symmetry, &mut made);
+                    self.take(group, symmetry, &mut made);
                 }
             }
         }
@@ -249,14 +247,16 @@ impl Rule<'_> {
         };
         let members: Vec<(Tile, Mirror)> = members.into_iter().filter(has_any).collect();
         let level = self.level_for(least);
-        let half = canonical.size / 2;
-        let can_be_cut = half >= LEAST_TILE * level.pixels() as i32 && f64::from(half) >= LEAST_OF_BLUR * most;
-        (!members.is_empty()).then_some(Candidate { canonical, members, level, can_be_cut })
+        let can_be_cut = canonical.size / 2 >= LEAST_TILE * level.pixels() as i32;
+        let most = members.iter().map(|(tile, _)| self.density(tile)).max()?;
+        let is_finer = level == Level::PIXEL && self.settings.subpixels && most > 1;
+        let finest = if is_finer { self.finer_level(layer, canonical.center(), most) } else { None };
+        Some(Candidate { canonical, members, level, finest, can_be_cut })
     }
 
     /// Returns the largest error of the edge spread functions in the middle of a tile, along rows and columns.
     fn error(&self, kernels: &LayerKernels, group: &Candidate) -> f64 {
-        let at = |node: Node| kernels.at((node, group.level));
+        let at = |node: Node| kernels.at((node, group.judged()));
         let (corners, middle) = (group.canonical.corners().map(at), at(group.canonical.center()));
         let terms: Vec<(&NodeKernel, f32)> =
             corners.iter().map(|kernel| (kernel, -0.25)).chain([(&middle, 1.0)]).collect();
@@ -264,34 +264,44 @@ impl Rule<'_> {
         edge_spread_peak(&difference.samples, difference.at.columns)
     }
 
+    /// The most samples of the scene along a pixel of a tile.
+    fn density(&self, tile: &Tile) -> usize {
+        let range = |start: i32| f64::from(start)..f64::from(start + tile.size);
+        self.blocks.most_density(range(tile.down), range(tile.right))
+    }
+
     /// Adds tiles that need not be cut.
-    fn take(&self, layer: usize, group: Candidate, symmetry: Symmetry, made: &mut LayerTiles) {
-        let Candidate { canonical, members, level, .. } = group;
+    fn take(&self, group: Candidate, symmetry: Symmetry, made: &mut LayerTiles) {
+        let Candidate { canonical, members, level, finest, .. } = group;
         let mut add = |canonical: Tile, members: Vec<(Tile, Mirror)>, level: Level| {
             made.nodes.extend(canonical.corners().map(|node| (symmetry.canonical(node), level)));
             made.groups.push(TileGroup { level, canonical, members });
         };
-        if level != Level::PIXEL || !self.settings.subpixels {
-            return add(canonical, members, level);
-        }
-        // Where the scene is finer than the film and the blur leaves detail, tiles are imaged on half pixels, each by itself.
-        let is_finer = |(tile, _): &(Tile, Mirror)| {
-            let range = |start: i32| f64::from(start)..f64::from(start + tile.size);
-            self.blocks.most_density(range(tile.down), range(tile.right)) > 1
-        };
-        let (finer, others): (Vec<_>, Vec<_>) = members.into_iter().partition(is_finer);
-        let leaves_detail = || {
-            let [down, across] = self.lens.kernel(layer, (canonical.center(), Level::HALF), self.middle_nm).variances();
-            let sigma_px = |variance: f64| variance.sqrt() * Level::HALF.step_px();
-            sigma_px(down.min(across)) < FINE_BLUR_PX.end && sigma_px(down.max(across)) > FINE_BLUR_PX.start
-        };
-        if !finer.is_empty() && leaves_detail() {
-            finer.into_iter().for_each(|(tile, _)| add(tile, vec![(tile, Mirror::default())], Level::HALF));
-        } else if !finer.is_empty() {
-            add(canonical, finer, level);
+        let Some(finest) = finest else { return add(canonical, members, level) };
+        // Where the scene is finer than the film and the blur leaves detail, tiles are imaged on parts of pixels, each by itself.
+        let (finer, others): (Vec<_>, Vec<_>) = members.into_iter().partition(|(tile, _)| self.density(tile) > 1);
+        for (tile, _) in finer {
+            add(tile, vec![(tile, Mirror::default())], finest.max(Level::of_density(self.density(&tile))));
         }
         if !others.is_empty() {
             add(canonical, others, level);
+        }
+    }
+
+    /// Returns the parts of pixels that hold what the kernel about a node leaves of a scene with so many samples along a pixel, if it leaves anything finer than pixels.
+    fn finer_level(&self, layer: usize, node: Node, density: usize) -> Option<Level> {
+        let mut level = Level::HALF;
+        loop {
+            let kernel = self.lens.kernel(layer, (node, level), self.middle_nm);
+            let sigmas_px = kernel.variances().map(|variance| variance.sqrt() * level.step_px());
+            if sigmas_px[0].min(sigmas_px[1]) >= FINE_BLUR_PX.end {
+                return None;
+            }
+            let is_finest = level == Level::EIGHTH.max(Level::of_density(density));
+            if is_finest || kernel.left_of_detail() < LEFT_OF_DETAIL {
+                return (sigmas_px[0].max(sigmas_px[1]) > FINE_BLUR_PX.start).then_some(level);
+            }
+            level = Level(level.0 - 1);
         }
     }
 
@@ -311,13 +321,20 @@ struct Candidate {
     canonical: Tile,
     members: Vec<(Tile, Mirror)>,
     level: Level,
+    /// The finest parts of pixels that any is imaged on.
+    finest: Option<Level>,
     can_be_cut: bool,
 }
 
 impl Candidate {
+    /// The samples on which kernels tell.
+    fn judged(&self) -> Level {
+        self.finest.unwrap_or(self.level)
+    }
+
     /// The nodes whose kernels tell.
     fn looked_at(&self) -> Vec<NodeAt> {
         let nodes = self.canonical.corners().into_iter().chain([self.canonical.center()]);
-        if self.can_be_cut { nodes.map(|node| (node, self.level)).collect() } else { vec![] }
+        if self.can_be_cut { nodes.map(|node| (node, self.judged())).collect() } else { vec![] }
     }
 }

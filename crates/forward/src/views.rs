@@ -57,6 +57,11 @@ impl Views {
         &self.imagings[0]
     }
 
+    /// One of each part of the pupil, or of the whole.
+    pub(crate) fn imagings(&self) -> &[Imaging] {
+        &self.imagings
+    }
+
     pub(crate) fn imagings_mut(&mut self) -> &mut [Imaging] {
         &mut self.imagings
     }

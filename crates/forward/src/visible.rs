@@ -7,10 +7,10 @@ use rayon::prelude::*;
 
 use crate::{
     Film,
-    blocks::BLOCK,
     coverage::Gathered,
-    layers::tent,
+    layers::{DEPTH_EDGE_PX, IN_FOCUS_PX, tent},
     node_kernels::{LayerKernels, NodeKernel},
+    raster::BLOCK,
     ray::Ray,
     rectangle::Rectangle,
     sight::{Met, NearEdges, Sight, widest_px},
@@ -26,25 +26,25 @@ pub(crate) struct Visible {
     sight: Sight,
     /// By row and column of each block of pixels, as counted from the film's middle.
     blocks: BTreeMap<(i64, i64), BlockParts>,
+    /// The part of the film from which rays pass behind all surfaces that are known.
+    pub(crate) unknown_fraction: f64,
 }
 
 /// The parts that are seen at points over a block.
 struct BlockParts {
     /// Pixels from point to point.
     step: usize,
-    /// Of layers of which more or less is seen than of all that lies behind what is before them: the ratio over [`ONE`], row by row.
-    by_layer: Vec<(u16, Vec<u16>)>,
+    /// Of layers of which more or less is seen than of all that lies behind what is before them: the ratio, row by row.
+    by_layer: Vec<(u16, Vec<f32>)>,
+    /// The part of the points from which rays come to no surface.
+    unknown_fraction: f64,
 }
 
-/// Blur radii between which rays begin to tell parts of the pupil apart, pixels: what a point in focus becomes is aberrations and pixels.
-const TELLS_APART_PX: (f32, f32) = (1.0, 3.0);
 /// Rays along the radius of a bundle.
 const ALONG_RADIUS: usize = 5;
 /// Points over the blur radius of a near side.
 const POINTS_OF_RADIUS: f32 = 6.0;
-/// What stands for 1 among ratios.
-const ONE: f32 = 1024.0;
-/// Part of the rays that must meet a layer to tell what is seen of it; of less, all rays tell.
+/// Part of the rays that must meet a layer to tell what is seen of it, of less all rays tell; or nothing, to be worth telling.
 const FEW_RAYS: f32 = 0.02;
 
 impl Visible {
@@ -70,13 +70,15 @@ impl Visible {
             Ok(BlockParts::of(&sight, &at, &bundle).map(|parts| (block, parts)))
         });
         let parts: Vec<Option<((i64, i64), BlockParts)>> = parts.collect::<Result<_, Cancelled>>()?;
-        let blocks = parts.into_iter().flatten().collect();
-        Ok(Self { sight, blocks })
+        let blocks: BTreeMap<(i64, i64), BlockParts> = parts.into_iter().flatten().collect();
+        let unknown: f64 = blocks.values().map(|block| block.unknown_fraction).sum();
+        let unknown_fraction = unknown * (BLOCK * BLOCK) as f64 / pixels.len() as f64;
+        Ok(Self { sight, blocks, unknown_fraction: unknown_fraction.min(1.0) })
     }
 
     pub(crate) fn size_bytes(&self) -> usize {
         let ratios = self.blocks.values().flat_map(|block| &block.by_layer).map(|(_, ratios)| ratios.len());
-        self.sight.size_bytes() + size_of::<u16>() * ratios.sum::<usize>()
+        self.sight.size_bytes() + size_of::<f32>() * ratios.sum::<usize>()
     }
 
     /// Takes from what pixels gather of a layer what they do not see of it, `open` being the part of their pupils that layers well before it leave.
@@ -118,9 +120,9 @@ impl Visible {
     }
 }
 
-/// How far rays through the pupil of a blur radius tell parts of it apart; in focus all of it sees the same.
+/// How far rays through the pupil of a blur radius tell parts of it apart: as far as an edge of depth does wholly, and in focus, where all of it sees the same, not at all.
 fn told(radius_px: f32) -> f32 {
-    (radius_px.abs() - TELLS_APART_PX.0) / (TELLS_APART_PX.1 - TELLS_APART_PX.0)
+    (radius_px.abs() - IN_FOCUS_PX) / (DEPTH_EDGE_PX - IN_FOCUS_PX)
 }
 
 /// Rays through a pupil: where each goes in a layer of a blur radius of 1 pixel, and its weight.
@@ -169,22 +171,22 @@ impl Bundle {
 
 impl BlockParts {
     /// Returns the ratios of a layer, if they are not all 1.
-    fn of_layer(&self, layer: usize) -> Option<&[u16]> {
+    fn of_layer(&self, layer: usize) -> Option<&[f32]> {
         let found = self.by_layer.binary_search_by_key(&(layer as u16), |(layer, _)| *layer);
         found.ok().map(|found| self.by_layer[found].1.as_slice())
     }
 
     /// Returns the ratio at a pixel, between points.
-    fn ratio(&self, ratios: &[u16], (row, column): (i64, i64)) -> f32 {
+    fn ratio(&self, ratios: &[f32], (row, column): (i64, i64)) -> f32 {
         let (step, points) = (self.step, BLOCK as usize / self.step + 1);
         let split = |pixel: i64| {
             let within = pixel.rem_euclid(BLOCK) as usize;
             (within / step, (within % step) as f32 / step as f32)
         };
         let ((row, down), (column, across)) = (split(row), split(column));
-        let at = |row: usize, column: usize| f32::from(ratios[row * points + column]);
+        let at = |row: usize, column: usize| ratios[row * points + column];
         let along = |row: usize| at(row, column) + across * (at(row, column + 1) - at(row, column));
-        (along(row) + down * (along(row + 1) - along(row))) / ONE
+        along(row) + down * (along(row + 1) - along(row))
     }
 
     /// Draws the bundles of points over a block that pass edges out of focus; `None` where no bundle passes an edge.
@@ -201,34 +203,39 @@ impl BlockParts {
         let first = met.first()?.layer;
         let is_told = |met: &Met| met.layer > first + 1 && told(met.radius_px) > 0.0;
         if told(edges.most_px) <= 0.0 || !met.iter().any(is_told) {
-            return Some(Self { step: 1, by_layer: vec![] });
+            return Some(Self { step: 1, by_layer: vec![], unknown_fraction: 0.0 });
         }
         let bundle = bundle(&met)?;
         let points = BLOCK as usize / step + 1;
-        let mut by_layer: Vec<(u16, Vec<u16>)> =
+        let mut by_layer: Vec<(u16, Vec<f32>)> =
             met.iter().map(|met| (met.layer as u16, Vec::with_capacity(points * points))).collect();
         let mut sums = vec![[0.0; 3]; met.len()];
+        let mut n_unknown = 0;
         let corner = (at.first_row.div_euclid(BLOCK) * BLOCK, at.first_column.div_euclid(BLOCK) * BLOCK);
         for (row, column) in (0..points).flat_map(|row| (0..points).map(move |column| (row, column))) {
             let pixel = (corner.0 + (row * step) as i64, corner.1 + (column * step) as i64);
-            bundle.seen_from(sight, sight.place_px(pixel), &met, &mut sums);
+            if bundle.seen_from(sight, sight.place_px(pixel), &met, &mut sums) > FEW_RAYS {
+                n_unknown += 1;
+            }
             for ((_, ratios), [seen, all, open]) in by_layer.iter_mut().zip(&sums) {
                 // Of what is open the share that sees it, over that of all that would.
                 let of_open = if *open > 0.0 { seen / open } else { 0.0 };
-                ratios.push((ONE * (of_open + FEW_RAYS) / (all + FEW_RAYS)).round() as u16);
+                ratios.push((of_open + FEW_RAYS) / (all + FEW_RAYS));
             }
         }
-        by_layer.retain(|(_, ratios)| ratios.iter().any(|ratio| f32::from(*ratio) != ONE));
-        Some(Self { step, by_layer })
+        by_layer.retain(|(_, ratios)| ratios.iter().any(|ratio| (ratio - 1.0).abs() > f32::EPSILON.sqrt()));
+        Some(Self { step, by_layer, unknown_fraction: f64::from(n_unknown) / (points * points) as f64 })
     }
 }
 
 impl Bundle {
-    /// Follows the rays from a place layer by layer: of each layer, the part of the rays that see it, of those that would without what lies before, and of all that are open.
-    fn seen_from(&self, sight: &Sight, place: (f32, f32), met: &[Met], sums: &mut [[f32; 3]]) {
+    /// Follows the rays from a place layer by layer: of each layer, the part of the rays that see it, of those that would without what lies before, and of all that are open. Returns
+    /// the part that comes to no surface.
+    fn seen_from(&self, sight: &Sight, place: (f32, f32), met: &[Met], sums: &mut [[f32; 3]]) -> f32 {
         sums.fill([0.0; 3]);
         let total: f32 = self.rays.iter().map(|(_, weight)| weight).sum();
         let widest_px = widest_px(met);
+        let mut unknown = 0.0;
         for ([down, across], weight) in &self.rays {
             let weight = weight / total;
             let mut ray = Ray::new(sight, place, (*down, *across), widest_px);
@@ -241,6 +248,8 @@ impl Bundle {
                     sums[2] += weight;
                 }
             }
+            unknown += if ray.ends() { 0.0 } else { weight };
         }
+        unknown
     }
 }

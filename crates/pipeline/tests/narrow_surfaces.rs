@@ -60,3 +60,25 @@ fn surfaces_narrower_than_the_pupil_are_stated() {
     assert_eq!(narrow(slats(54, true), BlurSpec::Layered), None);
     assert_eq!(narrow(slats(14, true), BlurSpec::Pointwise), None);
 }
+
+/// Two rows of slats before the wall, the nearer ones over the edges of the others: the second layer shows these, and not what lies behind both.
+#[test]
+fn what_lies_behind_two_surfaces_is_said_to_be_unknown() {
+    let mut scene = slats(14, true);
+    let depth = scene.depth.take().unwrap().z_m().clone();
+    let is_second = |column: usize| (7..28).contains(&(column % 70));
+    let with_second =
+        |z_m: &Array2<f32>| Array2::from_shape_fn(SIZE, |at| if is_second(at.1) { z_m[at].min(1.6) } else { z_m[at] });
+    scene.depth = Some(DepthMap::new(with_second(&depth)).unwrap());
+    let hidden = scene.hidden.as_mut().unwrap();
+    hidden.depth = DepthMap::new(with_second(hidden.depth.z_m())).unwrap();
+    let unknown = |scene| {
+        let capture = capture(scene, BlurSpec::Layered, Quality::Preview);
+        capture.irradiance.summary.narrow_surfaces.unwrap()
+    };
+    let found = unknown(scene);
+    assert!((0.05..0.5).contains(&found.unknown_fraction), "{found:?}");
+    assert!(found.note_on_unknown().unwrap().contains("two surfaces"), "{found:?}");
+    let found = unknown(slats(14, true));
+    assert!(found.unknown_fraction < 1e-3 && found.note_on_unknown().is_none(), "{found:?}");
+}

@@ -262,7 +262,8 @@ impl RunReport {
                 light_temperature: scene.light.as_ref().map(|light| light.illuminant.color_temperature()),
                 notes: {
                     let narrow = capture.irradiance.summary.narrow_surfaces;
-                    let narrow = narrow.and_then(|narrow| narrow.note());
+                    let narrow =
+                        narrow.into_iter().flat_map(|narrow| [narrow.note(), narrow.note_on_unknown()]).flatten();
                     let points = capture.irradiance.summary.unseen_points.and_then(|points| points.note());
                     let notes = scene.notes.iter().cloned().chain(narrow).chain(points);
                     notes.chain(note_on_coarse_samples(run)).chain(note_on_panorama(run)).collect()

@@ -1,4 +1,4 @@
-//! What of a scene is narrower than the pupil: there layers of depth are least exact.
+//! Where layers of depth are least exact: beside what is narrower than the pupil, and behind what is known.
 
 use dioptric_forward::ImagingPlan;
 use dioptric_scene::Scene;
@@ -15,13 +15,28 @@ pub struct NarrowSurfaces {
     pub fraction: f64,
     /// Whether the scene has a second layer, which shows what lies behind.
     pub is_known_behind: bool,
+    /// The share of the film from which a part of the pupil looks behind all that the scene tells, or that is guessed of it.
+    #[serde(default)]
+    pub unknown_fraction: f64,
 }
 
 impl NarrowSurfaces {
     /// Returns those of a scene; `None` where nothing is narrow.
     pub(super) fn of(plan: &ImagingPlan, scene: &Scene) -> Option<Self> {
-        let fraction = plan.narrow_fraction();
-        (fraction > 0.0).then_some(Self { fraction, is_known_behind: scene.hidden.is_some() })
+        let (fraction, unknown_fraction) = (plan.narrow_fraction(), plan.unknown_fraction());
+        let is_known_behind = scene.hidden.is_some();
+        (fraction.max(unknown_fraction) > 0.0).then_some(Self { fraction, is_known_behind, unknown_fraction })
+    }
+
+    /// Returns a note on what is not known at all, where it is worth one.
+    pub fn note_on_unknown(&self) -> Option<String> {
+        (self.unknown_fraction >= LEAST_NOTED).then(|| {
+            format!(
+                "{:.0} % of the film looks past the edges of two surfaces, one behind the other: the scene has no more than two layers, and what lies \
+                 behind both is taken for what is seen beside it",
+                100.0 * self.unknown_fraction
+            )
+        })
     }
 
     /// Returns a note for the user, where there is something to do about it.
