@@ -70,7 +70,7 @@ impl TileKernels {
             corners.iter().zip(factors).for_each(|(kernel, factor)| kernel.add_to(&mut samples, &at, factor));
             let largest = if down && across { 0.25 } else { 0.5 };
             let is_mean = !(down || across);
-            let is_needed = is_mean || largest * edge_spread_peak(&samples, at.columns, 1) > NEGLIGIBLE_EDGE;
+            let is_needed = is_mean || largest * edge_spread_peak(&samples, at.columns) > NEGLIGIBLE_EDGE;
             is_needed.then_some(Term { down, across, samples })
         };
         Self { at, terms: terms.into_iter().filter_map(term).collect() }

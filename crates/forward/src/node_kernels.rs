@@ -233,19 +233,15 @@ impl LayerKernels {
     }
 }
 
-/// Returns the largest magnitude of the edge spread functions, along rows and columns, of a kernel, as means over pixels of so many samples.
-pub(crate) fn edge_spread_peak(kernel: &[f32], width: usize, per_pixel: usize) -> f64 {
+/// Returns the largest magnitude of the edge spread functions, along rows and columns, of a kernel.
+pub(crate) fn edge_spread_peak(kernel: &[f32], width: usize) -> f64 {
     let (by_row, by_column) = sums_of_lines(kernel, width);
     let peak = |sums: Vec<f64>| {
-        let mut edge = vec![0.0; per_pixel];
-        let mut sum = 0.0;
-        edge.extend(sums.iter().map(|line| {
-            sum += line;
-            sum
-        }));
-        let last = edge[edge.len() - 1];
-        edge.resize(edge.len() + per_pixel, last);
-        edge.windows(per_pixel).map(|edge| edge.iter().sum::<f64>().abs()).fold(0.0, f64::max) / per_pixel as f64
+        let mut edge = 0.0_f64;
+        sums.iter().fold(0.0_f64, |peak, sum| {
+            edge += sum;
+            peak.max(edge.abs())
+        })
     };
     peak(by_row).max(peak(by_column))
 }

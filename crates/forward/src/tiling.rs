@@ -261,7 +261,7 @@ impl Rule<'_> {
         let terms: Vec<(&NodeKernel, f32)> =
             corners.iter().map(|kernel| (kernel, -0.25)).chain([(&middle, 1.0)]).collect();
         let difference = NodeKernel::sum_of(&terms);
-        edge_spread_peak(&difference.samples, difference.at.columns, group.judged().per_pixel())
+        edge_spread_peak(&difference.samples, difference.at.columns)
     }
 
     /// The most samples of the scene along a pixel of a tile.
