@@ -66,7 +66,7 @@ fn an_irradiance_is_no_scene() {
     let folder = folder();
     let bytes = spectral_exr(folder.path());
     fs::write(folder.path().join("scene.exr"), bytes).unwrap();
-    check_scene(folder.path(), &["W.m^-2.sr^-1.nm^-1"]);
+    check_scene(folder.path(), &["scene.exr", "the irradiance on a film", "dioptric sense"]);
 }
 
 #[test]
