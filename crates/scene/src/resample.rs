@@ -46,7 +46,7 @@ pub(crate) fn resampling_weights(
             what: "the range of the bands",
             value: format!("{new_first}–{new_last} nm"),
             expected: format!(
-                "centers of {least}–{most} nm: half a band's width at most beyond {first}–{last} nm, the bands of the scene"
+                "centers of {least}–{most} nm: half a band's width at most beyond {first}–{last} nm, its own bands (--wavelengths-nm asks for others)"
             ),
         });
     }

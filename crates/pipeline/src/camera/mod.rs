@@ -27,7 +27,7 @@ use dioptric_optics::{Iris, SurfaceChange};
 use dioptric_psf::{Diffraction, PsfError};
 use dioptric_sensor::{AutoExposure, ExposureControl, Metering, NoiseSources, Processing};
 use dioptric_spectrum::WavelengthGrid;
-use ron::extensions::Extensions;
+use ron::{error::Position, extensions::Extensions};
 use serde::{Deserialize, Serialize};
 
 pub use bank::RetiredBank;
@@ -303,8 +303,15 @@ impl Camera {
     /// # Errors
     /// Names the file, the line and the key that is wrong, and what was expected.
     pub fn read(path: &Path) -> Result<Self, PipelineError> {
-        let text = fs::read_to_string(path)
-            .map_err(|e| PipelineError::Read { path: path.to_owned(), reason: e.to_string() })?;
+        let text = fs::read_to_string(path).map_err(|e| {
+            let reason = match e.kind() {
+                std::io::ErrorKind::InvalidData => {
+                    "it is no text in UTF-8, expected a camera file; pictures are scenes (--scene FILE)".to_owned()
+                }
+                _ => e.to_string(),
+            };
+            PipelineError::Read { path: path.to_owned(), reason }
+        })?;
         Self::parse(&text, path)
     }
 
@@ -318,7 +325,7 @@ impl Camera {
             path: path.to_owned(),
             line: e.span.start.line,
             column: e.span.start.col,
-            reason: e.code.to_string(),
+            reason: syntax_reason(text, &e),
         })?;
         camera.check(&Checker::of_file(path, text))?;
         camera.resolve_paths(path.parent().unwrap_or(Path::new("")));
@@ -465,6 +472,31 @@ impl Camera {
     }
 }
 
+/// Returns what is wrong with the text of a camera file: after which key, and what stands there.
+fn syntax_reason(text: &str, error: &ron::error::SpannedError) -> String {
+    let Position { line, col } = error.span.start;
+    let Some(line) = text.lines().nth(line.saturating_sub(1)) else { return error.code.to_string() };
+    let split = line.char_indices().nth(col.saturating_sub(1)).map_or(line.len(), |(at, _)| at);
+    let (before, found) = line.split_at(split);
+    let key = before
+        .trim_end()
+        .strip_suffix(':')
+        .map(|before| before.rsplit(|c: char| !(c.is_ascii_alphanumeric() || c == '_')).next().unwrap_or_default());
+    let (Some(key), false) = (key.filter(|key| !key.is_empty()), found.is_empty()) else {
+        return error.code.to_string();
+    };
+    let end = match found.strip_prefix('"') {
+        Some(within) => within.find('"').map(|end| end + 2),
+        None => found.find([',', ')', ']', '}']),
+    };
+    let found: String = found[..end.unwrap_or(found.len())].chars().take(24).collect();
+    let remedy = match error.code {
+        ron::Error::ExpectedIdentifier if found.starts_with('"') => ": words of choices stand without quotes",
+        _ => "",
+    };
+    format!("{key}: {}, found {}{remedy}", error.code, found.trim_end())
+}
+
 #[cfg(test)]
 mod tests {
     use dioptric_sensor::{NoiseSource, WhiteBalance};
@@ -490,6 +522,21 @@ mod tests {
         let demo = Camera::demo().unwrap();
         demo.validate().unwrap();
         assert_eq!(parse(&demo.to_ron()).unwrap(), demo);
+    }
+
+    #[test]
+    fn what_is_no_word_of_a_choice_is_named_with_its_key() {
+        for (reading, expected) in [
+            (
+                "quantity: \"reflectance\"",
+                "quantity: Expected identifier, found \"reflectance\": words of choices stand without quotes",
+            ),
+            ("depth_kind: Disparity", "depth_kind: Expected"),
+        ] {
+            let text = SHORT.replace("File(\"scene.exr\")", &format!("File(\"scene.exr\"), reading: ({reading})"));
+            let error = parse(&text).unwrap_err().to_string();
+            assert!(error.contains(expected), "{error}");
+        }
     }
 
     #[test]

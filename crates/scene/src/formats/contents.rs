@@ -268,7 +268,8 @@ impl Cube {
                 Some(grid) => grid.centers_nm().to_vec(),
                 None => {
                     let reason = format!(
-                        "it does not tell the wavelengths of its {n} bands: expected --scene-wavelengths-nm, {n} numbers"
+                        "it does not tell the wavelengths of its {n} bands: expected --scene-wavelengths-nm, {n} numbers; \
+                         where they lie along another axis, --axes (byx: the first)"
                     );
                     return Err(unreadable(path, reason));
                 }

@@ -41,7 +41,8 @@ pub(super) fn colors_of(
         })
         .filter(|prefix| ["G", "B"].iter().all(|letter| names.contains(&full(prefix, letter))))
         .collect();
-    let listed = || prefixes.iter().map(|prefix| format!("'{prefix}'")).collect::<Vec<_>>().join(", ");
+    let shown = |prefix: &&str| if prefix.is_empty() { "one without a name".to_owned() } else { format!("'{prefix}'") };
+    let listed = || prefixes.iter().map(shown).collect::<Vec<_>>().join(", ");
     let is_called = |prefix: &&&str| is_called_picture(prefix);
     let of_picture = || prefixes.iter().find(|prefix| prefix.is_empty()).or_else(|| prefixes.iter().find(is_called));
     let prefix = match told {

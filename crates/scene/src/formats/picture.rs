@@ -320,7 +320,21 @@ pub(super) fn pnm_top(path: &Path) -> Option<u32> {
 }
 
 fn undecodable(path: &Path, error: &ImageError) -> SceneError {
-    unreadable(path, said(error))
+    let said = said(error);
+    let is_cut = |error: &std::io::Error| error.kind() == std::io::ErrorKind::UnexpectedEof;
+    let reason = match error {
+        ImageError::IoError(error) if is_cut(error) => format!("it ends before all of its samples ({said})"),
+        ImageError::Decoding(_) if said.contains("failed to fill whole buffer") => {
+            format!("it ends before all of its samples ({said})")
+        }
+        ImageError::Decoding(_) => format!("it is broken, or of another format than its name says ({said})"),
+        ImageError::Unsupported(_) => format!(
+            "it is of a kind that is not read ({said}): expected gray or red, green and blue as .png, .jpg, .tif, .webp, .bmp, .ppm or .hdr, or \
+             numbers as .exr, .pfm, .npy, .npz, .mat, .h5 or .txt"
+        ),
+        _ => said,
+    };
+    unreadable(path, reason)
 }
 
 #[cfg(test)]

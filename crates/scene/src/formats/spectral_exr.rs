@@ -286,7 +286,9 @@ fn depth_of(
         Some(told) if channels.get(told).is_some() => Some((told.to_owned(), exr_depth::kind_of(told))),
         Some(told) => {
             let names = channels.names().collect::<Vec<_>>().join(", ");
-            return Err(unreadable(path, format!("it has no channel '{told}' for its depth, expected one of {names}")));
+            let expected = if names.is_empty() { "no other is left beside its colors" } else { "expected one of " };
+            let reason = format!("it has no channel '{told}' for its depth (--depth-variable): {expected}{names}");
+            return Err(unreadable(path, reason));
         }
     };
     let Some((name, kind)) = found else { return Ok(None) };

@@ -249,8 +249,15 @@ fn numbers_of(dataset: &Dataset) -> Result<Vec<u8>, String> {
 }
 
 fn broken(error: hdf5_pure::Error) -> String {
-    let way = "expected one without links, which older programs read as well (h5repack --high=V18)";
-    format!("it is HDF5 that cannot be read ({}): {way}", said(error))
+    let said = said(error);
+    let way = if said.contains("unexpected EOF") {
+        "expected all of it, for it ends too early"
+    } else if said.contains("unsupported filter") {
+        "expected none or gzip (h5repack -f GZIP=4)"
+    } else {
+        "expected one without links, which older programs read as well (h5repack --high=V18)"
+    };
+    format!("it is HDF5 that cannot be read ({said}): {way}")
 }
 
 fn too_many() -> String {
