@@ -20,6 +20,7 @@ mod error;
 mod film_map;
 mod hurb_splatter;
 mod kernel;
+mod lattice;
 mod lens_image;
 mod mesh;
 mod metrics;

@@ -14,10 +14,11 @@ use crate::{
     bundle::{Bundle, FilmPointJob, Frame, Moments, unobscured},
     decenter::Decenter,
     hurb_splatter::bending,
+    lattice::Lattice,
     pupil::Outline,
     render::{Layout, wave_energies},
     station::SurveyedLens,
-    survey::{Lattice, N_AZIMUTHS, Survey},
+    survey::{N_AZIMUTHS, Survey},
     symmetry::Symmetry,
 };
 

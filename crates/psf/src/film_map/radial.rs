@@ -4,7 +4,7 @@ use glam::{DMat2, DVec2, DVec3};
 use multiversion::multiversion;
 
 use super::{FieldsAlong, LEAST_COSINE};
-use crate::survey::Lattice;
+use crate::lattice::Lattice;
 
 /// From the distance from an axis to the direction seen there, and to the irradiance.
 ///

@@ -65,6 +65,7 @@ const PANELS: &[(&str, &[&str])] = &[
     ("part rows", &["Crop.rows"]),
     ("diffraction", &["Camera.diffraction", "Diffraction.Hurb"]),
     ("gamma", &["Diffraction.Hurb.gamma"]),
+    ("reflections", &["Camera.lens_reflections"]),
     ("blur", &["Camera.blur"]),
     ("views", &["BlurSpec.Views"]),
     ("bands", &["Camera.wavelengths", "WavelengthSpec.Range"]),
