@@ -68,12 +68,12 @@ impl Survey {
                 (FilmMap::from(radius.map(lattice)), radius.stations, None, Some(bladed))
             }
             _ => {
-                let (map, stations, n) = surveyed_grid(lens, lattice.coarser());
+                let (map, stations, n) = surveyed_grid(lens, lattice.of_grid());
                 (FilmMap::from(map), stations, Some(n), None)
             }
         };
         // Of a grid the first one's points say it well enough.
-        let stride = n_columns.map_or(1, |n| (n - 1) / (2 * lattice.coarser().n_steps));
+        let stride = n_columns.map_or(1, |n| (n - 1) / (2 * lattice.of_grid().n_steps));
         let is_told =
             |i: usize| n_columns.is_none_or(|n| (i / n).is_multiple_of(stride) && (i % n).is_multiple_of(stride));
         let told: Vec<&Station> =
@@ -118,7 +118,7 @@ impl Survey {
             let fraction = ((radius_mm - from) / (to - from)).clamp(0.0, 1.0);
             return mixed([(self.moments[above - 1], 1.0 - fraction), (self.moments[above], fraction)]);
         }
-        let grid = self.lattice.coarser();
+        let grid = self.lattice.of_grid();
         let n = 2 * grid.n_steps + 1;
         let place = ((from_axis_mm + grid.reach_mm()) / grid.step_mm).clamp(DVec2::ZERO, DVec2::splat((n - 1) as f64));
         let below = place.floor().min(DVec2::splat((n - 2) as f64));
