@@ -1,8 +1,12 @@
 //! Which colors the codes of a picture stand for, as its file states them: an ICC profile, the chunks of PNG, or the Exif data of cameras.
 
-use std::{fs::File, io::BufReader, path::Path};
+use std::{
+    fs::File,
+    io::{BufReader, Read},
+    path::Path,
+};
 
-use image::{ImageDecoder, ImageFormat, ImageReader};
+use image::{ImageDecoder, ImageFormat};
 use moxcms::{
     Chromaticity, CicpColorPrimaries, ColorPrimaries, ColorProfile, DataColorSpace, Matrix3d, ProfileText,
     ToneReprCurve, TransferCharacteristics, XyY,
@@ -11,6 +15,7 @@ use moxcms::{
 use crate::{
     bmp::{BmpColors, colors_of_bmp},
     exif::{Exif, TiffFields},
+    open::{PictureFile, open},
 };
 
 /// How far curve and matrix of a profile may be from those of sRGB to be taken as these: four digits of a profile's fractions.
@@ -38,8 +43,7 @@ impl StatedColors {
     /// # Errors
     /// When the colors cannot be converted to linear light: the reason, which a sentence can go on with after the file's name.
     pub fn of(path: &Path) -> Result<Option<Self>, String> {
-        let reader = ImageReader::open(path).ok().and_then(|reader| reader.with_guessed_format().ok());
-        let Some(reader) = reader else { return Ok(None) };
+        let Ok(reader) = open(path) else { return Ok(None) };
         let format = reader.format();
         if format == Some(ImageFormat::Png) {
             return of_png(path);
@@ -277,7 +281,8 @@ fn of_code_points(points: &png::CodingIndependentCodePoints) -> Result<Option<St
 /// Returns the profile of a TIFF file, whose field is of bytes, or of bytes of no kind.
 fn profile_of_tiff(path: &Path) -> Option<Vec<u8>> {
     const ICC_PROFILE: usize = 34_675;
-    let bytes = std::fs::read(path).ok()?;
+    let mut bytes = vec![];
+    PictureFile::open(path).ok()?.read_to_end(&mut bytes).ok()?;
     let fields = TiffFields::new(&bytes)?;
     let count = fields.field(fields.first_directory()?, ICC_PROFILE)?;
     let (n, place) = (fields.number(count, 4)?, fields.number(count + 4, 4)?);

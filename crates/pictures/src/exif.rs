@@ -2,7 +2,9 @@
 
 use std::path::Path;
 
-use image::{ImageDecoder, ImageReader};
+use image::ImageDecoder;
+
+use crate::open::open;
 
 /// The fields of a TIFF file or of Exif data, which are one.
 pub(crate) struct TiffFields<'a> {
@@ -71,6 +73,8 @@ pub struct Exif {
     pub subject_distance_m: Option<f64>,
     /// The exponent of the curve from codes to light.
     pub gamma: Option<f64>,
+    /// Its `ColorSpace` where that is not 1, sRGB, and no profile says what its colors are: 65 535 is uncalibrated.
+    pub other_colors: Option<u16>,
     is_adobe_rgb: bool,
 }
 
@@ -80,9 +84,12 @@ const FILM_DIAGONAL_MM: f64 = 43.266_615;
 impl Exif {
     /// Returns what the Exif data of a PNG, JPEG or WebP file state; nothing of other files.
     pub fn of(path: &Path) -> Self {
-        let reader = ImageReader::open(path).ok().and_then(|reader| reader.with_guessed_format().ok());
-        let bytes = reader.and_then(|reader| reader.into_decoder().ok()?.exif_metadata().ok().flatten());
-        bytes.map_or_else(Self::default, |bytes| Self::of_bytes(&bytes))
+        let decoder = open(path).ok().and_then(|reader| reader.into_decoder().ok());
+        let Some(mut decoder) = decoder else { return Self::default() };
+        let has_profile = decoder.icc_profile().ok().flatten().is_some_and(|profile| !profile.is_empty());
+        let bytes = decoder.exif_metadata().ok().flatten();
+        let own = bytes.map_or_else(Self::default, |bytes| Self::of_bytes(&bytes));
+        Self { other_colors: own.other_colors.filter(|_| !has_profile), ..own }
     }
 
     /// Returns what Exif data of these bytes state.
@@ -95,8 +102,8 @@ impl Exif {
         // Some writers put all fields into the first directory.
         let number = |tag| own.and_then(|own| fields.value(own, tag)).or_else(|| fields.value(first, tag));
         let above_0 = |tag| number(tag).filter(|v| v.is_finite() && *v > 0.0);
-        // No sRGB (`ColorSpace` 65535), and interoperability R03 (DCF 2.0, 2010, 4.2).
-        let is_other = number(0xA001) == Some(65_535.0);
+        // No sRGB (`ColorSpace` 65535), and interoperability R03 (DCF 2.0, 2010, 4.2); or 2, as many cameras have it.
+        let color_space = number(0xA001);
         let interoperability = own.and_then(|own| fields.directory(own, INTEROPERABILITY_DIRECTORY));
         let index = interoperability.and_then(|directory| fields.field(directory, 1));
         let is_r03 = index.is_some_and(|at| bytes.get(at + 4..at + 7) == Some(b"R03"));
@@ -105,7 +112,8 @@ impl Exif {
             focal_on_film_mm: above_0(0xA405),
             subject_distance_m: above_0(0x9206),
             gamma: above_0(0xA500),
-            is_adobe_rgb: is_other && is_r03,
+            other_colors: color_space.filter(|own| *own != 1.0).map(|own| own as u16),
+            is_adobe_rgb: color_space == Some(2.0) || color_space == Some(65_535.0) && is_r03,
         }
     }
 
@@ -160,6 +168,11 @@ mod tests {
             // 36 mm at 50 mm.
             let fov_deg = exif.horizontal_fov_deg(3000, 2000).unwrap();
             assert!((fov_deg - 39.5978).abs() < 1e-3 && !exif.is_adobe_rgb(), "{fov_deg}");
+            for (space, other, is_adobe) in [(1, None, false), (2, Some(2), true), (65_535, Some(65_535), false)] {
+                let bytes = [&bytes[..8], &n(1, 2), &short(0xA001, space), &n(0, 4)].concat();
+                let exif = Exif::of_bytes(&bytes);
+                assert_eq!((exif.other_colors, exif.is_adobe_rgb()), (other, is_adobe), "{space}");
+            }
             for end in 0..bytes.len() {
                 Exif::of_bytes(&bytes[..end]);
             }

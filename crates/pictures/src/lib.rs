@@ -4,6 +4,7 @@
 mod bmp;
 mod colors;
 mod exif;
+mod open;
 mod reduced;
 mod tagged;
 
@@ -19,6 +20,7 @@ use image::{ExtendedColorType, ImageDecoder, ImageReader};
 pub use colors::StatedColors;
 pub use exif::Exif;
 pub use image::{DynamicImage, ImageError, ImageFormat, Limits};
+pub use open::{PictureFile, open};
 pub use reduced::{Curve, read_reduced};
 pub use tagged::{CodeSpace, encode_in};
 
@@ -27,7 +29,7 @@ pub use tagged::{CodeSpace, encode_in};
 /// # Errors
 /// When the file cannot be read.
 pub fn format_of(path: &Path) -> io::Result<Option<ImageFormat>> {
-    Ok(ImageReader::open(path)?.with_guessed_format()?.format())
+    Ok(open(path)?.format())
 }
 
 /// Returns the columns and rows of a picture from its header.
@@ -35,7 +37,7 @@ pub fn format_of(path: &Path) -> io::Result<Option<ImageFormat>> {
 /// # Errors
 /// When the file cannot be read or is no such picture.
 pub fn size_of(path: &Path) -> Result<(usize, usize), ImageError> {
-    let mut reader = ImageReader::open(path)?.with_guessed_format()?;
+    let mut reader = open(path)?;
     // Whoever reads its samples checks what they take.
     reader.limits(Limits::no_limits());
     let (columns, rows) = reader.into_decoder()?.dimensions();
@@ -49,7 +51,7 @@ pub fn size_of(path: &Path) -> Result<(usize, usize), ImageError> {
 /// When the file cannot be read, is no such picture, or takes more memory than it may.
 pub fn read_within(path: &Path, beside_bytes: u64) -> Result<DynamicImage, ImageError> {
     let n_bytes = fs::metadata(path)?.len();
-    decoded(ImageReader::open(path)?.with_guessed_format()?, n_bytes, beside_bytes)
+    decoded(open(path)?, n_bytes, beside_bytes)
 }
 
 /// Reads a picture from the bytes of a file, as [`read_within`] does.
@@ -79,7 +81,7 @@ fn decoded<R: BufRead + Seek>(
 /// # Errors
 /// When the file cannot be read, is no such picture, or is larger than the limits.
 pub fn read(path: &Path, limits: Limits) -> Result<DynamicImage, ImageError> {
-    let mut reader = ImageReader::open(path)?.with_guessed_format()?;
+    let mut reader = open(path)?;
     reader.limits(limits);
     reader.decode()
 }

@@ -155,7 +155,8 @@ impl Contents {
             (
                 "an order of axes (--axes)",
                 reading.axes.is_some(),
-                !(is_of(path, MATLAB_OR_HDF5) || is_of(path, &["npy", "npz"])),
+                // A scene of ISETCam says which axes are which.
+                self.heeds == Heeds::Nothing || !(is_of(path, MATLAB_OR_HDF5) || is_of(path, &["npy", "npz"])),
             ),
         ];
         match given.into_iter().find(|(_, is_given, is_wrong)| *is_given && *is_wrong) {
@@ -304,7 +305,7 @@ impl Cube {
             (Some(FileQuantity::Reflectance), Some(_)) => {
                 units("a reflectance has no unit: expected --unit or --quantity reflectance, not both")
             }
-            (_, Some(unit)) => Ok(Some(unit)),
+            (_, Some(unit)) => reading.check_quantity(path, unit).map(|()| Some(unit)),
             (quantity, None) => Ok(quantity.and_then(FileQuantity::light_unit)),
         }
     }

@@ -313,6 +313,9 @@ impl EnviFile {
         let gain_unit = || LightUnit::parse("W/m^2/sr/um").filter(|_| has_gains && !is_reflecting);
         let is_light = wants_light.unwrap_or(own_unit.is_some() || gain_unit().is_some());
         if is_light {
+            if let Some(unit) = told_unit.or(own_unit) {
+                reading.check_quantity(&self.header_path, unit)?;
+            }
             let by_quantity = || reading.quantity.and_then(FileQuantity::light_unit);
             let unit = told_unit.or(own_unit).or_else(by_quantity).or_else(gain_unit).unwrap_or(LightUnit::RADIANCE);
             let words = match (reading.unit.as_deref(), header.data_units.as_deref().filter(|_| own_unit.is_some())) {

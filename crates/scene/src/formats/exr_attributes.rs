@@ -76,7 +76,31 @@ pub(super) fn is_harmless(name: &str) -> bool {
         "dwaCompressionLevel",
     ];
     const STARTS: [&str; 8] = ["oiio:", "nuke/", "cycles.", "Exif", "exif", "IPTC:", "input/", "cryptomatte/"];
-    NAMES.contains(&name) || STARTS.iter().any(|start| name.starts_with(start))
+    let is_usual = NAMES.contains(&name) || STARTS.iter().any(|start| name.starts_with(start));
+    is_usual && !name.starts_with(COLOR_SPACE)
+}
+
+/// What OpenImageIO says of the colors.
+const COLOR_SPACE: &str = "oiio:ColorSpace";
+
+/// Whether a color space of OpenImageIO is what linear colors of an EXR file are without a word: of sRGB's primaries.
+fn is_linear_srgb(text: &str) -> bool {
+    let plain: String = text.chars().filter(char::is_ascii_alphanumeric).collect::<String>().to_lowercase();
+    const NAMES: [&str; 12] = [
+        "",
+        "linear",
+        "scenelinear",
+        "linsrgb",
+        "linsrgbscene",
+        "linrec709",
+        "linrec709srgb",
+        "linrec709scene",
+        "linearsrgb",
+        "linearrec709",
+        "linearrec709srgb",
+        "utilitylinearsrgb",
+    ];
+    NAMES.contains(&plain.as_str())
 }
 
 /// Returns a text of a header, which is UTF-8 or, where it cannot be, Latin-1.
@@ -153,6 +177,11 @@ pub(crate) fn from_layer(layer: &LayerAttributes) -> Attributes {
     };
     let ours = [LAYOUT_VERSION, UNITS, PITCH, FOCAL, CENTER_X, CENTER_Y, FOV, LIGHT];
     let own = layer.other.keys().map(words_of).filter(|name| !ours.contains(&name.as_str()));
+    let own = own.filter_map(|name| match get(COLOR_SPACE).filter(|_| name == COLOR_SPACE) {
+        Some(AttributeValue::Text(text)) if is_linear_srgb(&words_of(text)) => None,
+        Some(AttributeValue::Text(text)) => Some(format!("{COLOR_SPACE} ({})", words_of(text))),
+        _ => Some(name),
+    });
     // Attributes of the standard that would change where or how bright things are.
     let standard = [
         ("adoptedNeutral", layer.adopted_neutral.is_some()),
@@ -238,6 +267,22 @@ mod tests {
         assert_eq!((quantity, back.pitch_um), (Some(Quantity::Irradiance), Some(1.4)));
         assert_eq!(back.view(10, 10).unwrap(), Some(view));
         assert_eq!(back.light, Ok(Some(light)));
+    }
+
+    #[test]
+    fn other_colors_are_named() {
+        let names = |space: &str| {
+            let mut layer = LayerAttributes::default();
+            layer.other.insert(Text::from(COLOR_SPACE), AttributeValue::Text(Text::from(space)));
+            let stated = from_layer(&layer).others;
+            stated.names().filter(|name| !is_harmless(name)).map(str::to_owned).collect::<Vec<_>>()
+        };
+        for space in ["Linear", "lin_rec709", "Linear Rec.709 (sRGB)", "scene_linear"] {
+            assert_eq!(names(space), Vec::<String>::new(), "{space}");
+        }
+        for space in ["ACEScg", "sRGB", "Rec709", "lin_ap1"] {
+            assert_eq!(names(space), [format!("oiio:ColorSpace ({space})")]);
+        }
     }
 
     #[test]

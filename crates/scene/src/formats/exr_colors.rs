@@ -20,8 +20,17 @@ pub(super) fn is_called_picture(layer: &str) -> bool {
     ["combined", "rgb", "rgba", "color", "beauty", "image"].contains(&last.as_str())
 }
 
+/// What the channels of a picture are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum ColorsOf {
+    /// Red, green and blue, or gray.
+    Primaries,
+    /// X, Y and Z of CIE 1931.
+    Xyz,
+}
+
 /// Takes red, green and blue of the layer told, or else `R`, `G` and `B`, or those of a layer, Blender's `….Combined` before others; or
-/// gray, `Y`. Returns them with what stands before their letters.
+/// `X`, `Y` and `Z`; or gray, `Y`. Returns what they are, and them with what stands before their letters.
 ///
 /// # Errors
 /// When there are no such channels, or layers of which none is called a picture.
@@ -29,7 +38,7 @@ pub(super) fn colors_of(
     path: &Path,
     channels: &mut Stated<Array2<f32>>,
     told: Option<&str>,
-) -> Result<(String, [Array2<f32>; 3]), SceneError> {
+) -> Result<(String, ColorsOf, [Array2<f32>; 3]), SceneError> {
     let names: Vec<String> = channels.names().map(str::to_owned).collect();
     let full =
         |prefix: &str, letter: &str| if prefix.is_empty() { letter.to_owned() } else { format!("{prefix}.{letter}") };
@@ -57,15 +66,26 @@ pub(super) fn colors_of(
     if let Some(prefix) = prefix.map(|prefix| (*prefix).to_owned()) {
         let mut take = |letter| channels.take(&full(&prefix, letter)).ok_or_else(no_bands);
         let planes = [take("R")?, take("G")?, take("B")?];
-        return Ok((prefix, planes));
+        return Ok((prefix, ColorsOf::Primaries, planes));
     }
     if prefixes.len() > 1 {
         let reason = format!("it has several layers of colors, {}: expected --variable with the name of one", listed());
         return Err(unreadable(path, reason));
     }
+    if ["X", "Y", "Z"].iter().all(|letter| channels.get(letter).is_some()) {
+        let mut take = |letter| channels.take(letter).ok_or_else(no_bands);
+        let planes = [take("X")?, take("Y")?, take("Z")?];
+        return Ok((String::new(), ColorsOf::Xyz, planes));
+    }
     let has_chroma = ["RY", "BY"].iter().any(|name| channels.get(name).is_some());
     let gray = if has_chroma { None } else { channels.take("Y") }.ok_or_else(no_bands)?;
-    Ok((String::new(), [gray.clone(), gray.clone(), gray]))
+    Ok((String::new(), ColorsOf::Primaries, [gray.clone(), gray.clone(), gray]))
+}
+
+/// Returns the matrix from CIE XYZ, of which the white of D65 has a Y of 1, to linear sRGB.
+pub(super) fn srgb_from_xyz() -> [[f64; 3]; 3] {
+    let [x, y, z] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|of| Xyz(of).to_linear_srgb());
+    [0, 1, 2].map(|i| [x[i], y[i], z[i]])
 }
 
 /// Returns the matrix from colors of these primaries to linear sRGB, their white adapted to D65 (Bradford).
@@ -136,7 +156,7 @@ mod tests {
             let planes = names.iter().map(|name| ((*name).to_owned(), Array2::zeros((1, 1)))).collect();
             let mut channels = Stated::new("channel", planes);
             colors_of(Path::new("a.exr"), &mut channels, told)
-                .map(|(prefix, _)| (prefix, channels.names().map(str::to_owned).collect::<Vec<_>>()))
+                .map(|(prefix, ..)| (prefix, channels.names().map(str::to_owned).collect::<Vec<_>>()))
         };
         let take = |names: &[&str]| take_of(names, None);
         let pass = |pass: &str| ["R", "G", "B"].map(|letter| format!("{pass}.{letter}"));
@@ -145,6 +165,7 @@ mod tests {
         let (prefix, left) = take(&names).unwrap();
         assert_eq!((prefix.as_str(), left.len()), ("V.Combined", 3));
         assert_eq!(take(&["Y"]).unwrap().0, "");
+        assert_eq!(take(&["A", "X", "Y", "Z"]).unwrap().1, ["A"]);
         assert!(take(&["Y", "RY", "BY"]).is_err() && take(&["R", "G"]).is_err());
         // Of two passes neither of which is called a picture none is chosen.
         let two = [pass("x"), pass("y")].concat();

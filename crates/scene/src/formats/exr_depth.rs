@@ -33,7 +33,12 @@ pub(super) fn depth_name<'a>(names: impl Iterator<Item = &'a str>, prefix: &str)
         wanted.push(format!("{prefix}.Z"));
     }
     wanted.extend(["Z", "depth.Z", "Depth.Z", "depth.V", "Depth.V", "depth.Y", "Depth.Y"].map(str::to_owned));
-    if let Some(name) = wanted.into_iter().find(|name| names.contains(&name.as_str())) {
+    // X, Y and Z side by side are colors (CIE), or places and directions.
+    let is_of_three = |name: &str| {
+        let beside = |letter: &str| name.strip_suffix('Z').map(|start| format!("{start}{letter}"));
+        ["X", "Y"].iter().all(|letter| beside(letter).is_some_and(|name| names.contains(&name.as_str())))
+    };
+    if let Some(name) = wanted.into_iter().find(|name| names.contains(&name.as_str()) && !is_of_three(name)) {
         return Some((name, DepthKind::Axial));
     }
     if prefix.is_empty() {
@@ -95,6 +100,9 @@ mod tests {
         check(&["A.Depth.Z", "B.Depth.Z"], "", None);
         check(&["A.Depth.Z", "A.Noisy.R"], "", Some("A.Depth.Z"));
         check(&["distance", "Z"], "", Some("Z"));
+        check(&["X", "Y", "Z"], "", None);
+        check(&["X", "Y", "Z", "distance"], "", Some("distance"));
+        check(&["Y", "Z"], "", Some("Z"));
         // Mitsuba calls the way along the ray T, and reflectances of bands have names that begin so.
         check(&["dd.y.T", "albedo.R"], "", Some("dd.y.T"));
         check(&["a.T", "b.T"], "", None);

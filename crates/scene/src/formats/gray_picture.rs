@@ -8,7 +8,7 @@ use ndarray::Array2;
 use super::{
     contents::is_of,
     picture::{decode, has_holes, pnm_top},
-    picture_parts::notes_on_parts,
+    picture_parts::{note_of_orientation, notes_on_parts},
     stated::{Noted, name_of, note_of},
     tiff_file::{TiffAs, TiffFile, TiffStack, read_tiff},
     unusable::unreadable,
@@ -40,6 +40,7 @@ pub(super) fn read_gray(path: &Path, told: Option<&str>) -> Result<Noted<GrayPic
         return Err(unreadable(path, "it has one plane without a name, expected it without --depth-variable"));
     }
     let mut notes = notes_on_parts(path)?;
+    notes.extend(note_of_orientation(path));
     // What cannot be converted to light is a number all the same.
     let colors = StatedColors::of(path).unwrap_or_else(|reason| Some(StatedColors::linear(reason, [[0.0; 3]; 3])));
     notes.extend(colors.map(|colors| {

@@ -45,6 +45,11 @@ impl LightUnit {
         if below == Below::No { sum.unit() } else { None }
     }
 
+    /// Whether it counts photons, and not their energy.
+    pub(super) fn is_photons(self) -> bool {
+        self.is_photons
+    }
+
     /// Returns what makes watts of a number.
     pub(super) fn factor_at(self, wavelength_nm: f64) -> f64 {
         let joules = if self.is_photons { joules_per_photon(wavelength_nm) } else { 1.0 };

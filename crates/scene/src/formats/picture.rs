@@ -9,7 +9,7 @@ use ndarray::Array2;
 use rayon::prelude::*;
 
 use super::{
-    picture_parts::{notes_on_samples, orientation_of},
+    picture_parts::{note_on_exif_colors, notes_on_samples, orientation_of},
     primaries::into_srgb,
     spectral_exr::{NamedPlanes, read_planes_and_primaries_exr},
     stated::{Noted, name_of, note_of},
@@ -199,6 +199,7 @@ pub(super) fn oriented(path: &Path, size: Option<(usize, usize)>) -> Result<Orie
     notes.extend(colors.as_ref().map(|colors| {
         format!("{}: its codes are converted to light by what it states, {}", name_of(path), colors.name)
     }));
+    notes.extend(note_on_exif_colors(path, colors.as_ref()));
     if has_holes(&picture) {
         notes.extend(note_of(path, "channel", &["opacity".to_owned()]));
     }

@@ -6,7 +6,7 @@ use std::{
     path::Path,
 };
 
-use dioptric_pictures::{Exif, size_of};
+use dioptric_pictures::{Exif, StatedColors, size_of};
 use image::{ImageDecoder, metadata::Orientation};
 
 use super::{
@@ -63,13 +63,34 @@ pub fn notes_on_samples(path: &Path) -> Result<Vec<String>, SceneError> {
     let is_turned = orientation_of(path) != Orientation::NoTransforms;
     let note = || format!("{}: its pixels are counted as stored, not turned as its orientation says", name_of(path));
     let parts = note_of(path, "part", &unknown_parts(path)?);
-    Ok(is_turned.then(note).into_iter().chain(parts).chain(note_on_exif(path, false)).collect())
+    let colors = StatedColors::of(path).ok().and_then(|colors| note_on_exif_colors(path, colors.as_ref()));
+    Ok(is_turned.then(note).into_iter().chain(parts).chain(colors).chain(note_on_exif(path, false)).collect())
+}
+
+/// Returns what is said of colors that the Exif data state to be others than those that the codes are taken for.
+pub(super) fn note_on_exif_colors(path: &Path, taken: Option<&StatedColors>) -> Option<String> {
+    let space = Exif::of(path).other_colors.filter(|_| taken.is_none())?;
+    let what = match space {
+        2 => "Adobe RGB",
+        65_535 => "uncalibrated colors",
+        _ => "colors that nobody here knows",
+    };
+    Some(format!(
+        "{}: its Exif data state {what} (ColorSpace {space}), and no profile is there: its codes are taken for those of sRGB",
+        name_of(path)
+    ))
+}
+
+/// Returns what is said of the orientation of a picture whose pixels lie as stored.
+pub(super) fn note_of_orientation(path: &Path) -> Option<String> {
+    let own = orientation_of(path);
+    let words = || format!("{}: its orientation, {} (Exif), is not used", name_of(path), own.to_exif());
+    (own != Orientation::NoTransforms).then(words)
 }
 
 /// Returns the orientation that a picture states.
 pub(super) fn orientation_of(path: &Path) -> Orientation {
-    let reader = image::ImageReader::open(path).ok().and_then(|reader| reader.with_guessed_format().ok());
-    let decoder = reader.and_then(|reader| reader.into_decoder().ok());
+    let decoder = dioptric_pictures::open(path).ok().and_then(|reader| reader.into_decoder().ok());
     decoder.and_then(|mut decoder| decoder.orientation().ok()).unwrap_or(Orientation::NoTransforms)
 }
 

@@ -183,6 +183,9 @@ fn of_exr(path: &Path, options: &ReadOptions) -> Result<Contents, SceneError> {
                 return Err(SceneError::Units { file: path.to_owned(), reason });
             }
             let told = reading.unit.as_deref().map(light_unit).transpose()?;
+            if let Some(told) = told {
+                reading.check_quantity(path, told)?;
+            }
             let unit = told.or_else(|| reading.quantity.and_then(FileQuantity::light_unit)).filter(|_| is_unit_open);
             let scale = reading.scale.unwrap_or(1.0);
             // Of a film, which a scene is none.

@@ -1,6 +1,9 @@
 //! What is said of a file that it does not say itself.
 
-use std::{path::PathBuf, str::FromStr};
+use std::{
+    path::{Path, PathBuf},
+    str::FromStr,
+};
 
 use dioptric_spectrum::Quantity;
 use ndarray::{Array2, s};
@@ -85,6 +88,20 @@ impl FileReading {
             return Err(setting("the wavelengths of the scene's bands", "none", "one a band, nm"));
         }
         Ok(())
+    }
+}
+
+impl FileReading {
+    /// Checks that the quantity told is that of the unit of light that a file states or that is told.
+    ///
+    /// # Errors
+    /// When photons are told of a unit of energy.
+    pub(super) fn check_quantity(&self, file: &Path, unit: LightUnit) -> Result<(), SceneError> {
+        if self.quantity != Some(FileQuantity::Photons) || unit.is_photons() {
+            return Ok(());
+        }
+        let reason = "its unit is one of energy, which --quantity photons contradicts: expected one of them";
+        Err(SceneError::Units { file: file.to_owned(), reason: reason.to_owned() })
     }
 }
 

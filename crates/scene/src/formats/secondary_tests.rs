@@ -299,3 +299,151 @@ fn bands_of_several_kinds_have_one_white() {
     };
     assert_eq!(image.spectrum_at(0, 0), [3.5]);
 }
+
+/// A TIFF file that begins with a thumbnail is read by its first page of full size, as a picture and as a depth.
+#[test]
+fn thumbnails_are_left() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, is_big: bool| {
+        let path = folder.path().join(name);
+        let file = fs::File::create(&path).unwrap();
+        let full: Vec<u16> = (0..ROWS * COLUMNS).map(|i| 2000 + i as u16).collect();
+        // A page of 1 × 2 samples before the picture and one of 2 × 1 behind it.
+        macro_rules! write_pages {
+            ($encoder:expr) => {{
+                let mut encoder = $encoder;
+                for (columns, rows, codes) in
+                    [(1, 2, &[7; 2][..]), (COLUMNS as u32, ROWS as u32, &full), (2, 1, &[7; 2])]
+                {
+                    let mut image = encoder.new_image::<colortype::Gray16>(columns, rows).unwrap();
+                    let is_reduced = u32::from(codes.len() == 2);
+                    image.encoder().write_tag(Tag::NewSubfileType, is_reduced).unwrap();
+                    image.write_data(codes).unwrap();
+                }
+            }};
+        }
+        if is_big {
+            write_pages!(TiffEncoder::new_big(file).unwrap());
+        } else {
+            write_pages!(TiffEncoder::new(file).unwrap());
+        }
+        path
+    };
+    for is_big in [false, true] {
+        let path = write("a.tif", is_big);
+        let scene = read_scene(&path, &ReadOptions::default()).unwrap();
+        assert_eq!((scene.rows(), scene.columns()), (ROWS, COLUMNS));
+        check_named(&scene, "its pages '1 (reduced)', '3 (reduced)' are not used");
+        assert_eq!(super::flat_size_of(&path, &FileReading::default()), Some((ROWS, COLUMNS)));
+        let scene = read_scene(&picture(folder.path()), &options(None, Some(path))).unwrap();
+        assert_eq!(scene.require_depth().unwrap().range_m(), (2.0, 2.0 + 0.001 * (ROWS * COLUMNS - 1) as f32 as f64));
+    }
+}
+
+/// Writes a gray picture with Exif data of one short number.
+fn write_with_exif(path: &Path, tag: u16, value: u16) {
+    let [a, b] = tag.to_le_bytes();
+    let [c, d] = value.to_le_bytes();
+    let exif = [&b"II*\0\x08\0\0\0\x01\0"[..], &[a, b, 3, 0, 1, 0, 0, 0, c, d, 0, 0, 0, 0, 0, 0]].concat();
+    let mut encoder = image::codecs::png::PngEncoder::new(fs::File::create(path).unwrap());
+    image::ImageEncoder::set_exif_metadata(&mut encoder, exif).unwrap();
+    let codes = [0x07, 0xd0].repeat(ROWS * COLUMNS);
+    // Codes of 16 bits are in the order of the machine.
+    let codes: Vec<u8> = codes.chunks(2).flat_map(|two| u16::from_be_bytes([two[0], two[1]]).to_ne_bytes()).collect();
+    image::ImageEncoder::write_image(encoder, &codes, COLUMNS as u32, ROWS as u32, image::ExtendedColorType::L16)
+        .unwrap();
+}
+
+/// What Exif data state of how a picture of numbers lies, and of colors without a profile, is named.
+#[test]
+fn orientations_and_colors_of_exif_data_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let depth = folder.path().join("d.png");
+    for (orientation, n) in [(1, 0), (3, 1), (6, 1)] {
+        write_with_exif(&depth, 274, orientation);
+        let scene = read_scene(&picture(folder.path()), &options(None, Some(depth.clone()))).unwrap();
+        let note = format!("d.png: its orientation, {orientation} (Exif), is not used");
+        assert_eq!(scene.notes.iter().filter(|own| **own == note).count(), n, "{:?}", scene.notes);
+    }
+    let bands = folder.path().join("bands");
+    fs::create_dir(&bands).unwrap();
+    [450, 550].iter().for_each(|nm| write_with_exif(&bands.join(format!("b_{nm}.png")), 274, 3));
+    check_named(&read_scene(&bands, &ReadOptions::default()).unwrap(), "its orientation, 3 (Exif), is not used");
+    for (space, word) in [(1, ""), (65_535, "uncalibrated colors (ColorSpace 65535)"), (2, "Adobe RGB (ColorSpace 2)")]
+    {
+        write_with_exif(&depth, 0xA001, space);
+        let scene = read_scene(&depth, &ReadOptions::default()).unwrap();
+        let n = scene.notes.iter().filter(|note| note.contains("ColorSpace") && note.contains(word)).count();
+        assert_eq!(n, usize::from(space != 1), "{:?}", scene.notes);
+    }
+}
+
+/// Photons of which the file or the options state a unit of energy are refused, whatever the kind of file.
+#[test]
+fn photons_are_not_counted_in_watts() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let bytes: Vec<u8> = [0.5_f32; 4].iter().flat_map(|v| v.to_le_bytes()).collect();
+    fs::write(at("a.npy"), npy("<f4", false, "(1, 2, 2)", &bytes)).unwrap();
+    let head = |unit: &str| {
+        format!(
+            "ENVI\nsamples = 2\nlines = 1\nbands = 2\ndata type = 4\ninterleave = bip\nwavelength = {{500, 600}}\n{unit}"
+        )
+    };
+    for (name, unit) in [("b", "data units = W/m^2/sr/nm\n"), ("c", "")] {
+        fs::write(at(&format!("{name}.hdr")), head(unit)).unwrap();
+        fs::write(at(&format!("{name}.raw")), &bytes).unwrap();
+    }
+    write_exr(&at("d.exr"), vec![layer("", "comments", &[("S0.500nm", 0.5), ("S0.600nm", 0.5)])]);
+    let read = |name: &str, quantity, unit: Option<&str>| {
+        let reading = FileReading {
+            quantity: Some(quantity),
+            unit: unit.map(str::to_owned),
+            wavelengths_nm: (name == "a.npy").then(|| vec![500.0, 600.0]),
+            ..FileReading::default()
+        };
+        read_scene(&at(name), &ReadOptions { reading, ..ReadOptions::default() })
+    };
+    for (name, unit) in [("a.npy", Some("W/m^2/sr/nm")), ("b.hdr", None), ("c.hdr", Some("uW/(cm^2 sr nm)"))] {
+        let message = read(name, FileQuantity::Photons, unit).unwrap_err().to_string();
+        assert!(message.contains(name) && message.contains("--quantity photons contradicts"), "{message}");
+        assert!(read(name, FileQuantity::Radiance, unit).is_ok(), "{name}");
+    }
+    let message = read("d.exr", FileQuantity::Photons, Some("W/m^2/sr/nm")).unwrap_err().to_string();
+    assert!(message.contains("--quantity photons contradicts"), "{message}");
+    for name in ["a.npy", "c.hdr", "d.exr"] {
+        assert!(read(name, FileQuantity::Photons, Some("photons/s/m^2/sr/nm")).is_ok(), "{name}");
+    }
+}
+
+/// CIE colors are no gray picture with a depth: those of a white of D65 become white.
+#[test]
+fn channels_x_y_and_z_are_colors() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("xyz.exr");
+    let white = dioptric_spectrum::Xyz::from_linear_srgb([0.5; 3]).0;
+    write_exr(
+        &path,
+        vec![layer("", "comments", &[("X", white[0] as f32), ("Y", white[1] as f32), ("Z", white[2] as f32)])],
+    );
+    let contents = contents_of(&path, &ReadOptions::default()).unwrap();
+    assert!(contents.depth.is_none() && contents.notes.iter().any(|note| note.contains("CIE XYZ")));
+    let Samples::Linear { planes, .. } = contents.image else { panic!("no colors") };
+    // Single floats.
+    assert!(planes.iter().flatten().all(|v| (v - 0.5).abs() < 1e-6), "{planes:?}");
+}
+
+/// A scene of `ISETCam` says all itself.
+#[test]
+fn nothing_can_be_said_of_a_scene_of_isetcam() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures/scenes/iset_scene.mat");
+    for (reading, word) in [
+        (FileReading { axes: Some("yxb".to_owned()), ..FileReading::default() }, "--axes"),
+        (FileReading { unit: Some("W/m^2/sr/nm".to_owned()), ..FileReading::default() }, "--unit"),
+        (FileReading { scale: Some(2.0), ..FileReading::default() }, "--scale"),
+        (FileReading { variable: Some("scene".to_owned()), ..FileReading::default() }, "scene"),
+    ] {
+        let message = read_scene(&path, &ReadOptions { reading, ..ReadOptions::default() }).unwrap_err().to_string();
+        assert!(message.contains(word), "{message}");
+    }
+}

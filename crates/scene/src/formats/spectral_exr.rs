@@ -9,7 +9,7 @@ use ndarray::Array2;
 use super::{
     band_name::{self, BandKind},
     exr_attributes::{Attributes, is_harmless},
-    exr_colors::{EXPECTED, colors_of, is_called_picture, srgb_from},
+    exr_colors::{ColorsOf, EXPECTED, colors_of, is_called_picture, srgb_from, srgb_from_xyz},
     exr_depth,
     exr_layers::{RawLayer, leave_other_views, read_headers, read_layers},
     light_unit::LightUnit,
@@ -164,8 +164,14 @@ pub(super) fn read_raw_exr(path: &Path, asked: AskedChannels<'_>) -> Result<RawF
     let mut channels = Stated::new("channel", first.planes);
     let bands = channels.take_all(|name| band_name::parse(name).is_some());
     let (image, prefix) = if bands.is_empty() {
-        let (prefix, mut planes) = colors_of(path, &mut channels, asked.colors)?;
-        if let Some(own) = &head.chromaticities {
+        let (prefix, what, mut planes) = colors_of(path, &mut channels, asked.colors)?;
+        if what == ColorsOf::Xyz {
+            into_srgb(&mut planes, &srgb_from_xyz());
+            let what = "channels X, Y and Z are taken for CIE XYZ under D65, whose white has a Y of 1: they become linear sRGB";
+            notes.push(format!("{}: its {what}", name_of(path)));
+            let unused = head.chromaticities.as_ref().map(|_| "chromaticities".to_owned());
+            notes.extend(note_of(path, "attribute", unused.as_slice()));
+        } else if let Some(own) = &head.chromaticities {
             let no_colors = || unreadable(path, "its chromaticities are no three primaries and a white");
             into_srgb(&mut planes, &srgb_from(own).ok_or_else(no_colors)?);
             notes.push(format!("{}: its primaries become those of sRGB, its white D65", name_of(path)));

@@ -60,7 +60,7 @@ pub(super) fn read_tiff(path: &Path, wanted: TiffAs) -> Result<Noted<TiffFile>, 
     // Gray pages are planes of a stack, colored ones a picture and others.
     let is_picture = !as_planes && (pages.len() == 1 || first.n_samples > 1);
     if is_picture {
-        unused.extend((2..=pages.len()).map(|index| index.to_string()));
+        unused.extend(pages[1..].iter().map(|(page, _)| (page.index + 1).to_string()));
         notes.extend(note_of(path, "page", &unused));
         let unknown = first.unknown_sample().map(|sample| format!("sample {sample} (ExtraSamples 0)"));
         notes.extend(note_of(path, "channel", unknown.as_slice()));
@@ -113,7 +113,7 @@ fn pages_of(path: &Path) -> Result<Pages, SceneError> {
     for index in 1.. {
         let mut page = Page::of(&mut decoder, index - 1).map_err(broken)?;
         let at = decoder.ifd_pointer().map_or(0, |place| place.0);
-        if index == 1 && !page.descriptions.is_empty() {
+        if pages.is_empty() && !page.is_reduced && !page.descriptions.is_empty() {
             // What decodes the file keeps the last of two.
             let mut file = File::open(path).map_err(|error| unreadable(path, error))?;
             let directory = Directory::read(&mut file, at).map_err(|error| unreadable(path, error))?;
@@ -139,7 +139,7 @@ fn pages_of(path: &Path) -> Result<Pages, SceneError> {
         let first = pages.first().map(|(first, _)| first);
         let is_like = first.is_none_or(|first| first.size == page.size && first.n_samples == page.n_samples);
         if page.is_reduced || (!is_like && first.is_some_and(|first| !first.is_stack())) {
-            unused.push(index.to_string());
+            unused.push(if page.is_reduced { format!("{index} (reduced)") } else { index.to_string() });
         } else if is_like {
             pages.push((page, at));
         } else {
