@@ -10,12 +10,11 @@ use rayon::prelude::*;
 
 use crate::{
     film_map::ShareMap,
-    lattice::Lattice,
+    lattice::{AREA_OVER_RADIUS, DIM, Lattice, MOST_AREA_HALVINGS, MOST_OFF_SR, N_AZIMUTHS},
     mesh::Mesh,
     pupil::Outline,
     pupil_division::PupilDivision,
     station::{Station, SurveyedLens},
-    survey::{AREA_OVER_RADIUS, DIM, MOST_AREA_HALVINGS, MOST_OFF_SR, N_AZIMUTHS},
 };
 
 /// How many of the azimuths that are looked at lie in a sector, at least and at most.

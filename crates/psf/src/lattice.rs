@@ -1,5 +1,16 @@
 //! The lattice of distances from the axis at which films are surveyed.
 
+/// How often steps over an area are halved at most.
+pub(crate) const MOST_AREA_HALVINGS: usize = 3;
+/// How far irradiances between samples along a radius may be off, over the largest.
+pub(crate) const MOST_OFF_SR: f64 = 1e-4;
+/// So many times as far where an area is sampled, and not a radius.
+pub(crate) const AREA_OVER_RADIUS: f64 = 10.0;
+/// Points with less of the largest irradiance do not tell how directions go on beyond the light.
+pub(crate) const DIM: f64 = 1e-3;
+/// About how many directions from the axis are looked at: of the film of a lens with blades, and for the share of a part of a pupil.
+pub(crate) const N_AZIMUTHS: usize = 24;
+
 /// The distances from the axis of a lens at which its film is looked at first: whole steps, a power of two of mm, whatever is asked for.
 ///
 /// The stations of a wide survey are those of a narrow one and more, so that both say the same of the film that they share: the light of a

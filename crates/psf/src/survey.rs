@@ -10,7 +10,7 @@ use crate::{
     bladed::BladedSurvey,
     bundle::{Bundle, Frame, Moments},
     film_map::{PlaneMap, RadialMap, ShareMap},
-    lattice::Lattice,
+    lattice::{AREA_OVER_RADIUS, DIM, Lattice, MOST_AREA_HALVINGS, MOST_OFF_SR, N_AZIMUTHS},
     mesh::Mesh,
     pupil::Outline,
     pupil_division::PupilDivision,
@@ -18,22 +18,14 @@ use crate::{
     symmetry::Symmetry,
 };
 
-/// How often steps along a radius, and those of what is sampled over an area, are halved at most.
+/// How often steps along a radius are halved at most.
 const MOST_HALVINGS: usize = 9;
-pub(crate) const MOST_AREA_HALVINGS: usize = 3;
-/// How far what lies between samples may be off: directions, by the place on the film, over a step, and irradiances, over the largest.
+/// How far what lies between samples may be off in direction, by the place on the film, over a step.
 const MOST_OFF: f64 = 1e-5;
-pub(crate) const MOST_OFF_SR: f64 = 1e-4;
-/// So many times as far where an area is sampled, and not a radius.
-pub(crate) const AREA_OVER_RADIUS: f64 = 10.0;
 /// The place on the radius, over a step, that stands for the axis.
 const NEXT_TO_AXIS: f64 = 1e-3;
-/// Points with less of the largest irradiance do not tell how directions go on beyond the light.
-pub(crate) const DIM: f64 = 1e-3;
 /// Over how much of the lit radius the slope is taken with which directions go on beyond it.
 const RIM: f64 = 0.1;
-/// About how many directions from the axis are looked at: of the film of a lens with blades, and for the share of a part of a pupil.
-pub(crate) const N_AZIMUTHS: usize = 24;
 
 /// The film of the centered lens up to some distance from its axis.
 #[derive(Debug)]

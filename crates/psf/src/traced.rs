@@ -14,11 +14,11 @@ use crate::{
     bundle::{Bundle, FilmPointJob, Frame, Moments, unobscured},
     decenter::Decenter,
     hurb_splatter::bending,
-    lattice::Lattice,
+    lattice::{Lattice, N_AZIMUTHS},
     pupil::Outline,
     render::{Layout, wave_energies},
     station::SurveyedLens,
-    survey::{N_AZIMUTHS, Survey},
+    survey::Survey,
     symmetry::Symmetry,
 };
 

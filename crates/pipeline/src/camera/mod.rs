@@ -478,10 +478,11 @@ fn syntax_reason(text: &str, error: &ron::error::SpannedError) -> String {
     let Some(line) = text.lines().nth(line.saturating_sub(1)) else { return error.code.to_string() };
     let split = line.char_indices().nth(col.saturating_sub(1)).map_or(line.len(), |(at, _)| at);
     let (before, found) = line.split_at(split);
-    let key = before
-        .trim_end()
-        .strip_suffix(':')
-        .map(|before| before.rsplit(|c: char| !(c.is_ascii_alphanumeric() || c == '_')).next().unwrap_or_default());
+    let is_of_word = |c: char| c.is_ascii_alphanumeric() || c == '_';
+    // After a key, or after the word of a choice.
+    let head = before.trim_end();
+    let head = head.strip_suffix(':').or_else(|| head.trim_end_matches(is_of_word).trim_end().strip_suffix(':'));
+    let key = head.map(|head| head.rsplit(|c| !is_of_word(c)).next().unwrap_or_default());
     let (Some(key), false) = (key.filter(|key| !key.is_empty()), found.is_empty()) else {
         return error.code.to_string();
     };
@@ -494,7 +495,8 @@ fn syntax_reason(text: &str, error: &ron::error::SpannedError) -> String {
         ron::Error::ExpectedIdentifier if found.starts_with('"') => ": words of choices stand without quotes",
         _ => "",
     };
-    format!("{key}: {}, found {}{remedy}", error.code, found.trim_end())
+    let found = if found.is_empty() { String::new() } else { format!(", found {}", found.trim_end()) };
+    format!("{key}: {}{found}{remedy}", error.code)
 }
 
 #[cfg(test)]

@@ -80,10 +80,10 @@ pub(super) fn is_harmless(name: &str) -> bool {
     is_usual && !name.starts_with(COLOR_SPACE)
 }
 
-/// What OpenImageIO says of the colors.
+/// What `OpenImageIO` says of the colors.
 const COLOR_SPACE: &str = "oiio:ColorSpace";
 
-/// Whether a color space of OpenImageIO is what linear colors of an EXR file are without a word: of sRGB's primaries.
+/// Whether a color space of `OpenImageIO` is what linear colors of an EXR file are without a word: of sRGB's primaries.
 fn is_linear_srgb(text: &str) -> bool {
     let plain: String = text.chars().filter(char::is_ascii_alphanumeric).collect::<String>().to_lowercase();
     const NAMES: [&str; 12] = [
