@@ -142,7 +142,7 @@ impl Blocks {
 }
 
 /// Returns how many points each way a sample is the mean of, where so many samples of the scene lie along a pixel.
-pub(crate) fn points_of(density: usize, level: Level) -> usize {
+fn points_of(density: usize, level: Level) -> usize {
     (density * level.pixels()).div_ceil(level.per_pixel()).clamp(1, MOST_POINTS)
 }
 

@@ -11,6 +11,15 @@ use crate::{
     symmetry::{Mirror, Node, Symmetry},
 };
 
+/// The least that pixels add to a variance, or take from it, that is taken from kernels, samples².
+const LEAST_EXCESS: f64 = 1e-4;
+/// Of what is to be taken, the share that will do, and how much more each sample gives at most where some have nothing left to give.
+const NEARLY: f64 = 0.98;
+const MOST_MORE: f64 = 3.0;
+/// The most that a sample gives to each of its neighbors, and all of them to those behind, shares of it: less than all together.
+const MOST_MOVES: f32 = 0.4;
+const MOST_BACK: f64 = 0.2;
+
 /// What a film point gathers, on samples of some width: of sum 1, about that point.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct NodeKernel {
@@ -20,7 +29,7 @@ pub(crate) struct NodeKernel {
 }
 
 impl NodeKernel {
-    /// Takes a kernel of odd sides, leaves out borders without light and scales it to a sum of 1.
+    /// Takes a kernel of odd sides, leaves out borders without light, takes what pixels add to its width and scales it to a sum of 1.
     pub(crate) fn new(kernel: &Kernel) -> Self {
         let Kernel { samples, middle_px, .. } = kernel;
         let (rows, columns) = samples.dim();
@@ -39,8 +48,15 @@ impl NodeKernel {
         let at = Rectangle { first_row, first_column, rows: lit_rows, columns: lit_columns };
         let lines = samples.chunks_exact(columns).skip(above).take(lit_rows);
         let mut samples = Vec::with_capacity(at.len());
-        lines.for_each(|line| samples.extend_from_slice(&line[left..][..lit_columns]));
-        Self { at, samples }.normalized()
+        // What rounding leaves below 0 is nothing.
+        lines.for_each(|line| samples.extend(line[left..][..lit_columns].iter().map(|sample| sample.max(0.0))));
+        let mut made = Self { at, samples }.normalized();
+        for (axis, excess) in kernel.excess_px2.into_iter().enumerate() {
+            if excess.abs() > LEAST_EXCESS {
+                made = made.narrowed(axis, excess);
+            }
+        }
+        made.normalized()
     }
 
     fn normalized(mut self) -> Self {
@@ -54,40 +70,64 @@ impl NodeKernel {
         self
     }
 
-    /// Returns the kernel for a picture whose samples are means over themselves, of `n` points each way: that takes from its width what the means add.
+    /// Returns the kernel with a variance that is less by so much, samples², down or across: light moves between neighbors, towards the brighter, or, for less than
+    /// nothing, to the darker and one sample beyond the last. No sample falls below 0.
     ///
-    /// Means over squares of side 1 have the variance v = (1 − 1/n²)/12; with δ² the second difference, 1 − v/2 δ² + 9v/160 δ⁴ undoes them up to fourth
-    /// order (the cell averages of finite volumes), as far as no sample falls below 0. Of a kernel that is hardly wider than that, no more than half its width is taken: a point
-    /// stays one.
-    pub(crate) fn for_means_of(self, n: usize) -> Self {
-        let means = (1.0 - 1.0 / (n * n) as f32) / 12.0;
-        let [down, across] = self.variances();
-        let variance = means.min(0.5 * down.min(across) as f32);
-        if variance <= 0.0 {
-            return self;
+    /// What moves is c times the difference of neighbors in K − 9/80 δ²K, with δ² the second difference: for c = 1/24 that undoes means over samples, of variance
+    /// v = 1/12, up to fourth order, 1 − v/2 δ² + 9v/160 δ⁴ (the cell averages of finite volumes).
+    fn narrowed(self, axis: usize, excess: f64) -> Self {
+        let kernel = if excess < 0.0 { self.with_margin(axis) } else { self };
+        let before = kernel.variances()[axis];
+        let at_share = |share: f64| {
+            let moved = kernel.moved_inward(axis, share as f32);
+            (before - moved.variances()[axis], moved)
+        };
+        let (less, moved) = at_share(0.5 * excess);
+        // Samples that have nothing left to give take less: then the others give more.
+        if less / excess > NEARLY { moved } else { at_share(0.5 * excess * (excess / less).min(MOST_MORE)).1 }
+    }
+
+    /// Returns the kernel after light moved to the brighter of neighbors along an axis, this share of their difference and less than half of what the other has; then
+    /// a part of all light moves back by one sample, so that its mean stays.
+    fn moved_inward(&self, axis: usize, share: f32) -> Self {
+        let columns = self.at.columns;
+        let step = if axis == 0 { columns } else { 1 };
+        let pairs = || (0..self.samples.len() - step).filter(|i| axis == 0 || (i + 1) % columns != 0);
+        let mut curved = self.samples.clone();
+        for i in pairs() {
+            let by = 9.0 / 80.0 * (self.samples[i + step] - self.samples[i]);
+            curved[i] -= by;
+            curved[i + step] += by;
         }
-        let [near, far] = [-0.5 * variance, 9.0 / 160.0 * variance];
-        let taps = [far, near - 4.0 * far, 1.0 - 2.0 * near + 6.0 * far, near - 4.0 * far, far];
-        let at = self.at.grown(2);
-        let (rows, columns) = (at.rows, at.columns);
-        let mut wide = vec![0.0; at.len()];
-        self.add_to(&mut wide, &at, 1.0);
-        let mut along = vec![0.0; at.len()];
-        for (line, from) in along.chunks_exact_mut(columns).zip(wide.chunks_exact(columns)) {
-            for (k, tap) in taps.into_iter().enumerate() {
-                let (skip, ahead) = (2_usize.saturating_sub(k), k.saturating_sub(2));
-                line[skip..].iter_mut().zip(&from[ahead..]).for_each(|(sum, value)| *sum += tap * value);
-            }
+        let mut samples = self.samples.clone();
+        let mut ahead = 0.0;
+        for i in pairs() {
+            let wanted = share * (curved[i + step] - curved[i]);
+            let moves = wanted.clamp(-MOST_MOVES * self.samples[i + step], MOST_MOVES * self.samples[i]);
+            samples[i] -= moves;
+            samples[i + step] += moves;
+            ahead += f64::from(moves);
+        }
+        let back = ahead.clamp(-MOST_BACK, MOST_BACK) as f32;
+        for i in pairs() {
+            let moves = if back > 0.0 { back * self.samples[i + step] } else { back * self.samples[i] };
+            samples[i] += moves;
+            samples[i + step] -= moves;
+        }
+        Self { at: self.at, samples }
+    }
+
+    /// Returns the kernel with a dark sample before and behind its others along an axis.
+    fn with_margin(&self, axis: usize) -> Self {
+        let mut at = self.at;
+        if axis == 0 {
+            (at.first_row, at.rows) = (at.first_row - 1, at.rows + 2);
+        } else {
+            (at.first_column, at.columns) = (at.first_column - 1, at.columns + 2);
         }
         let mut samples = vec![0.0; at.len()];
-        for (row, line) in samples.chunks_exact_mut(columns).enumerate() {
-            for (k, tap) in taps.into_iter().enumerate() {
-                let Some(from) = (row + k).checked_sub(2).filter(|from| *from < rows) else { continue };
-                add_scaled(line, tap, &along[from * columns..][..columns]);
-            }
-            line.iter_mut().for_each(|sample| *sample = sample.max(0.0));
-        }
-        Self { at, samples }.normalized()
+        self.add_to(&mut samples, &at, 1.0);
+        Self { at, samples }
     }
 
     /// Adds the kernel times a factor to a block about the point that holds all of it.

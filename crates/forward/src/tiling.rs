@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 use crate::{
     Film, Settings,
-    blocks::{Blocks, points_of},
+    blocks::Blocks,
     layers::Layers,
     node_kernels::{LayerKernels, NodeAt, NodeKernel, edge_spread_peak},
     raster::{Level, Raster},
@@ -96,8 +96,6 @@ impl LayerTiles {
 pub(crate) struct Tiling {
     pub(crate) layers: Vec<LayerTiles>,
     symmetry: Symmetry,
-    /// How many samples of the scene lie along a pixel in the film's middle.
-    density: usize,
 }
 
 /// What tiles are cut by.
@@ -118,8 +116,7 @@ impl Tiling {
             work.advance(1);
             tiles
         });
-        let density = rule.blocks.most_density(0.0..0.0, 0.0..0.0);
-        Ok(Self { layers: layers.collect::<Result<_, Cancelled>>()?, symmetry, density })
+        Ok(Self { layers: layers.collect::<Result<_, Cancelled>>()?, symmetry })
     }
 
     /// The number of canonical nodes, all layers together.
@@ -168,7 +165,7 @@ impl Tiling {
                 let known = self.layers[layer].known.get(node).cloned();
                 let kernel = known.unwrap_or_else(|| lens.kernel(layer, *node, wavelength_nm));
                 work.advance(1);
-                Ok(kernel.for_means_of(points_of(self.density, node.1)))
+                Ok(kernel)
             };
             layers.iter().map(kernel).collect::<Result<Vec<NodeKernel>, Cancelled>>()
         };

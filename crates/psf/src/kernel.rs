@@ -23,6 +23,9 @@ pub struct Kernel {
     pub lambda_n_px: f64,
     /// The radius about the middle of the window at which they end, pixels; 0 without diffraction.
     pub edge_px: f64,
+    /// What pixels add to the variance of the light, down and across, pixels²: 1/12 to light that is wider than they are, less than nothing to light that one of
+    /// them holds, of which nothing is left; 0 where samples are to be taken as they are.
+    pub excess_px2: [f64; 2],
 }
 
 impl Kernel {
@@ -31,7 +34,8 @@ impl Kernel {
 
     /// Returns the kernel of these samples, odd × odd, that is about the middle of the middle one.
     pub fn centered(samples: Array2<f32>, pitch_um: f64) -> Self {
-        Self { samples, kept_share: 1.0, pitch_um, middle_px: IVec2::ZERO, lambda_n_px: 0.0, edge_px: 0.0 }
+        let (middle_px, excess_px2) = (IVec2::ZERO, [0.0; 2]);
+        Self { samples, kept_share: 1.0, pitch_um, middle_px, lambda_n_px: 0.0, edge_px: 0.0, excess_px2 }
     }
 
     /// Returns the kernel that blurs nothing.

@@ -3,7 +3,7 @@
 use dioptric_diffraction::{CircularStop, WaveQuality, WaveWindow, WindowCenter, wave_psf};
 use dioptric_optics::{MonoLens, ObjectPoint};
 use glam::{DVec2, IVec2};
-use ndarray::{Array2, Axis};
+use ndarray::{Array1, Array2, Axis};
 use serde::Serialize;
 
 use crate::{
@@ -21,6 +21,10 @@ const MOST_PIXELS: f64 = 600.0;
 const KEPT_OF_TAILS: f64 = 0.999;
 /// How far diffraction's tails are followed beyond the geometric picture, in units of λN.
 const TAILS: f64 = 12.0;
+/// Parts of a pixel, each way, on which light is drawn that hardly reaches beyond it: an odd number, so that one lies in the middle.
+pub(crate) const PARTS: usize = 3;
+/// How far from the middle light and λN together may reach to be drawn so, pixels.
+const NARROW: f64 = 3.0;
 /// The largest range of phases, radians, at which a kernel is wave optics alone; at twice that there is none.
 const ALL_WAVE: f64 = 200.0;
 
@@ -88,6 +92,28 @@ impl<'a> Layout<'a> {
         Self { side, ..self }
     }
 
+    /// Returns the layout on parts of its pixels, if the light is so narrow that whole ones do not tell its width.
+    pub(crate) fn on_parts(&self) -> Option<Self> {
+        let n = PARTS as f64;
+        let finer = |node: &Node| Node {
+            at_mm: n * node.at_mm,
+            along_l_mm: n * node.along_l_mm,
+            along_m_mm: n * node.along_m_mm,
+            ..*node
+        };
+        (self.reach + self.lambda_n_px <= NARROW).then(|| Self {
+            spots: self.spots,
+            nodes: self.nodes.iter().map(finer).collect(),
+            bending: self.bending.clone(),
+            middle_px: self.middle_px * PARTS as i32,
+            reach: n * self.reach,
+            radius: n * self.radius,
+            lambda_n_px: n * self.lambda_n_px,
+            side: PARTS * self.side,
+            natural_side: PARTS * self.natural_side,
+        })
+    }
+
     /// The range of phases B that a wave sum would have to follow, radians: over the pupil's radius, for light from
     /// its outermost ray to the corner of the window that holds the picture.
     fn bandwidth(&self) -> f64 {
@@ -152,6 +178,30 @@ impl<'a> Layout<'a> {
     }
 }
 
+/// Returns the pixels of energies on parts of them, and what they add to the variance of the light, down and across, pixels².
+pub(crate) fn of_parts(energies: &Array2<f64>) -> (Array2<f64>, [f64; 2]) {
+    let side = energies.nrows() / PARTS;
+    let mut pixels = Array2::zeros((side, side));
+    for ((row, column), energy) in energies.indexed_iter() {
+        pixels[(row / PARTS, column / PARTS)] += energy;
+    }
+    let pixels = moved_to(Some((middle(energies) + 0.5) / PARTS as f64), pixels);
+    let excess = [Axis(1), Axis(0)].map(|across| {
+        // Parts add their own width, 1/12 of a part.
+        let light = (variance(&energies.sum_axis(across)) - 1.0 / 12.0).max(0.0) / (PARTS * PARTS) as f64;
+        variance(&pixels.sum_axis(across)) - light
+    });
+    (pixels, excess)
+}
+
+/// Returns the variance of light along a line, samples².
+fn variance(line: &Array1<f64>) -> f64 {
+    let moment = |power: i32, from: f64| -> f64 {
+        line.iter().enumerate().map(|(i, energy)| energy * (i as f64 - from).powi(power)).sum::<f64>() / line.sum()
+    };
+    moment(2, moment(1, 0.0))
+}
+
 /// Returns the centroid of energies that lie evenly on the cells of a mesh whose nodes are at these places; `None` without energy.
 fn centroid(mesh: Mesh, at: &[DVec2], energies: &[f64]) -> Option<DVec2> {
     let of_cell = |(ring, j): (usize, usize)| {
@@ -164,13 +214,16 @@ fn centroid(mesh: Mesh, at: &[DVec2], energies: &[f64]) -> Option<DVec2> {
     middle.is_finite().then_some(middle)
 }
 
+/// Returns the mean column and row of the light on pixels.
+fn middle(pixels: &Array2<f64>) -> DVec2 {
+    let of_pixel = |((row, column), energy): ((usize, usize), &f64)| DVec2::new(column as f64, row as f64) * *energy;
+    pixels.indexed_iter().map(of_pixel).sum::<DVec2>() / pixels.sum()
+}
+
 /// Returns pixels whose centroid is that of the light on them: within a pixel light counts as at its middle, which moves that of an outline
 /// that a pixel's middle cuts, as of half a disc, by 0.16 pixels over the radius. A share of each pixel moves to the next.
 fn moved_to(centroid: Option<DVec2>, mut pixels: Array2<f64>) -> Array2<f64> {
-    let total = pixels.sum();
-    let of_pixel = |((row, column), energy): ((usize, usize), &f64)| DVec2::new(column as f64, row as f64) * *energy;
-    let found = pixels.indexed_iter().map(of_pixel).sum::<DVec2>() / total + 0.5;
-    let Some(by) = centroid.map(|centroid| centroid - found) else { return pixels };
+    let Some(by) = centroid.map(|centroid| centroid - (middle(&pixels) + 0.5)) else { return pixels };
     // Beyond half a pixel the window has cut the light.
     for (axis, by) in [(Axis(1), by.x), (Axis(0), by.y)].into_iter().filter(|(_, by)| by.abs() < 0.5) {
         for mut lane in pixels.lanes_mut(axis) {

@@ -16,7 +16,7 @@ use crate::{
     hurb_splatter::bending,
     lattice::{Lattice, N_AZIMUTHS},
     pupil::Outline,
-    render::{Layout, wave_energies},
+    render::{Layout, PARTS, of_parts, wave_energies},
     station::SurveyedLens,
     survey::Survey,
     symmetry::Symmetry,
@@ -286,9 +286,16 @@ impl Shared {
             spots.energies.iter_mut().for_each(|energy| *energy /= share);
         }
         let layout = Layout::new(&spots, bending(&color.lens, self.settings.diffraction), pitch_um);
-        let waves = |side, middle_px| self.waves(&color, &map, &query, side, middle_px);
-        let (energies, _) = layout.drawn(self.settings.diffraction, waves);
-        layout.kernel(&energies, pitch_um).normalized()
+        let drawn = |layout: &Layout<'_>, pitch_um: f64| {
+            let query = FilmQuery { pitch_um, ..query };
+            let waves = |side, middle_px| self.waves(&color, &map, &query, side, middle_px);
+            layout.drawn(self.settings.diffraction, waves).0
+        };
+        let (energies, excess_px2) = match layout.on_parts() {
+            Some(parts) => of_parts(&drawn(&parts, pitch_um / PARTS as f64)),
+            None => (drawn(&layout, pitch_um), [1.0 / 12.0; 2]),
+        };
+        Kernel { excess_px2, ..layout.kernel(&energies, pitch_um).normalized() }
     }
 
     /// Returns the wave-optical energies, in a window about a pixel, of the object point that the chief ray of a point of the film sees.
