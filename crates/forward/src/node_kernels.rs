@@ -11,14 +11,8 @@ use crate::{
     symmetry::{Mirror, Node, Symmetry},
 };
 
-/// The least that pixels add to a variance, or take from it, that is taken from kernels, samples².
-const LEAST_EXCESS: f64 = 1e-4;
-/// Of what is to be taken, the share that will do, and how much more each sample gives at most where some have nothing left to give.
-const NEARLY: f64 = 0.98;
-const MOST_MORE: f64 = 3.0;
-/// The most that a sample gives to each of its neighbors, and all of them to those behind, shares of it: less than all together.
-const MOST_MOVES: f32 = 0.4;
-const MOST_BACK: f64 = 0.2;
+/// The most that a sample gives to each of its neighbors, and the most that all give to those behind them, share of it: together no more than all.
+const MOST_MOVES: f32 = 1.0 / 3.0;
 
 /// What a film point gathers, on samples of some width: of sum 1, about that point.
 #[derive(Clone, Debug, PartialEq)]
@@ -52,7 +46,7 @@ impl NodeKernel {
         lines.for_each(|line| samples.extend(line[left..][..lit_columns].iter().map(|sample| sample.max(0.0))));
         let mut made = Self { at, samples }.normalized();
         for (axis, excess) in kernel.excess_px2.into_iter().enumerate() {
-            if excess.abs() > LEAST_EXCESS {
+            if excess != 0.0 {
                 made = made.narrowed(axis, excess);
             }
         }
@@ -77,19 +71,15 @@ impl NodeKernel {
     /// v = 1/12, up to fourth order, 1 − v/2 δ² + 9v/160 δ⁴ (the cell averages of finite volumes).
     fn narrowed(self, axis: usize, excess: f64) -> Self {
         let kernel = if excess < 0.0 { self.with_margin(axis) } else { self };
-        let before = kernel.variances()[axis];
-        let at_share = |share: f64| {
-            let moved = kernel.moved_inward(axis, share as f32);
-            (before - moved.variances()[axis], moved)
-        };
-        let (less, moved) = at_share(0.5 * excess);
-        // Samples that have nothing left to give take less: then the others give more.
-        if less / excess > NEARLY { moved } else { at_share(0.5 * excess * (excess / less).min(MOST_MORE)).1 }
+        let share = 0.5 * excess;
+        let less = kernel.variances()[axis] - kernel.moved_inward(axis, share).variances()[axis];
+        // Where samples have nothing left to give, the others give more.
+        if less * excess > 0.0 { kernel.moved_inward(axis, share * excess / less) } else { kernel }
     }
 
-    /// Returns the kernel after light moved to the brighter of neighbors along an axis, this share of their difference and less than half of what the other has; then
+    /// Returns the kernel after light moved to the brighter of neighbors along an axis, this share of their difference and no more than a third of what the other has; then
     /// a part of all light moves back by one sample, so that its mean stays.
-    fn moved_inward(&self, axis: usize, share: f32) -> Self {
+    fn moved_inward(&self, axis: usize, share: f64) -> Self {
         let columns = self.at.columns;
         let step = if axis == 0 { columns } else { 1 };
         let pairs = || (0..self.samples.len() - step).filter(|i| axis == 0 || (i + 1) % columns != 0);
@@ -102,13 +92,13 @@ impl NodeKernel {
         let mut samples = self.samples.clone();
         let mut ahead = 0.0;
         for i in pairs() {
-            let wanted = share * (curved[i + step] - curved[i]);
+            let wanted = share as f32 * (curved[i + step] - curved[i]);
             let moves = wanted.clamp(-MOST_MOVES * self.samples[i + step], MOST_MOVES * self.samples[i]);
             samples[i] -= moves;
             samples[i + step] += moves;
             ahead += f64::from(moves);
         }
-        let back = ahead.clamp(-MOST_BACK, MOST_BACK) as f32;
+        let back = (ahead as f32).clamp(-MOST_MOVES, MOST_MOVES);
         for i in pairs() {
             let moves = if back > 0.0 { back * self.samples[i + step] } else { back * self.samples[i] };
             samples[i] += moves;

@@ -23,6 +23,12 @@ impl Rectangle {
         (self.first_row + self.rows as i64, self.first_column + self.columns as i64)
     }
 
+    /// Whether it has a pixel.
+    pub(crate) fn has(&self, (row, column): (i64, i64)) -> bool {
+        let (end_row, end_column) = self.end();
+        (self.first_row..end_row).contains(&row) && (self.first_column..end_column).contains(&column)
+    }
+
     /// Returns it with a margin all around.
     pub(crate) fn grown(&self, margin: usize) -> Self {
         Self {

@@ -120,6 +120,11 @@ impl Visible {
     }
 }
 
+/// Points over a block along its side, so many pixels apart: one in each pixel, or those between which pixels lie.
+fn points_of(step: usize) -> usize {
+    BLOCK as usize / step + usize::from(step > 1)
+}
+
 /// How far rays through the pupil of a blur radius tell parts of it apart: as far as an edge of depth does wholly, and in focus, where all of it sees the same, not at all.
 fn told(radius_px: f32) -> f32 {
     (radius_px.abs() - IN_FOCUS_PX) / (DEPTH_EDGE_PX - IN_FOCUS_PX)
@@ -178,7 +183,11 @@ impl BlockParts {
 
     /// Returns the ratio at a pixel, between points.
     fn ratio(&self, ratios: &[f32], (row, column): (i64, i64)) -> f32 {
-        let (step, points) = (self.step, BLOCK as usize / self.step + 1);
+        let (step, points) = (self.step, points_of(self.step));
+        if step == 1 {
+            let [row, column] = [row, column].map(|pixel| pixel.rem_euclid(BLOCK) as usize);
+            return ratios[row * points + column];
+        }
         let split = |pixel: i64| {
             let within = pixel.rem_euclid(BLOCK) as usize;
             (within / step, (within % step) as f32 / step as f32)
@@ -206,7 +215,7 @@ impl BlockParts {
             return Some(Self { step: 1, by_layer: vec![], unknown_fraction: 0.0 });
         }
         let bundle = bundle(&met)?;
-        let points = BLOCK as usize / step + 1;
+        let points = points_of(step);
         let mut by_layer: Vec<(u16, Vec<f32>)> =
             met.iter().map(|met| (met.layer as u16, Vec::with_capacity(points * points))).collect();
         let mut sums = vec![[0.0; 3]; met.len()];
@@ -214,6 +223,11 @@ impl BlockParts {
         let corner = (at.first_row.div_euclid(BLOCK) * BLOCK, at.first_column.div_euclid(BLOCK) * BLOCK);
         for (row, column) in (0..points).flat_map(|row| (0..points).map(move |column| (row, column))) {
             let pixel = (corner.0 + (row * step) as i64, corner.1 + (column * step) as i64);
+            if step == 1 && !(at.has(pixel) && sight.near_edges(pixel).most_px > 0.0) {
+                // Where no bundle passes an edge there is nothing to tell.
+                by_layer.iter_mut().for_each(|(_, ratios)| ratios.push(1.0));
+                continue;
+            }
             if bundle.seen_from(sight, sight.place_px(pixel), &met, &mut sums) > FEW_RAYS {
                 n_unknown += 1;
             }
