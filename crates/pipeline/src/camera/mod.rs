@@ -47,6 +47,7 @@ pub use reflections::LensReflections;
 pub(crate) use scene::bands_or_own;
 pub use scene::{FlatSize, SceneSource, SceneSpec};
 pub use sensor_options::SensorOptions;
+pub use syntax::CAMERA_SCHEMA;
 pub use video::{CameraTurn, TurnPath, VideoSpec};
 pub use world::{RenderEffort, RenderMethod, WorldLamp, WorldSky, WorldSpec, WorldView};
 

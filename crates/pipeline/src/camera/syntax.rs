@@ -3,7 +3,8 @@
 use ron::error::Position;
 use serde_json::Value;
 
-use crate::schema::CAMERA_SCHEMA;
+/// The schema of camera files.
+pub const CAMERA_SCHEMA: &str = include_str!("../../data/camera.schema.json");
 
 /// Returns what is wrong with the text of a camera file: after which key, and what stands there.
 pub(super) fn reason(text: &str, error: &ron::error::SpannedError) -> String {
@@ -29,7 +30,10 @@ pub(super) fn reason(text: &str, error: &ron::error::SpannedError) -> String {
         ron::Error::ExpectedIdentifier if found.starts_with('"') => {
             ": words of choices stand without quotes".to_owned()
         }
-        ron::Error::ExpectedIdentifier | ron::Error::ExpectedStructLike | ron::Error::ExpectedNamedStructLike(_) => {
+        ron::Error::ExpectedIdentifier
+        | ron::Error::SuggestRawIdentifier(_)
+        | ron::Error::ExpectedStructLike
+        | ron::Error::ExpectedNamedStructLike(_) => {
             values_of(word).map_or_else(String::new, |values| format!(": {word} takes {values}"))
         }
         _ => String::new(),
@@ -68,10 +72,7 @@ mod tests {
                 "depth_kind: Disparity",
                 "depth_kind: Expected opening `(`: Disparity takes values, as Disparity(baseline_m: …, offset_px: … (or none))",
             ),
-            (
-                "depth_kind: Disparity(193)",
-                "depth_kind: Expected identifier, found 193: Disparity takes values, as Disparity(",
-            ),
+            ("depth_kind: Disparity(193)", "found 193: Disparity takes values, as Disparity("),
             ("depth_kind: InverseBetween\n  ", "as InverseBetween(far_m: …, near_m: …)"),
             ("depth_kind: Disparty", "Disparty"),
         ] {
