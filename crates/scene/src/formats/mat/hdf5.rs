@@ -151,7 +151,7 @@ impl Hdf5 {
 
 /// Returns the attributes that may change what numbers mean, in the order of their names.
 fn telling(attributes: impl IntoIterator<Item = (String, AttrValue)>) -> Vec<Attribute> {
-    const HARMLESS: [&str; 12] = [
+    const HARMLESS: [&str; 17] = [
         "CLASS",
         "NAME",
         "REFERENCE_LIST",
@@ -164,6 +164,12 @@ fn telling(attributes: impl IntoIterator<Item = (String, AttrValue)>) -> Vec<Att
         "long_name",
         "standard_name",
         "Conventions",
+        // Of whole files (CF conventions, 2.6.2).
+        "title",
+        "history",
+        "institution",
+        "references",
+        "_NCProperties",
     ];
     let is_telling =
         |name: &str| !(HARMLESS.contains(&name) || name.starts_with("MATLAB_") || name.starts_with("_Net"));
