@@ -84,12 +84,14 @@ fn spot(arguments: &SpotArgs, common: &Common) -> anyhow::Result<()> {
 
 fn region(arguments: &RegionArgs, common: &Common) -> anyhow::Result<()> {
     let curve = curve(arguments.picture_args.curve);
-    tell(&notes_on_picture(&arguments.picture, curve), common);
     let parsed = |text: &Option<String>| text.as_deref().map(PixelRegion::parse).transpose();
     let request = RegionRequest { region: parsed(&arguments.region)?, reference: parsed(&arguments.reference)? };
     let out = arguments.picture_args.out.as_deref();
     let finish = Finish::new(("region", "Region"), file_name(&arguments.picture), out, common)?;
-    finish.with(&request.measure_file(&arguments.picture, curve)?, region_table)
+    let mut notes = vec![];
+    let measured = request.measure_file(&arguments.picture, curve)?.told_in(&mut notes);
+    tell(&notes, common);
+    finish.with(&measured, region_table)
 }
 
 fn noise(arguments: &NoiseArgs, common: &Common) -> anyhow::Result<()> {

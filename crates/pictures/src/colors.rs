@@ -74,6 +74,15 @@ impl StatedColors {
         }
     }
 
+    /// Whether a file is a PNG whose chunks say what its colors are, be it sRGB: they count before its Exif data.
+    pub fn are_in_chunks(path: &Path) -> bool {
+        let Ok(file) = File::open(path) else { return false };
+        let Ok(reader) = png::Decoder::new(BufReader::new(file)).read_info() else { return false };
+        let info = reader.info();
+        let is_named = info.srgb.is_some() || info.coding_independent_code_points.is_some();
+        is_named || info.icc_profile.is_some() || info.gama_chunk.is_some() || info.chrm_chunk.is_some()
+    }
+
     /// Returns colors of samples that are linear: the matrix to linear sRGB is given.
     pub fn linear(name: String, to_srgb: [[f64; 3]; 3]) -> Self {
         Self { name, curves: None, to_srgb }

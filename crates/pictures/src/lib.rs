@@ -51,7 +51,28 @@ pub fn size_of(path: &Path) -> Result<(usize, usize), ImageError> {
 /// When the file cannot be read, is no such picture, or takes more memory than it may.
 pub fn read_within(path: &Path, beside_bytes: u64) -> Result<DynamicImage, ImageError> {
     let n_bytes = fs::metadata(path)?.len();
+    check_numbers(path)?;
     decoded(open(path)?, n_bytes, beside_bytes)
+}
+
+/// Refuses a TIFF file of colors of whole numbers of 32 bits, which what decodes it takes for floats.
+fn check_numbers(path: &Path) -> Result<(), ImageError> {
+    const WHOLE: u16 = 1;
+    if format_of(path)? != Some(ImageFormat::Tiff) {
+        return Ok(());
+    }
+    // Whoever decodes a broken file says what is wrong with it.
+    let Ok(mut decoder) = tiff::decoder::Decoder::new(io::BufReader::new(PictureFile::open(path)?)) else {
+        return Ok(());
+    };
+    let mut first =
+        |tag| decoder.find_tag_unsigned_vec::<u16>(tag).ok().flatten().and_then(|list| list.first().copied());
+    let (bits, format) = (first(tiff::tags::Tag::BitsPerSample), first(tiff::tags::Tag::SampleFormat));
+    if bits == Some(32) && format.unwrap_or(WHOLE) == WHOLE {
+        let reason = "its samples are whole numbers of 32 bits, expected those of 8 or 16 bits, or floats";
+        return Err(ImageError::IoError(io::Error::other(reason)));
+    }
+    Ok(())
 }
 
 /// Reads a picture from the bytes of a file, as [`read_within`] does.

@@ -47,8 +47,8 @@ pub use dioptric_scene::{
 };
 
 pub use camera::{
-    BlurSpec, BorderSpec, Camera, CameraTurn, CoatingSpec, Crop, DualPixelSpec, Exposed, FilmSpec, FilterSpec,
-    FlatSize, FocusSpec, FramesSpec, LensReadOptions, LensReflections, LensSpec, LightFieldSpec, Movements,
+    BlurSpec, BorderSpec, CAMERA_SCHEMA, Camera, CameraTurn, CoatingSpec, Crop, DualPixelSpec, Exposed, FilmSpec,
+    FilterSpec, FlatSize, FocusSpec, FramesSpec, LensReadOptions, LensReflections, LensSpec, LightFieldSpec, Movements,
     PhotodiodeReads, Photodiodes, REFERENCE_WAVELENGTH_NM, RenderEffort, RenderMethod, RetiredBank, SceneSource,
     SceneSpec, SensorOptions, SensorSpec, StopSpec, TurnPath, VideoSpec, WavelengthSpec, WorldLamp, WorldSky,
     WorldSpec, WorldView, nearest_to_reference_nm, with_blades,
@@ -71,7 +71,7 @@ pub use ranges::{Range, range_of};
 pub use scene_files::{SceneInfo, SceneRequest};
 #[cfg(feature = "schema")]
 pub use schema::generated_schemas;
-pub use schema::{CAMERA_SCHEMA, CAMERA_TEMPLATE, SENSOR_SCHEMA};
+pub use schema::{CAMERA_TEMPLATE, SENSOR_SCHEMA};
 pub use sense::{SenseRequest, Sensed};
 pub use shown::{ShowRequest, ShownPicture, open_display};
 pub use stages::{

@@ -4,8 +4,6 @@
 //! `Name` is a string. The texts are made from the types by `cargo xtask schema`, and a test of the workspace holds them to
 //! the types, so that a program that only prints them builds no generator.
 
-/// The schema of camera files.
-pub const CAMERA_SCHEMA: &str = include_str!("../data/camera.schema.json");
 /// The schema of sensor files.
 pub const SENSOR_SCHEMA: &str = include_str!("../data/sensor.schema.json");
 /// A camera file with every key, its default and its choices in comments.
@@ -26,7 +24,7 @@ mod tests {
     use std::path::Path;
 
     use super::*;
-    use crate::{Camera, LensSpec, SceneSource};
+    use crate::{CAMERA_SCHEMA, Camera, LensSpec, SceneSource};
 
     #[test]
     fn template_is_a_camera_of_defaults() {

@@ -146,7 +146,8 @@ pub(crate) fn _measure<'py>(
             let request =
                 RegionRequest { region: options.get("region", region)?, reference: options.get("reference", region)? };
             measured(py, move || match picture {
-                Subject::File(path) => request.measure_file(&path, curve),
+                // What is said of the file was told above.
+                Subject::File(path) => Ok(request.measure_file(&path, curve)?.told_in(&mut vec![])),
                 Subject::Light(picture) => request.measure(&picture),
                 Subject::Bands(image) => request.measure_bands("the shot", &image),
             })

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use dioptric_scene::read_spectral_exr;
+use dioptric_scene::{Noted, read_spectral_exr};
 use dioptric_spectrum::{ColorTemperature, Lab, Observer, Quantity, Xyz, delta_e_2000};
 use ndarray::{Array2, ArrayView2, Axis};
 use serde::Serialize;
@@ -122,16 +122,18 @@ pub struct ColorDifference {
 }
 
 impl RegionRequest {
-    /// Measures a region of a file, whose samples stand for light so.
+    /// Measures a region of a file, whose samples stand for light so; with what of the file is not used, a sentence each.
     ///
     /// # Errors
     /// When the file cannot be read, or a region is not within it.
-    pub fn measure_file(&self, path: &Path, curve: CodeCurve) -> Result<RegionMeasurement, PipelineError> {
+    pub fn measure_file(&self, path: &Path, curve: CodeCurve) -> Result<Noted<RegionMeasurement>, PipelineError> {
         let is_exr = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr"));
         match is_exr.then(|| read_spectral_exr(path)) {
-            // What its header states beside is told by `notes_on_picture`.
-            Some(Ok(file)) => self.measure_bands(&path.display().to_string(), &file.told_in(&mut vec![]).image),
-            _ => self.measure(&MeasuredPicture::open(path, curve)?),
+            Some(Ok(file)) => file.try_map(|file| self.measure_bands(&path.display().to_string(), &file.image)),
+            _ => {
+                let picture = MeasuredPicture::open(path, curve)?;
+                Ok(Noted::new(self.measure(&picture)?, picture.notes))
+            }
         }
     }
 

@@ -15,6 +15,7 @@ mod photodiodes;
 mod reflections;
 mod scene;
 mod sensor_options;
+mod syntax;
 mod video;
 mod world;
 
@@ -27,7 +28,7 @@ use dioptric_optics::{Iris, SurfaceChange};
 use dioptric_psf::{Diffraction, PsfError};
 use dioptric_sensor::{AutoExposure, ExposureControl, Metering, NoiseSources, Processing};
 use dioptric_spectrum::WavelengthGrid;
-use ron::{error::Position, extensions::Extensions};
+use ron::extensions::Extensions;
 use serde::{Deserialize, Serialize};
 
 pub use bank::RetiredBank;
@@ -46,6 +47,7 @@ pub use reflections::LensReflections;
 pub(crate) use scene::bands_or_own;
 pub use scene::{FlatSize, SceneSource, SceneSpec};
 pub use sensor_options::SensorOptions;
+pub use syntax::CAMERA_SCHEMA;
 pub use video::{CameraTurn, TurnPath, VideoSpec};
 pub use world::{RenderEffort, RenderMethod, WorldLamp, WorldSky, WorldSpec, WorldView};
 
@@ -325,7 +327,7 @@ impl Camera {
             path: path.to_owned(),
             line: e.span.start.line,
             column: e.span.start.col,
-            reason: syntax_reason(text, &e),
+            reason: syntax::reason(text, &e),
         })?;
         camera.check(&Checker::of_file(path, text))?;
         camera.resolve_paths(path.parent().unwrap_or(Path::new("")));
@@ -472,33 +474,6 @@ impl Camera {
     }
 }
 
-/// Returns what is wrong with the text of a camera file: after which key, and what stands there.
-fn syntax_reason(text: &str, error: &ron::error::SpannedError) -> String {
-    let Position { line, col } = error.span.start;
-    let Some(line) = text.lines().nth(line.saturating_sub(1)) else { return error.code.to_string() };
-    let split = line.char_indices().nth(col.saturating_sub(1)).map_or(line.len(), |(at, _)| at);
-    let (before, found) = line.split_at(split);
-    let is_of_word = |c: char| c.is_ascii_alphanumeric() || c == '_';
-    // After a key, or after the word of a choice.
-    let head = before.trim_end();
-    let head = head.strip_suffix(':').or_else(|| head.trim_end_matches(is_of_word).trim_end().strip_suffix(':'));
-    let key = head.map(|head| head.rsplit(|c| !is_of_word(c)).next().unwrap_or_default());
-    let (Some(key), false) = (key.filter(|key| !key.is_empty()), found.is_empty()) else {
-        return error.code.to_string();
-    };
-    let end = match found.strip_prefix('"') {
-        Some(within) => within.find('"').map(|end| end + 2),
-        None => found.find([',', ')', ']', '}']),
-    };
-    let found: String = found[..end.unwrap_or(found.len())].chars().take(24).collect();
-    let remedy = match error.code {
-        ron::Error::ExpectedIdentifier if found.starts_with('"') => ": words of choices stand without quotes",
-        _ => "",
-    };
-    let found = if found.is_empty() { String::new() } else { format!(", found {}", found.trim_end()) };
-    format!("{key}: {}{found}{remedy}", error.code)
-}
-
 #[cfg(test)]
 mod tests {
     use dioptric_sensor::{NoiseSource, WhiteBalance};
@@ -524,21 +499,6 @@ mod tests {
         let demo = Camera::demo().unwrap();
         demo.validate().unwrap();
         assert_eq!(parse(&demo.to_ron()).unwrap(), demo);
-    }
-
-    #[test]
-    fn what_is_no_word_of_a_choice_is_named_with_its_key() {
-        for (reading, expected) in [
-            (
-                "quantity: \"reflectance\"",
-                "quantity: Expected identifier, found \"reflectance\": words of choices stand without quotes",
-            ),
-            ("depth_kind: Disparity", "depth_kind: Expected"),
-        ] {
-            let text = SHORT.replace("File(\"scene.exr\")", &format!("File(\"scene.exr\"), reading: ({reading})"));
-            let error = parse(&text).unwrap_err().to_string();
-            assert!(error.contains(expected), "{error}");
-        }
     }
 
     #[test]

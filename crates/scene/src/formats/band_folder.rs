@@ -23,6 +23,9 @@ const LISTS: [&str; 2] = ["wavelengths.txt", "wavelengths.csv"];
 /// Endings of pictures that are no bands.
 const OTHERS: [&str; 10] = ["bmp", "jpg", "jpeg", "webp", "ppm", "pgm", "pnm", "exr", "hdr", "pfm"];
 
+/// Endings of files that may say something of the numbers.
+const TELLING: [&str; 11] = ["json", "txt", "csv", "xml", "yaml", "yml", "ini", "toml", "mat", "npy", "h5"];
+
 /// Reads a folder of gray PNG or TIFF pictures, one a band, whose codes are linear, or floats.
 ///
 /// Names end in the wavelength in nm (`toys_400.png`, `toys-400.5nm.png`) or in a number (`toys_ms_01.png`). Numbered
@@ -32,14 +35,15 @@ const OTHERS: [&str; 10] = ["bmp", "jpg", "jpeg", "webp", "ppm", "pgm", "pnm", "
 /// # Errors
 /// When there is no such picture, wavelengths are missing, or the pictures differ in size.
 pub(super) fn band_folder(folder: &Path, told_nm: Option<&[f64]>) -> Result<Cube, SceneError> {
-    let (pictures, unused) = numbered_pictures(folder)?;
+    let Listing { pictures, unused, files } = listing(folder)?;
     if pictures.is_empty() {
         return Err(SceneError::NoBands {
             file: folder.to_owned(),
             expected: "PNG or TIFF pictures whose names end in a wavelength in nm or in a number",
         });
     }
-    let mut notes: Vec<String> = note_of(folder, "picture", &unused).into_iter().collect();
+    let notes = [note_of(folder, "picture", &unused), note_of(folder, "file", &files)];
+    let mut notes: Vec<String> = notes.into_iter().flatten().collect();
     let wavelengths_nm = match (told_nm, wavelengths_of(folder, &pictures)) {
         (None, own) => {
             let own = own?;
@@ -132,10 +136,20 @@ fn planes_of(pictures: &[Numbered], notes: &mut Vec<String>) -> Result<(Vec<Arra
 /// A picture with the number that its name ends in.
 type Numbered = (f64, PathBuf);
 
-/// Returns the pictures whose names end in a number, with the number, in its order; and the names of the others.
-fn numbered_pictures(folder: &Path) -> Result<(Vec<Numbered>, Vec<String>), SceneError> {
+/// What is in a folder.
+#[derive(Default)]
+struct Listing {
+    /// The pictures whose names end in a number, in its order.
+    pictures: Vec<Numbered>,
+    /// The names of other pictures.
+    unused: Vec<String>,
+    /// The names of files that may say something of the numbers.
+    files: Vec<String>,
+}
+
+fn listing(folder: &Path) -> Result<Listing, SceneError> {
     let entries = fs::read_dir(folder).map_err(|error| unreadable(folder, error))?;
-    let (mut pictures, mut unused) = (Vec::new(), Vec::new());
+    let Listing { mut pictures, mut unused, mut files } = Listing::default();
     for entry in entries {
         let path = entry.map_err(|error| unreadable(folder, error))?.path();
         let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
@@ -145,6 +159,12 @@ fn numbered_pictures(folder: &Path) -> Result<(Vec<Numbered>, Vec<String>), Scen
         }
         if OTHERS.contains(&extension.as_str()) {
             unused.push(name_of(&path));
+        }
+        let name = name_of(&path).to_lowercase();
+        let is_known =
+            LISTS.contains(&name.as_str()) || ["readme", "license"].iter().any(|start| name.starts_with(start));
+        if TELLING.contains(&extension.as_str()) && !is_known {
+            files.push(name_of(&path));
         }
         if !matches!(extension.as_str(), "png" | "tif" | "tiff") {
             continue;
@@ -157,7 +177,8 @@ fn numbered_pictures(folder: &Path) -> Result<(Vec<Numbered>, Vec<String>), Scen
     }
     pictures.sort_by(|a, b| a.0.total_cmp(&b.0).then_with(|| a.1.cmp(&b.1)));
     unused.sort();
-    Ok((pictures, unused))
+    files.sort();
+    Ok(Listing { pictures, unused, files })
 }
 
 /// Returns the number that a stem ends in, before an optional `nm`.
@@ -227,6 +248,17 @@ mod tests {
         assert_eq!(image.quantity(), Quantity::Reflectance);
         let expected = [200.0, 300.0, 100.0].map(|code: f32| f64::from(code / 65535.0));
         assert_eq!(image.spectrum_at(1, 2), expected);
+    }
+
+    #[test]
+    fn files_beside_the_bands_are_named() {
+        let folder = folder_of(&["a_450.png", "a_550.png", "depth.png"]);
+        for name in ["exposure.json", "README.txt", "wavelengths.csv"] {
+            fs::write(folder.path().join(name), "450, 550").unwrap();
+        }
+        let notes = band_folder(folder.path(), None).unwrap().notes.join(" ");
+        let named = ["'depth.png'", "'exposure.json'", "readme.md", "README.txt", "wavelengths.csv"];
+        assert_eq!(named.map(|name| notes.contains(name)), [true, true, false, false, false], "{notes}");
     }
 
     #[test]

@@ -309,20 +309,21 @@ impl EnviFile {
         {
             return units(format!("its header says that {own} is white, which a white level of {told} contradicts"));
         }
-        // Gains without a unit are those of ENVI, W m⁻² sr⁻¹ µm⁻¹.
-        let gain_unit = || LightUnit::parse("W/m^2/sr/um").filter(|_| has_gains && !is_reflecting);
+        // Gains without a unit are those of ENVI, W m⁻² sr⁻¹ µm⁻¹, and make no photons.
+        let is_of_gains = has_gains && !is_reflecting && reading.quantity != Some(FileQuantity::Photons);
+        let gain_unit = || LightUnit::parse("W/m^2/sr/um").filter(|_| is_of_gains);
         let is_light = wants_light.unwrap_or(own_unit.is_some() || gain_unit().is_some());
         if is_light {
             if let Some(unit) = told_unit.or(own_unit) {
                 reading.check_quantity(&self.header_path, unit)?;
             }
             let by_quantity = || reading.quantity.and_then(FileQuantity::light_unit);
-            let unit = told_unit.or(own_unit).or_else(by_quantity).or_else(gain_unit).unwrap_or(LightUnit::RADIANCE);
+            let unit = told_unit.or(own_unit).or_else(gain_unit).or_else(by_quantity).unwrap_or(LightUnit::RADIANCE);
             let words = match (reading.unit.as_deref(), header.data_units.as_deref().filter(|_| own_unit.is_some())) {
                 (Some(told), _) => told.to_owned(),
                 (None, Some(own)) => short(own),
                 (None, None) if reading.quantity == Some(FileQuantity::Photons) => "photons/s/m^2/sr/nm".to_owned(),
-                (None, None) if reading.quantity.is_none() => "W/m^2/sr/um by its gains".to_owned(),
+                (None, None) if is_of_gains => "W/m^2/sr/um by its gains".to_owned(),
                 (None, None) => "W/m^2/sr/nm".to_owned(),
             };
             let factor = scale / header.radiance_scale.unwrap_or(1.0);

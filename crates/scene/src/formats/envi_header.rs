@@ -381,6 +381,10 @@ impl Entries<'_> {
             13 => DataType::U32,
             14 => DataType::I64,
             15 => DataType::U64,
+            6 | 9 => {
+                let reason = "it holds complex numbers, expected real ones (1–5 or 12–15): save their magnitudes";
+                return Err(self.wrong("data type", reason.to_owned()));
+            }
             other => return Err(self.wrong("data type", format!("{other}, expected 1–5 or 12–15"))),
         })
     }
@@ -519,7 +523,8 @@ mod tests {
             ("samples = 4", "samples = four", "line 3: 'samples': 'four'"),
             ("samples = 4", "samples = 0", "without samples"),
             ("lines   = 3", "", "'lines': the header lacks it"),
-            ("data type = 12", "data type = 6", "line 7: 'data type': 6, expected"),
+            ("data type = 12", "data type = 6", "line 7: 'data type': it holds complex numbers"),
+            ("data type = 12", "data type = 7", "line 7: 'data type': 7, expected"),
             ("BIL", "bob", "expected bsq, bil or bip"),
             ("byte order = 1", "byte order = 2", "expected 0 or 1"),
             ("Micrometers", "furlongs", "'wavelength units': 'furlongs'"),

@@ -77,11 +77,11 @@ pub(super) fn is_harmless(name: &str) -> bool {
     ];
     const STARTS: [&str; 8] = ["oiio:", "nuke/", "cycles.", "Exif", "exif", "IPTC:", "input/", "cryptomatte/"];
     let is_usual = NAMES.contains(&name) || STARTS.iter().any(|start| name.starts_with(start));
-    is_usual && !name.starts_with(COLOR_SPACE)
+    is_usual && !COLOR_SPACES.iter().any(|own| name.starts_with(own))
 }
 
-/// What `OpenImageIO` says of the colors.
-const COLOR_SPACE: &str = "oiio:ColorSpace";
+/// What says of the colors which they are: `OpenImageIO`'s attribute, and that of the Color Interop Forum.
+const COLOR_SPACES: [&str; 2] = ["oiio:ColorSpace", "colorInteropID"];
 
 /// Whether a color space of `OpenImageIO` is what linear colors of an EXR file are without a word: of sRGB's primaries.
 fn is_linear_srgb(text: &str) -> bool {
@@ -177,9 +177,9 @@ pub(crate) fn from_layer(layer: &LayerAttributes) -> Attributes {
     };
     let ours = [LAYOUT_VERSION, UNITS, PITCH, FOCAL, CENTER_X, CENTER_Y, FOV, LIGHT];
     let own = layer.other.keys().map(words_of).filter(|name| !ours.contains(&name.as_str()));
-    let own = own.filter_map(|name| match get(COLOR_SPACE).filter(|_| name == COLOR_SPACE) {
+    let own = own.filter_map(|name| match get(&name).filter(|_| COLOR_SPACES.contains(&name.as_str())) {
         Some(AttributeValue::Text(text)) if is_linear_srgb(&words_of(text)) => None,
-        Some(AttributeValue::Text(text)) => Some(format!("{COLOR_SPACE} ({})", words_of(text))),
+        Some(AttributeValue::Text(text)) => Some(format!("{name} ({})", words_of(text))),
         _ => Some(name),
     });
     // Attributes of the standard that would change where or how bright things are.
@@ -271,17 +271,19 @@ mod tests {
 
     #[test]
     fn other_colors_are_named() {
-        let names = |space: &str| {
+        let names = |key: &str, space: &str| {
             let mut layer = LayerAttributes::default();
-            layer.other.insert(Text::from(COLOR_SPACE), AttributeValue::Text(Text::from(space)));
+            layer.other.insert(Text::from(key), AttributeValue::Text(Text::from(space)));
             let stated = from_layer(&layer).others;
             stated.names().filter(|name| !is_harmless(name)).map(str::to_owned).collect::<Vec<_>>()
         };
-        for space in ["Linear", "lin_rec709", "Linear Rec.709 (sRGB)", "scene_linear"] {
-            assert_eq!(names(space), Vec::<String>::new(), "{space}");
-        }
-        for space in ["ACEScg", "sRGB", "Rec709", "lin_ap1"] {
-            assert_eq!(names(space), [format!("oiio:ColorSpace ({space})")]);
+        for key in COLOR_SPACES {
+            for space in ["Linear", "lin_rec709", "Linear Rec.709 (sRGB)", "scene_linear", "lin_rec709_scene"] {
+                assert_eq!(names(key, space), Vec::<String>::new(), "{space}");
+            }
+            for space in ["ACEScg", "sRGB", "Rec709", "lin_ap1_scene", "srgb_rec709_scene"] {
+                assert_eq!(names(key, space), [format!("{key} ({space})")]);
+            }
         }
     }
 

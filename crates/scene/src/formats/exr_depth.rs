@@ -73,7 +73,8 @@ pub(super) fn depth_channel(planes: Vec<(String, &Array2<f32>)>) -> Option<(Stri
     };
     let name = depth_name(channels.names(), "").map(|(name, _)| name).or_else(only)?;
     let plane = channels.take(&name)?;
-    if name == "R" {
+    // The one channel of a file may be called so as well.
+    if name == "R" && channels.get("G").is_some() {
         let is_same = |own: Option<&&Array2<f32>>| own == Some(&plane);
         if !(is_same(channels.get("G")) && is_same(channels.get("B"))) {
             return None;

@@ -6,11 +6,10 @@ use dioptric_pictures::{DynamicImage, StatedColors};
 use ndarray::Array2;
 
 use super::{
-    contents::is_of,
     picture::{decode, has_holes, pnm_top},
     picture_parts::{note_of_orientation, notes_on_parts},
     stated::{Noted, name_of, note_of},
-    tiff_file::{TiffAs, TiffFile, TiffStack, read_tiff},
+    tiff_file::{TiffAs, TiffFile, TiffStack, is_tiff, read_tiff},
     unusable::unreadable,
 };
 use crate::SceneError;
@@ -30,7 +29,7 @@ pub(super) struct GrayPicture {
 /// # Errors
 /// When it cannot be read, has colors, or several planes of which none is told.
 pub(super) fn read_gray(path: &Path, told: Option<&str>) -> Result<Noted<GrayPicture>, SceneError> {
-    if is_of(path, &["tif", "tiff"]) {
+    if is_tiff(path) {
         let mut notes = vec![];
         let file = read_tiff(path, TiffAs::Planes(None))?.told_in(&mut notes);
         let gray = of_tiff(path, file, told, &mut notes)?;
@@ -69,7 +68,7 @@ fn of_tiff(
         TiffFile::Stack(stack) => plane_of(path, stack, told, notes)?,
     };
     page.undo(&mut gray.values, gray.top.unwrap_or(1.0) as f32);
-    notes.extend(gray.wavelength_nm.is_none().then(|| page.note_of_description(path)).flatten());
+    notes.extend(page.note_of_description(path));
     Ok(gray)
 }
 

@@ -35,8 +35,7 @@ pub(super) fn read_hidden(
         reading = FileReading { depth_variable: None, depth_unit: None, depth_kind: None, ..reading };
     }
     let options = &ReadOptions { hidden: None, reading, ..options.clone() };
-    let mut contents = contents_of(file, options)?;
-    contents.check_heeds(file, options)?;
+    let mut contents = contents_behind(file, options)?;
     if contents.panorama.is_some() || contents.frame() != frame {
         let reason = format!("its samples are others than those of {}, behind which they lie", name_of(first));
         return Err(unreadable(file, reason));
@@ -57,6 +56,47 @@ pub(super) fn read_hidden(
         }),
     );
     Ok(Hidden { file: file.to_owned(), contents, is_own_file: true })
+}
+
+/// Reads a file under what is said of the numbers of the first surface, where it says not itself what its own are.
+fn contents_behind(file: &Path, options: &ReadOptions) -> Result<Contents, SceneError> {
+    let of = |options: &ReadOptions| {
+        let contents = contents_of(file, options)?;
+        contents.check_heeds(file, options)?;
+        Ok(contents)
+    };
+    let Some(told) = told_words(options) else { return of(options) };
+    let noted = |contents: Contents, words: &str| {
+        let note = format!("{}: what was said of the first surface ({told}) {words}", name_of(file));
+        Contents { notes: contents.notes.into_iter().chain([note]).collect(), ..contents }
+    };
+    match of(options) {
+        Ok(contents) => Ok(noted(contents, "counts for it too")),
+        Err(error @ (SceneError::DoesNotApply { .. } | SceneError::Units { .. })) => {
+            let FileReading { depth, depth_unit, depth_kind, depth_variable, no_data, .. } = options.reading.clone();
+            let reading =
+                FileReading { depth, depth_unit, depth_kind, depth_variable, no_data, ..FileReading::default() };
+            let own = of(&ReadOptions { reading, white_level: None, ..options.clone() }).map_err(|_| error)?;
+            Ok(noted(own, "does not count for it, which says itself what it is"))
+        }
+        Err(error) => Err(error),
+    }
+}
+
+/// Returns the names of what is said of the numbers of the first surface, where anything is.
+fn told_words(options: &ReadOptions) -> Option<String> {
+    let reading = &options.reading;
+    let given = [
+        ("--quantity", reading.quantity.is_some()),
+        ("--unit", reading.unit.is_some()),
+        ("--scale", reading.scale.is_some()),
+        ("--white-level", options.white_level.is_some()),
+        ("--scene-wavelengths-nm", reading.wavelengths_nm.is_some()),
+        ("--variable", reading.variable.is_some()),
+        ("--axes", reading.axes.is_some()),
+    ];
+    let names: Vec<&str> = given.into_iter().filter(|(_, is_given)| *is_given).map(|(name, _)| name).collect();
+    (!names.is_empty()).then(|| names.join(", "))
 }
 
 /// Returns radiance and depth of what lies behind a first surface of this view and depth, on the bands wanted; reflectances are under the light on

@@ -80,6 +80,8 @@ mod unusable;
 mod wavelength_unit;
 #[cfg(test)]
 mod word_tests;
+#[cfg(test)]
+mod written_tests;
 
 pub(crate) use picture::decode as decode_picture;
 pub(crate) use unusable::{check_made, unwritable};
@@ -95,8 +97,7 @@ pub use mat::{
     write_iset_scene,
 };
 pub use photons::joules_per_photon;
-pub use picture::{PictureSamples, read_picture, read_picture_samples};
-pub use picture_parts::notes_on_samples;
+pub use picture::{PictureSamples, notes_on_samples, read_picture, read_picture_samples};
 pub use point_table::PointTable;
 pub use read_options::{Part, ReadOptions};
 pub use read_scene::read_scene;

@@ -213,5 +213,98 @@ fn mutations_of_texts_are_read_or_refused() {
         let codes: Vec<u8> = (1..13_u16).flat_map(|code| (code * 500).to_be_bytes()).collect();
         let pgm = [&b"P5\n# a word\n4 3\n65535\n"[..], &codes].concat();
         check("depth PGM", &pgm, false, &depth, &folder.join("made_depth.pgm"));
+        let nerf = r#"{"w": 4, "h": 3, "camera_angle_x": 0.8, "fl_x": 4.731, "cx": 2.0, "cy": 1.5, "frames": []}"#;
+        check("transforms.json", nerf.as_bytes(), true, &view, &folder.join("made_transforms.json"));
+        let points = "name,x_deg,y_deg,depth_m,candela,light\na lamp,-3,2,0.45,0.02,625nm\nstar,1,2,,1,D65\n";
+        check_table(points, &folder.join("points.csv"));
+    });
+}
+
+/// Reads changed tables of points.
+fn check_table(good: &str, path: &Path) {
+    let mut rng = ChaCha8Rng::seed_from_u64(7);
+    for _ in 0..n_cases() {
+        fs::write(path, changed(&mut rng, good.as_bytes(), true)).unwrap();
+        if let Err(error) = super::PointTable::read(path) {
+            let message = error.to_string();
+            assert!(message.contains("points.csv") && !message.contains('\n') && message.len() < 1000, "{message}");
+        }
+    }
+}
+
+#[test]
+fn mutations_of_stacks_and_parts_are_read_or_refused() {
+    alone(|| {
+        let (_folder, folder) = folder();
+        let plain = |path: &Path| read_scene(path, &ReadOptions::default());
+        let mut stack = std::io::Cursor::new(vec![]);
+        let mut encoder = tiff::encoder::TiffEncoder::new(&mut stack).unwrap();
+        for nm in [450, 550] {
+            let mut page = encoder.new_image::<tiff::encoder::colortype::Gray32Float>(4, 3).unwrap();
+            page.encoder().write_tag(tiff::tags::Tag::Unknown(285), format!("{nm} nm").as_str()).unwrap();
+            let text = r#"{"wavelengths_nm": [450, 550], "gain": 2}"#;
+            page.encoder().write_tag(tiff::tags::Tag::ImageDescription, text).unwrap();
+            page.write_data(&[0.5; 12]).unwrap();
+        }
+        let reflecting = told(Some(FileQuantity::Reflectance), None, false);
+        let reflecting = ReadOptions { white_level: None, ..reflecting };
+        let as_bands = |path: &Path| read_scene(path, &reflecting);
+        check("TIFF stack", stack.get_ref(), false, &as_bands, &folder.join("made.tif"));
+        // Two parts of an EXR file, of which one lies behind the other.
+        let planes = [2.0_f32, 3.0].map(|z_m| [0.5, 0.5, z_m].map(|v| ndarray::Array2::from_elem((3, 4), v)));
+        let exr = folder.join("good.exr");
+        let names = ["S0.450,0nm", "S0.550,0nm", "Z"].map(|name| [name.to_owned(), format!("hidden.{name}")]);
+        let mut channels = vec![];
+        for (name, k) in names.iter().zip(0..) {
+            channels.extend([(name[0].as_str(), &planes[0][k]), (name[1].as_str(), &planes[1][k])]);
+        }
+        crate::write_planes_exr(&exr, &channels, crate::ExrSamples::Single).unwrap();
+        check("EXR of layers", &fs::read(&exr).unwrap(), false, &plain, &folder.join("made_layers.exr"));
+        // A list of wavelengths beside the pictures of a folder.
+        let bands = folder.join("wavelengths");
+        fs::create_dir(&bands).unwrap();
+        for name in ["a_01.png", "a_02.png"] {
+            fs::write(bands.join(name), encoded(image::GrayImage::new(4, 3).into(), image::ImageFormat::Png)).unwrap();
+        }
+        let listed = |_: &Path| read_scene(&bands, &ReadOptions::default());
+        check("list of bands", b"450\n550\n", true, &listed, &bands.join("wavelengths.txt"));
+    });
+}
+
+#[test]
+fn mutations_of_depths_are_read_or_refused() {
+    alone(|| {
+        let (_folder, folder) = folder();
+        let picture = folder.join("room.png");
+        fs::write(&picture, encoded(rgb(), image::ImageFormat::Png)).unwrap();
+        let depth = |path: &Path| {
+            let mut options = ReadOptions { horizontal_fov_deg: Some(20.0), ..ReadOptions::default() };
+            (options.reading.depth, options.fill_depth) = (Some(path.to_owned()), Some("far".parse().unwrap()));
+            options.reading.depth_unit = Some("m".to_owned());
+            read_scene(&picture, &options)
+        };
+        let z_m: Vec<f64> = (2..14).map(f64::from).collect();
+        let bytes: Vec<u8> = z_m.iter().flat_map(|v| (*v as f32).to_le_bytes()).collect();
+        let npy = super::npy::tests::npy("<f4", false, "(3, 4)", &bytes);
+        check("depth npy", &npy, false, &depth, &folder.join("made.npy"));
+        let words = super::npy::tests::npy("<f8", false, "(1,)", &2.0_f64.to_le_bytes());
+        let zip = zip_of(&[("depth", npy), ("scale", words)], false);
+        check("depth npz", &zip, false, &depth, &folder.join("made.npz"));
+        let mat = mat_file(&[variable_of("depth", &[3, 4], 6, &z_m)]);
+        check("depth mat", &mat, false, &depth, &folder.join("made.mat"));
+        let mut file = hdf5_pure::FileBuilder::new();
+        file.create_dataset("depth").with_data(&z_m).with_shape(&[3, 4]);
+        check("depth HDF5", &file.finish().unwrap(), false, &depth, &folder.join("made.h5"));
+        let pfm = [&b"Pf\n4 3\n-1\n"[..], &bytes].concat();
+        check("depth PFM", &pfm, false, &depth, &folder.join("made.pfm"));
+        let mut tiff = std::io::Cursor::new(vec![]);
+        let mut encoder = tiff::encoder::TiffEncoder::new(&mut tiff).unwrap();
+        let floats: Vec<f32> = z_m.iter().map(|v| *v as f32).collect();
+        encoder.write_image::<tiff::encoder::colortype::Gray32Float>(4, 3, &floats).unwrap();
+        check("depth TIFF", tiff.get_ref(), false, &depth, &folder.join("made.tif"));
+        let plane = ndarray::Array2::from_shape_vec((3, 4), floats).unwrap();
+        let exr = folder.join("good.exr");
+        crate::write_planes_exr(&exr, &[("Z", &plane)], crate::ExrSamples::Single).unwrap();
+        check("depth EXR", &fs::read(&exr).unwrap(), false, &depth, &folder.join("made.exr"));
     });
 }

@@ -100,7 +100,12 @@ fn header_of(bytes: &[u8]) -> Result<Header, String> {
 pub(super) fn parse(bytes: &[u8]) -> Result<NpyArray, String> {
     let Header { sides, kind, is_big_endian, is_fortran, n_bytes } = header_of(bytes)?;
     let Some((size, top, number)) = element(&kind) else {
-        return Err(format!("its elements are '{}', expected real numbers", short(&kind)));
+        return Err(match kind.strip_prefix('c') {
+            Some(_) => {
+                "its elements are complex numbers, expected real ones: save their magnitudes (numpy.abs)".to_owned()
+            }
+            None => format!("its elements are '{}', expected real numbers", short(&kind)),
+        });
     };
     let n = sides.iter().try_fold(1_usize, |n, &side| n.checked_mul(side)).unwrap_or(usize::MAX);
     let data = &bytes[n_bytes..];
@@ -134,9 +139,10 @@ pub(super) fn parse(bytes: &[u8]) -> Result<NpyArray, String> {
     Ok(NpyArray { sides, values, top, n_more: data.len() - n * size })
 }
 
-/// Whether an array of these bytes has sides that are wanted and real numbers.
+/// Whether an array of these bytes has sides that are wanted and numbers; complex ones are refused when they are read.
 pub(super) fn is_array_of(start: &[u8], is_wanted: impl Fn(&[usize]) -> bool) -> bool {
-    header_of(start).is_ok_and(|header| element(&header.kind).is_some() && is_wanted(&header.sides))
+    let has_numbers = |header: &Header| element(&header.kind).is_some() || header.kind.starts_with('c');
+    header_of(start).is_ok_and(|header| has_numbers(&header) && is_wanted(&header.sides))
 }
 
 /// The bytes of an element, the largest whole number of its type, and how it is read.
@@ -231,7 +237,8 @@ pub(super) mod tests {
             (b"\x93NUMPY\x01\x00".to_vec(), "truncated"),
             (b"\x93NUMPY\x09\x00\x00\x00\x00\x00".to_vec(), "version 9"),
             (npy("<f4", false, "(2, 3)", &[0; 23]), "truncated"),
-            (npy("<c8", false, "(1,)", &[0; 8]), "'c8'"),
+            (npy("<c8", false, "(1,)", &[0; 8]), "complex numbers, expected real"),
+            (npy("<M8", false, "(1,)", &[0; 8]), "'M8'"),
             (npy("<f4", false, "(99999999999, 99999999999, 9999)", &[0; 8]), "truncated"),
             (npy("<f4", false, "(a,)", &[0; 8]), "'a'"),
         ] {

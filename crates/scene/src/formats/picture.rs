@@ -9,10 +9,12 @@ use ndarray::Array2;
 use rayon::prelude::*;
 
 use super::{
-    picture_parts::{note_on_exif_colors, notes_on_samples, orientation_of},
+    contents::is_of,
+    picture_parts::{note_on_exif, note_on_exif_colors, orientation_of, unknown_parts},
     primaries::into_srgb,
-    spectral_exr::{NamedPlanes, read_planes_and_primaries_exr},
+    spectral_exr::{NamedPlanes, notes_on_planes_exr, read_planes_and_primaries_exr},
     stated::{Noted, name_of, note_of},
+    tiff_file::{float_planes, is_tiff, notes_on_pages},
     unusable::{check_made, said, unreadable},
 };
 use crate::SceneError;
@@ -271,6 +273,22 @@ pub fn read_picture_samples(path: &Path) -> Result<Noted<PictureSamples>, SceneE
     }
     let colors = StatedColors::of(path);
     let mut notes = notes_on_samples(path)?;
+    let floats = if is_tiff(path) { float_planes(path)? } else { None };
+    if let Some(planes) = floats {
+        let planes = planes.told_in(&mut notes);
+        let names: &[&str] = match planes.len() {
+            1 => &["Y"],
+            3 => &["R", "G", "B"],
+            n => {
+                return Err(unreadable(
+                    path,
+                    format!("it has {n} samples a pixel, expected gray or red, green and blue"),
+                ));
+            }
+        };
+        let planes = names.iter().map(|name| (*name).to_owned()).zip(planes).collect();
+        return Ok(Noted::new(PictureSamples { planes, top: None, colors }, notes));
+    }
     let picture = decode(path, SAMPLES_BYTES)?;
     if has_holes(&picture) {
         notes.extend(note_of(path, "channel", &["opacity".to_owned()]));
@@ -303,6 +321,29 @@ pub fn read_picture_samples(path: &Path) -> Result<Noted<PictureSamples>, SceneE
         other => (parted(other.into_rgb32f().into_raw(), &RGB), None),
     };
     Ok(Noted::new(PictureSamples { planes, top, colors }, notes))
+}
+
+/// Returns what of a picture's statements [`read_picture_samples`] does not use, a sentence each.
+///
+/// # Errors
+/// When the file cannot be opened, or ends too early.
+pub fn notes_on_samples(path: &Path) -> Result<Vec<String>, SceneError> {
+    if is_of(path, &["exr"]) {
+        return notes_on_planes_exr(path);
+    }
+    let is_turned = orientation_of(path) != Orientation::NoTransforms;
+    let note = || format!("{}: its pixels are counted as stored, not turned as its orientation says", name_of(path));
+    let parts = note_of(path, "part", &unknown_parts(path)?);
+    let pages = if is_tiff(path) { notes_on_pages(path) } else { vec![] };
+    let colors = StatedColors::of(path).ok().and_then(|colors| note_on_exif_colors(path, colors.as_ref()));
+    Ok(is_turned
+        .then(note)
+        .into_iter()
+        .chain(parts)
+        .chain(pages)
+        .chain(colors)
+        .chain(note_on_exif(path, false))
+        .collect())
 }
 
 /// Decodes a picture of any kind that is recognized by the file's content, of which `beside_bytes` are made for each pixel.

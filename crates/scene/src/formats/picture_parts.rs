@@ -7,11 +7,10 @@ use std::{
 };
 
 use dioptric_pictures::{Exif, StatedColors, size_of};
+use flate2::read::ZlibDecoder;
 use image::{ImageDecoder, metadata::Orientation};
 
 use super::{
-    contents::is_of,
-    spectral_exr::notes_on_planes_exr,
     stated::{name_of, note_of, short},
     unusable::unreadable,
 };
@@ -52,24 +51,9 @@ pub(super) fn notes_on_parts(path: &Path) -> Result<Vec<String>, SceneError> {
     Ok(note_of(path, "part", &unknown_parts(path)?).into_iter().chain(note_on_exif(path, true)).collect())
 }
 
-/// Returns what of a picture's statements [`read_picture_samples`](crate::read_picture_samples) does not use, a sentence each.
-///
-/// # Errors
-/// When the file cannot be opened, or ends too early.
-pub fn notes_on_samples(path: &Path) -> Result<Vec<String>, SceneError> {
-    if is_of(path, &["exr"]) {
-        return notes_on_planes_exr(path);
-    }
-    let is_turned = orientation_of(path) != Orientation::NoTransforms;
-    let note = || format!("{}: its pixels are counted as stored, not turned as its orientation says", name_of(path));
-    let parts = note_of(path, "part", &unknown_parts(path)?);
-    let colors = StatedColors::of(path).ok().and_then(|colors| note_on_exif_colors(path, colors.as_ref()));
-    Ok(is_turned.then(note).into_iter().chain(parts).chain(colors).chain(note_on_exif(path, false)).collect())
-}
-
 /// Returns what is said of colors that the Exif data state to be others than those that the codes are taken for.
 pub(super) fn note_on_exif_colors(path: &Path, taken: Option<&StatedColors>) -> Option<String> {
-    let space = Exif::of(path).other_colors.filter(|_| taken.is_none())?;
+    let space = Exif::of(path).other_colors.filter(|_| taken.is_none() && !StatedColors::are_in_chunks(path))?;
     let what = match space {
         2 => "Adobe RGB",
         65_535 => "uncalibrated colors",
@@ -95,7 +79,7 @@ pub(super) fn orientation_of(path: &Path) -> Orientation {
 }
 
 /// Returns what the Exif data state of light, and of geometry where that counts, that is not used.
-fn note_on_exif(path: &Path, of_scene: bool) -> Option<String> {
+pub(super) fn note_on_exif(path: &Path, of_scene: bool) -> Option<String> {
     let exif = Exif::of(path);
     let (mut columns, mut rows) = size_of(path).ok()?;
     if orientation_of(path).to_exif() > 4 {
@@ -118,7 +102,7 @@ fn note_on_exif(path: &Path, of_scene: bool) -> Option<String> {
 }
 
 /// Returns the names of the parts of a PNG, JPEG, WebP, BMP or PNM file that are not known; none of other files.
-fn unknown_parts(path: &Path) -> Result<Vec<String>, SceneError> {
+pub(super) fn unknown_parts(path: &Path) -> Result<Vec<String>, SceneError> {
     let file = File::open(path).map_err(|error| unreadable(path, error))?;
     let mut file = BufReader::new(file);
     let mut start = vec![];
@@ -152,7 +136,7 @@ fn unknown_parts(path: &Path) -> Result<Vec<String>, SceneError> {
 const NOT_SQUARE: &str = "pixels that are not square";
 
 /// Returns the name of a comment that says something of the numbers, and not who made them when.
-fn comment(text: &[u8]) -> Option<String> {
+pub(super) fn comment(text: &[u8]) -> Option<String> {
     const WORDS: [&str; 15] = [
         "depth",
         "scale",
@@ -267,12 +251,10 @@ fn of_png(file: &mut (impl Read + Seek)) -> std::io::Result<Vec<String>> {
         content.truncate(n_bytes.min(MOST_BYTES) as usize);
         match &kind {
             b"tEXt" | b"zTXt" | b"iTXt" => {
-                let word = content.split(|byte| *byte == 0).next().unwrap_or_default();
-                let word: String = word.iter().map(|byte| char::from(*byte)).collect();
+                let (word, text) = text_of(kind, &content);
                 match word.as_str() {
-                    "XML:com.adobe.xmp" => names.extend(of_xmp(&content)),
-                    // What is behind the word and flags of compression; compressed texts are not looked at.
-                    usual if USUAL_WORDS.contains(&usual) => names.extend(comment(&content[word.len()..])),
+                    "XML:com.adobe.xmp" => names.extend(of_xmp(&text)),
+                    usual if USUAL_WORDS.contains(&usual) => names.extend(comment(&text)),
                     _ => names.push(format!("text '{word}'")),
                 }
             }
@@ -287,6 +269,30 @@ fn of_png(file: &mut (impl Read + Seek)) -> std::io::Result<Vec<String>> {
         }
     }
     Ok(names)
+}
+
+/// Returns the word of a chunk of text and its text, inflated where it is compressed (PNG, third edition, 11.3.3).
+fn text_of(kind: [u8; 4], content: &[u8]) -> (String, Vec<u8>) {
+    let parted = |bytes: &[u8]| {
+        let end = bytes.iter().position(|byte| *byte == 0).unwrap_or(bytes.len());
+        (bytes[..end].to_vec(), bytes.get(end + 1..).unwrap_or_default().to_vec())
+    };
+    let (word, mut rest) = parted(content);
+    let mut is_compressed = kind == *b"zTXt";
+    if kind == *b"iTXt" && rest.len() >= 2 {
+        is_compressed = rest[0] == 1;
+        // Behind the flag and the method stand the language and the word in that.
+        rest = parted(&parted(&rest[2..]).1).1;
+    } else if is_compressed && !rest.is_empty() {
+        rest.remove(0);
+    }
+    if is_compressed {
+        let mut text = vec![];
+        // Of a broken one, or one that is looked at in part, what there is.
+        let _ = ZlibDecoder::new(&rest[..]).take(MOST_BYTES).read_to_end(&mut text);
+        rest = text;
+    }
+    (word.into_iter().map(char::from).collect(), rest)
 }
 
 /// Names what phones put beside the picture: depths, gains for bright displays, further pictures; `None` of a file without an end.

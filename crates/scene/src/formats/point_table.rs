@@ -4,6 +4,7 @@ use std::{collections::BTreeMap, path::Path};
 
 use dioptric_spectrum::{Illuminant, Observer, WavelengthGrid};
 
+use super::stated::short;
 use crate::{PointBrightness, PointLight, PointPlace, SceneError};
 
 /// Points as a table states them, on no bands yet.
@@ -79,6 +80,7 @@ impl PointTable {
             let is_known = PLACES.as_flattened().iter().chain(&AMOUNTS).chain(&OTHERS).any(|known| *known == name);
             if !is_known {
                 let known = [PLACES.as_flattened(), &AMOUNTS, &OTHERS].concat().join(", ");
+                let name = short(&name);
                 return Err(format!("line 1: the column '{name}' is not known, expected some of {known}"));
             }
             if columns.insert(name.clone(), number).is_some() {
@@ -105,7 +107,7 @@ impl PointTable {
             let number = |name: &str| {
                 let text = cell(name).ok_or_else(|| format!("line {line}: expected a number for {name}"))?;
                 let number = text.parse::<f64>().ok().filter(|number| !number.is_nan());
-                number.ok_or_else(|| format!("line {line}: {name} is '{text}', expected a number"))
+                number.ok_or_else(|| format!("line {line}: {name} is '{}', expected a number", short(text)))
             };
             let [x, y] = [number(place[0])?, number(place[1])?];
             let place = match place[0] {
@@ -160,11 +162,12 @@ impl Color {
         if let Some(nm) = text.strip_suffix("nm").and_then(|number| number.trim().parse::<f64>().ok()) {
             return match (100.0..1e5).contains(&nm) {
                 true => Ok(Self::Line(nm)),
-                false => Err(format!("light is '{text}', expected a wavelength of 100 nm to 100000 nm")),
+                false => Err(format!("light is '{}', expected a wavelength of 100 nm to 100000 nm", short(text))),
             };
         }
         Illuminant::parse(text).map(Self::Of).map_err(|_| {
             let names = Illuminant::NAMES.join(", ");
+            let text = short(text);
             format!("light is '{text}', expected {names}, a temperature (3000K), a chromaticity (\"0.46,0.414\") or a line (589nm)")
         })
     }

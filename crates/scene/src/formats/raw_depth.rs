@@ -15,6 +15,8 @@ use crate::{SceneError, View};
 const SKY_M: f64 = 1e9;
 /// Numbers that stand for none in arrays of any type: the last code of 16 bits, and what programs put where nothing was measured.
 const NONES: [f32; 8] = [65_535.0, -1.0, -99.0, -999.0, -9999.0, -99_999.0, -32_768.0, -2_147_483_648.0];
+/// The largest half float, which stands for what was farther or not measured in files of floats.
+const LARGEST_HALF: f32 = 65_504.0;
 /// The largest numbers of types of whole numbers, which stand for none in arrays of these.
 const TOPS: [f64; 4] = [32_767.0, 65_535.0, 2_147_483_647.0, 4_294_967_295.0];
 
@@ -136,7 +138,11 @@ impl RawDepth {
 
     /// Whether a number of lengths stands for none.
     fn is_none(&self, value: f32) -> bool {
-        NONES.contains(&value) || self.top.is_some_and(|top| TOPS.contains(&top) && value == top as f32)
+        let top = match self.top {
+            Some(top) => TOPS.contains(&top).then_some(top as f32),
+            None => Some(LARGEST_HALF),
+        };
+        NONES.contains(&value) || top == Some(value)
     }
 
     /// Returns the depths in metres along the axis; 0 where none was measured, infinity for the sky. `None` for what needs the

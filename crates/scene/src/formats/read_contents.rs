@@ -27,10 +27,14 @@ use super::{
     reduced::reduced_size,
     spectral_exr::{AskedChannels, RawFile, RawImage, read_raw_exr},
     stated::{name_of, note_of},
-    tiff_file::{TiffAs, TiffFile, TiffStack, read_tiff},
+    tiff_file::{RAW, TiffAs, TiffFile, TiffStack, is_tiff, read_tiff},
     unusable::{starts_with, unreadable},
 };
 use crate::{SceneError, View};
+
+/// Endings of raw photographs: DNG, and those of makers.
+const RAW_ENDINGS: &[&str] =
+    &["dng", "cr2", "cr3", "nef", "nrw", "arw", "raf", "orf", "rw2", "pef", "srw", "3fr", "iiq"];
 
 /// Reads what is in a file of a scene, by its name and its first bytes.
 pub(super) fn contents_of(path: &Path, options: &ReadOptions) -> Result<Contents, SceneError> {
@@ -61,7 +65,10 @@ pub(super) fn contents_of(path: &Path, options: &ReadOptions) -> Result<Contents
         "jpg" | "jpeg" if cfg!(not(feature = "jpeg")) => {
             Err(SceneError::LacksFeature { file: path.to_owned(), feature: "jpeg" })
         }
+        // Whatever its name says, a stack of pages is no picture.
+        "png" | "jpg" | "jpeg" | "webp" | "bmp" | "ppm" | "pgm" | "pnm" if is_tiff(path) => of_tiff(path, options),
         "png" | "jpg" | "jpeg" | "webp" | "bmp" | "ppm" | "pgm" | "pnm" | "hdr" => of_picture(path, options, vec![]),
+        _ if is_of(path, RAW_ENDINGS) => Err(unreadable(path, RAW)),
         _ => match header_of(path) {
             Some(header) => contents_of_envi(&header, options),
             None => Err(SceneError::UnknownKind { file: path.to_owned() }),
@@ -123,19 +130,14 @@ fn of_tiff(path: &Path, options: &ReadOptions) -> Result<Contents, SceneError> {
     let wanted = n_told.map_or(TiffAs::Marked, |n| TiffAs::Planes(Some(n)));
     let mut notes = vec![];
     match read_tiff(path, wanted)?.told_in(&mut notes) {
-        TiffFile::Picture(page) => {
-            let no_data = page.no_data.map(|none| none.to_string());
-            notes.extend(note_of(path, "number for no data (GDAL)", no_data.as_slice()));
-            of_picture(path, options, notes)
-        }
+        TiffFile::Picture(_) => of_picture(path, options, notes),
         TiffFile::Linear(mut planes, page) => {
             planes.iter_mut().for_each(|plane| page.ignore(plane));
             Ok(linear(planes, None, notes))
         }
         TiffFile::Stack(mut stack) => {
             stack.planes.iter_mut().for_each(|plane| stack.page.ignore(plane));
-            let described = stack.page.note_of_description(path).filter(|_| stack.wavelengths_nm.is_none());
-            notes.extend(described);
+            notes.extend(stack.page.note_of_description(path));
             let TiffStack { planes, wavelengths_nm, top, .. } = stack;
             Cube { planes, top, wavelengths_nm, quantity: None, unit: None, notes }.into_contents(path, options)
         }

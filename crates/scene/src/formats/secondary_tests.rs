@@ -378,6 +378,13 @@ fn orientations_and_colors_of_exif_data_are_named() {
         let scene = read_scene(&depth, &ReadOptions::default()).unwrap();
         let n = scene.notes.iter().filter(|note| note.contains("ColorSpace") && note.contains(word)).count();
         assert_eq!(n, usize::from(space != 1), "{:?}", scene.notes);
+        // A chunk that says sRGB counts before them.
+        let mut bytes = fs::read(&depth).unwrap();
+        let chunk = [0, 0, 0, 1, b's', b'R', b'G', b'B', 0, 0xae, 0xce, 0x1c, 0xe9];
+        bytes.splice(33..33, chunk);
+        fs::write(&depth, bytes).unwrap();
+        let scene = read_scene(&depth, &ReadOptions::default()).unwrap();
+        assert!(scene.notes.iter().all(|note| !note.contains("ColorSpace")), "{:?}", scene.notes);
     }
 }
 

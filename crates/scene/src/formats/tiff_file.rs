@@ -3,13 +3,18 @@
 use std::{fs::File, io::BufReader, path::Path};
 
 use ndarray::Array2;
-use tiff::decoder::{Decoder, Limits};
+use tiff::{
+    TiffError, TiffUnsupportedError,
+    decoder::{Decoder, Limits},
+};
 
 use super::{
+    contents::is_of,
+    picture_parts::comment,
     stated::{Noted, note_of},
     tiff_bands::{AsGray, planes_of},
     tiff_directory::Directory,
-    tiff_page::{Marked, Page, PageWords, SampleDepth, wavelengths_of},
+    tiff_page::{Marked, Page, PageWords, SampleDepth, StatedBands},
     unusable::{check_memory, said, unreadable},
 };
 use crate::SceneError;
@@ -18,6 +23,34 @@ use crate::SceneError;
 const DESCRIPTION: u16 = 270;
 /// Pages of a file.
 const LIMIT_PAGES: usize = 10_000;
+
+/// What is said of raw photographs.
+pub(super) const RAW: &str = "it is a raw photograph, which is no scene: `dioptric develop` makes a picture of a DNG";
+
+/// Returns what is wrong with a file that what decodes it does not take.
+fn broken(path: &Path, error: &TiffError) -> SceneError {
+    let said = said(error);
+    unreadable(
+        path,
+        match error {
+            TiffError::UnsupportedError(TiffUnsupportedError::UnknownInterpretation) => {
+                "its samples are marked as none that are read, as logarithms or those of a sensor, expected gray or red, green and blue: \
+                 `dioptric develop` makes a picture of a raw photograph"
+                    .to_owned()
+            }
+            TiffError::UnsupportedError(_) => {
+                format!("it is of a kind that is not read ({said}): expected it without compression, or with LZW or Deflate")
+            }
+            _ => said,
+        },
+    )
+}
+
+/// Whether a file is a TIFF, by its first bytes, or by its name where they say nothing.
+pub(super) fn is_tiff(path: &Path) -> bool {
+    let by_content = dioptric_pictures::format_of(path).ok().flatten();
+    by_content.map_or_else(|| is_of(path, &["tif", "tiff"]), |format| format == dioptric_pictures::ImageFormat::Tiff)
+}
 
 /// What is wanted of a TIFF file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -53,17 +86,14 @@ pub(super) struct TiffStack {
 /// # Errors
 /// When it is none, is truncated or too large, or its pages differ in size.
 pub(super) fn read_tiff(path: &Path, wanted: TiffAs) -> Result<Noted<TiffFile>, SceneError> {
-    let Pages { mut pages, mut unused, mut notes } = pages_of(path)?;
+    let Pages { mut pages, unused, mut notes } = pages_of(path)?;
     let Some((first, _)) = pages.first() else { return Err(unreadable(path, "it has no page of full size")) };
     let words = first.words();
     let as_planes = first.is_stack() || (wanted != TiffAs::Marked && first.has_plain_samples());
     // Gray pages are planes of a stack, colored ones a picture and others.
     let is_picture = !as_planes && (pages.len() == 1 || first.n_samples > 1);
     if is_picture {
-        unused.extend(pages[1..].iter().map(|(page, _)| (page.index + 1).to_string()));
-        notes.extend(note_of(path, "page", &unused));
-        let unknown = first.unknown_sample().map(|sample| format!("sample {sample} (ExtraSamples 0)"));
-        notes.extend(note_of(path, "channel", unknown.as_slice()));
+        notes.extend(notes_on_others(path, &pages, unused));
         if first.depth != SampleDepth::Float {
             return Ok(Noted::new(TiffFile::Picture(words), notes));
         }
@@ -83,15 +113,29 @@ pub(super) fn read_tiff(path: &Path, wanted: TiffAs) -> Result<Noted<TiffFile>, 
     let top = first.top();
     let own: Vec<Page> = pages.into_iter().map(|(page, _)| page).collect();
     // Where there are as many wavelengths as samples, what is marked as an opacity is a band.
-    let is_whole = wanted == TiffAs::Planes(Some(planes.len())) || wavelengths_of(&own, planes.len()).is_some();
+    let bands = StatedBands::of(&own).map_err(|reason| unreadable(path, reason))?;
+    let n_stated = bands.wavelengths_nm.as_ref().map(Vec::len);
+    let is_whole = wanted == TiffAs::Planes(Some(planes.len())) || n_stated == Some(planes.len());
     if !is_whole {
         notes.extend(without_opacity(path, &own[0], &mut planes));
     }
-    let wavelengths_nm = wavelengths_of(&own, planes.len()).map(|(list, left)| {
-        notes.extend(note_of(path, "key of its description", &left));
-        list
-    });
-    Ok(Noted::new(TiffFile::Stack(TiffStack { planes, wavelengths_nm, top, page: words }), notes))
+    if let Some(n_stated) = n_stated.filter(|n| *n != planes.len()) {
+        return Err(unreadable(path, format!("it states {n_stated} wavelengths, but has {} planes", planes.len())));
+    }
+    notes.extend(note_of(path, "key of its description", &bands.keys));
+    notes.extend(note_of(path, "page name", &bands.names));
+    let mut page = words;
+    page.descriptions = described(&own, bands.are_described);
+    Ok(Noted::new(TiffFile::Stack(TiffStack { planes, wavelengths_nm: bands.wavelengths_nm, top, page }), notes))
+}
+
+/// Returns what the descriptions of all pages say, each once, where their wavelengths are not all that they say.
+fn described(pages: &[Page], are_bands: bool) -> Vec<String> {
+    let mut all: Vec<String> =
+        if are_bands { vec![] } else { pages.iter().flat_map(|page| page.descriptions.clone()).collect() };
+    let mut known = std::collections::HashSet::new();
+    all.retain(|text| known.insert(text.clone()));
+    all
 }
 
 /// The pages of a file that are like its first, with the places of their directories.
@@ -104,7 +148,7 @@ struct Pages {
 }
 
 fn pages_of(path: &Path) -> Result<Pages, SceneError> {
-    let broken = |error: tiff::TiffError| unreadable(path, said(error));
+    let broken = |error| broken(path, &error);
     let file = File::open(path).map_err(|error| unreadable(path, error))?;
     let length = file.metadata().map_err(|error| unreadable(path, error))?.len();
     let mut decoder = Decoder::new(BufReader::new(file)).map_err(broken)?.with_limits(Limits::default());
@@ -125,14 +169,11 @@ fn pages_of(path: &Path) -> Result<Pages, SceneError> {
         if index > LIMIT_PAGES {
             return Err(unreadable(path, format!("it has more than {LIMIT_PAGES} pages")));
         }
-        if page.marked == Marked::Inks {
-            return Err(unreadable(
-                path,
-                "it holds inks (CMYK), expected gray or red, green and blue; convert it to sRGB",
-            ));
+        if page.is_raw {
+            return Err(unreadable(path, RAW));
         }
-        if page.marked == Marked::Palette {
-            let reason = "it has a table of colors (palette), expected gray or red, green and blue; convert it to sRGB";
+        if let (Marked::Unread(what), false) = (page.marked, page.is_reduced) {
+            let reason = format!("it holds {what}, expected gray or red, green and blue: convert it to sRGB");
             return Err(unreadable(path, reason));
         }
         unknown.extend(page.unknown.iter().map(ToString::to_string));
@@ -160,9 +201,54 @@ fn pages_of(path: &Path) -> Result<Pages, SceneError> {
     Ok(Pages { pages, unused, notes })
 }
 
+/// Returns the samples of the first picture of a file where they are floats, those of an opacity left out and named; `None` where they are codes.
+///
+/// # Errors
+/// When the file is of a kind that is not read, or its samples are no picture's.
+pub(super) fn float_planes(path: &Path) -> Result<Option<Noted<Vec<Array2<f32>>>>, SceneError> {
+    let Pages { mut pages, .. } = pages_of(path)?;
+    pages.truncate(1);
+    let Some((first, _)) = pages.first() else { return Err(unreadable(path, "it has no page of full size")) };
+    match first.depth {
+        SampleDepth::Float => {}
+        SampleDepth::Unsigned(..=16) => return Ok(None),
+        _ => {
+            let reason = "its samples are whole numbers with a sign, or of 32 bits and more, expected codes of 8 or 16 bits, or floats";
+            return Err(unreadable(path, reason));
+        }
+    }
+    let mut planes = planes_of_pages(path, &pages)?;
+    let note = without_opacity(path, &pages[0].0, &mut planes);
+    Ok(Some(Noted::new(planes, note)))
+}
+
+/// Returns what is said of the pages and samples of a TIFF file of which the first picture is taken; of one that is not read here nothing, since whoever
+/// decodes it says what is wrong.
+pub(super) fn notes_on_pages(path: &Path) -> Vec<String> {
+    let Ok(Pages { pages, unused, mut notes }) = pages_of(path) else { return vec![] };
+    notes.extend(notes_on_others(path, &pages, unused));
+    notes
+}
+
+/// Names the pages behind the first, its sample that is neither a color nor an opacity, and what it states that no picture is made of.
+fn notes_on_others(path: &Path, pages: &[(Page, u64)], mut unused: Vec<String>) -> Vec<String> {
+    unused.extend(pages.iter().skip(1).map(|(page, _)| (page.index + 1).to_string()));
+    let mut notes: Vec<String> = note_of(path, "page", &unused).into_iter().collect();
+    let Some((first, _)) = pages.first() else { return notes };
+    let unknown = first.unknown_sample().map(|sample| format!("sample {sample} (ExtraSamples 0)"));
+    notes.extend(note_of(path, "channel", unknown.as_slice()));
+    if first.depth != SampleDepth::Float {
+        let no_data = first.words().no_data.map(|none| none.to_string());
+        notes.extend(note_of(path, "number for no data (GDAL)", no_data.as_slice()));
+    }
+    let told: Vec<String> = first.descriptions.iter().filter_map(|text| comment(text.as_bytes())).collect();
+    notes.extend(note_of(path, "description", &told));
+    notes
+}
+
 /// Returns the samples of all pages, a plane each.
 fn planes_of_pages(path: &Path, pages: &[(Page, u64)]) -> Result<Vec<Array2<f32>>, SceneError> {
-    let broken = |error: tiff::TiffError| unreadable(path, said(error));
+    let broken = |error| broken(path, &error);
     let mut decoder = AsGray::open(path, pages).map_err(|error| unreadable(path, error))?;
     let mut planes = vec![];
     for (page, _) in pages {

@@ -46,14 +46,23 @@ pub(super) enum Marked {
     },
     /// Red, green and blue.
     Rgb,
-    /// Numbers of colors in a table.
-    Palette,
-    /// Brightness and differences of colors.
-    Chroma,
-    /// Cyan, magenta, yellow and black.
-    Inks,
+    /// What is not read, in words.
+    Unread(&'static str),
     Other,
 }
+
+/// What samples are marked as that are not read (TIFF 6.0, and its technical notes).
+const UNREAD: [(u16, &str); 7] = [
+    (3, "a table of colors (palette)"),
+    (4, "a mask"),
+    (5, "inks (CMYK)"),
+    (6, "brightness and differences of colors (YCbCr, as JPEG within TIFF has it)"),
+    (8, "colors of CIE L*a*b*"),
+    (9, "colors of CIE L*a*b* (ICC)"),
+    (10, "colors of CIE L*a*b* (ITU)"),
+];
+/// The tag of the version of DNG that a file is written by.
+const DNG_VERSION: u16 = 50_706;
 
 /// What a page states of itself.
 pub(super) struct Page {
@@ -67,6 +76,8 @@ pub(super) struct Page {
     /// What each of the last samples is: 0 unspecified, 1 and 2 an opacity.
     pub(super) extra: Vec<u16>,
     pub(super) is_reduced: bool,
+    /// Whether it is a page of a raw photograph.
+    pub(super) is_raw: bool,
     pub(super) has_tiles_of_planes: bool,
     /// Whether its samples are compressed as those of a JPEG picture.
     pub(super) is_jpeg: bool,
@@ -123,13 +134,14 @@ impl Page {
             marked: match photometric {
                 0 | 1 => Marked::Gray { is_white_zero: photometric == 0 },
                 2 => Marked::Rgb,
-                3 => Marked::Palette,
-                5 => Marked::Inks,
-                6 => Marked::Chroma,
-                _ => Marked::Other,
+                other => {
+                    let unread = UNREAD.iter().find(|(own, _)| *own == other);
+                    unread.map_or(Marked::Other, |(_, what)| Marked::Unread(what))
+                }
             },
             extra,
             is_reduced: kind & 1 != 0,
+            is_raw: unknown.contains(&DNG_VERSION),
             has_tiles_of_planes: is_planar && n_samples > 1 && has_tiles,
             is_jpeg: matches!(compression, 6 | 7),
             name,
@@ -163,7 +175,7 @@ impl Page {
     }
 
     pub(super) fn is_colored(&self) -> bool {
-        matches!(self.marked, Marked::Rgb | Marked::Palette | Marked::Chroma)
+        self.marked == Marked::Rgb
     }
 
     /// Whether its samples are numbers by themselves, a plane each.
@@ -204,7 +216,7 @@ pub(super) struct PageWords {
     pub(super) no_data: Option<f64>,
     /// Whether 0 is white, so that decoded samples are counted from there.
     is_white_zero: bool,
-    descriptions: Vec<String>,
+    pub(super) descriptions: Vec<String>,
     orientation: u16,
 }
 
@@ -239,16 +251,47 @@ impl PageWords {
     }
 }
 
-/// Returns the wavelengths of so many planes that pages are named after, or that the first one's description lists as JSON; with the keys
-/// there that are not used.
-pub(super) fn wavelengths_of(pages: &[Page], n_planes: usize) -> Option<(Vec<f64>, Vec<String>)> {
-    let named = |text: Option<&String>| text.and_then(|text| wavelength_in(text));
-    let of_names: Option<Vec<f64>> = pages.iter().map(|page| named(page.name.as_ref())).collect();
-    let of_texts: Option<Vec<f64>> = pages.iter().map(|page| named(page.descriptions.first())).collect();
-    if let Some(list) = of_names.or(of_texts).filter(|list| list.len() == n_planes) {
-        return Some((list, vec![]));
+/// What pages say of their bands.
+#[derive(Debug, Default)]
+pub(super) struct StatedBands {
+    /// Their wavelengths, nm.
+    pub(super) wavelengths_nm: Option<Vec<f64>>,
+    /// Whether these are those of descriptions.
+    pub(super) are_described: bool,
+    /// The names of pages, where these are no wavelengths.
+    pub(super) names: Vec<String>,
+    /// The keys of the description that are not used.
+    pub(super) keys: Vec<String>,
+}
+
+impl StatedBands {
+    /// Returns the wavelengths that pages are named after or described by, or that the first one's description lists as JSON.
+    ///
+    /// # Errors
+    /// When they state two lists that differ.
+    pub(super) fn of(pages: &[Page]) -> Result<Self, String> {
+        let named = |text: Option<&String>| text.and_then(|text| wavelength_in(text));
+        let of_names: Option<Vec<f64>> = pages.iter().map(|page| named(page.name.as_ref())).collect();
+        let of_texts: Option<Vec<f64>> = pages.iter().map(|page| named(page.descriptions.first())).collect();
+        let (listed, keys) = pages.first().and_then(listed_in).unzip();
+        let names =
+            if of_names.is_some() { vec![] } else { pages.iter().filter_map(|page| page.name.clone()).collect() };
+        let described = of_texts.or(listed);
+        if let (Some(named), Some(described)) = (&of_names, &described)
+            && named != described
+        {
+            let reason =
+                "its pages are named after other wavelengths than its description states: expected one of them";
+            return Err(reason.to_owned());
+        }
+        let are_described = described.is_some();
+        Ok(Self { wavelengths_nm: described.or(of_names), are_described, names, keys: keys.unwrap_or_default() })
     }
-    let maps = pages.first()?.descriptions.iter().filter_map(|text| match serde_json::from_str(text) {
+}
+
+/// Returns the wavelengths that a page's description lists as JSON, nm, and the keys there that are not used.
+fn listed_in(page: &Page) -> Option<(Vec<f64>, Vec<String>)> {
+    let maps = page.descriptions.iter().filter_map(|text| match serde_json::from_str(text) {
         Ok(Json::Object(map)) => Some(map),
         _ => None,
     });
@@ -257,7 +300,7 @@ pub(super) fn wavelengths_of(pages: &[Page], n_planes: usize) -> Option<(Vec<f64
     let list = list.as_array()?.iter().map(Json::as_f64).collect::<Option<Vec<f64>>>()?;
     // The shape of the array is written by tifffile.
     let left = map.into_iter().map(|(key, _)| key).filter(|key| !["shape", "axes"].contains(&key.as_str())).collect();
-    (list.len() == n_planes).then_some((list, left))
+    Some((list, left))
 }
 
 /// Returns the wavelength of a text such as `450 nm` or `Band 450.5nm`.

@@ -217,7 +217,10 @@ impl Numbers<'_> {
 
 /// Whether a file is HDF5, which a MATLAB file of version 7.3 is behind its first 512 bytes.
 fn is_hdf5(bytes: &[u8]) -> bool {
-    bytes.starts_with(b"MATLAB 7.3") || bytes.starts_with(b"\x89HDF")
+    // What a program puts before an HDF5 file is of 512 bytes, or a power of two times as many.
+    let mut starts = std::iter::once(0).chain((9..usize::BITS).map(|power| 1_usize << power));
+    bytes.starts_with(b"MATLAB 7.3")
+        || starts.any(|at| bytes.get(at..).is_some_and(|rest| rest.starts_with(b"\x89HDF\r\n\x1a\n")))
 }
 
 /// Returns what the variables of a file whose names are wanted are inflated to, bytes.
@@ -350,7 +353,9 @@ struct Header<'a> {
 
 impl Header<'_> {
     fn listed(self) -> Listed {
-        Listed { name: self.name, sides: self.sides, is_numeric: (6..=15).contains(&self.class) && !self.is_complex }
+        let has_numbers = (6..=15).contains(&self.class);
+        let [is_numeric, is_complex] = [false, true].map(|is_complex| has_numbers && self.is_complex == is_complex);
+        Listed { name: self.name, sides: self.sides, is_numeric, is_complex }
     }
 }
 

@@ -12,6 +12,8 @@ pub(super) struct Listed {
     pub(super) sides: Vec<usize>,
     /// Whether it is an array of real numbers.
     pub(super) is_numeric: bool,
+    /// Whether it is one of complex numbers.
+    pub(super) is_complex: bool,
 }
 
 /// Classes of arrays.

@@ -58,14 +58,15 @@ impl Hdf5 {
             let path = format!("{before}{name}");
             // A link to what is not there, or not here, is known by its name alone.
             let Ok(dataset) = group.dataset(&name) else {
-                let listed = Listed { name: path.clone(), sides: vec![], is_numeric: false };
+                let listed = Listed { name: path.clone(), sides: vec![], is_numeric: false, is_complex: false };
                 entries.push(Entry { listed, path, is_group: false, n_bytes: 0, attributes: vec![] });
                 continue;
             };
             let sides = self.sides_of(&dataset)?;
             let is_numeric = class_of(&dataset).is_ok_and(|class| class.is_some());
             let n_bytes = sides.iter().map(|side| *side as u64).fold(8, u64::saturating_mul);
-            let listed = Listed { name: path.clone(), sides, is_numeric };
+            let is_complex = dataset.dtype().is_ok_and(|kind| is_complex(&kind));
+            let listed = Listed { name: path.clone(), sides, is_numeric, is_complex };
             let attributes = dataset.attrs().map(telling).unwrap_or_default();
             entries.push(Entry { listed, path, is_group: false, n_bytes, attributes });
         }
@@ -76,7 +77,7 @@ impl Hdf5 {
             }
             let path = format!("{before}{name}");
             if self.is_matlab {
-                let listed = Listed { name: path.clone(), sides: vec![1, 1], is_numeric: false };
+                let listed = Listed { name: path.clone(), sides: vec![1, 1], is_numeric: false, is_complex: false };
                 entries.push(Entry { listed, path, is_group: true, n_bytes: 0, attributes: vec![] });
             } else {
                 let group = group.group(&name).map_err(broken)?;
@@ -150,7 +151,7 @@ impl Hdf5 {
 
 /// Returns the attributes that may change what numbers mean, in the order of their names.
 fn telling(attributes: impl IntoIterator<Item = (String, AttrValue)>) -> Vec<Attribute> {
-    const HARMLESS: [&str; 12] = [
+    const HARMLESS: [&str; 17] = [
         "CLASS",
         "NAME",
         "REFERENCE_LIST",
@@ -163,6 +164,12 @@ fn telling(attributes: impl IntoIterator<Item = (String, AttrValue)>) -> Vec<Att
         "long_name",
         "standard_name",
         "Conventions",
+        // Of whole files (CF conventions, 2.6.2).
+        "title",
+        "history",
+        "institution",
+        "references",
+        "_NCProperties",
     ];
     let is_telling =
         |name: &str| !(HARMLESS.contains(&name) || name.starts_with("MATLAB_") || name.starts_with("_Net"));
@@ -195,6 +202,13 @@ fn class_of(dataset: &Dataset) -> Result<Option<(u32, u32)>, String> {
         DType::Other(kind) if half_order(&kind).is_some() => (elements::SINGLES, 7),
         _ => return Ok(None),
     }))
+}
+
+/// Whether numbers are pairs as `h5py` (`r`, `i`) and MATLAB (`real`, `imag`) write complex ones.
+fn is_complex(kind: &DType) -> bool {
+    const NAMES: [[&str; 2]; 2] = [["r", "i"], ["real", "imag"]];
+    let DType::Compound(fields) = kind else { return false };
+    NAMES.iter().any(|names| fields.iter().map(|(name, _)| name.as_str()).eq(*names))
 }
 
 /// Returns the byte order of the half floats of IEEE 754; `None` of all else.
@@ -250,7 +264,9 @@ fn numbers_of(dataset: &Dataset) -> Result<Vec<u8>, String> {
 
 fn broken(error: hdf5_pure::Error) -> String {
     let said = said(error);
-    let way = if said.contains("unexpected EOF") {
+    // Links by name have no place.
+    let has_link = said.contains(&u64::MAX.to_string());
+    let way = if said.contains("unexpected EOF") && !has_link {
         "expected all of it, for it ends too early"
     } else if said.contains("unsupported filter") {
         "expected none or gzip (h5repack -f GZIP=4)"

@@ -142,9 +142,16 @@ pub(in super::super) fn read_mat(path: &Path, reading: &FileReading) -> Result<M
         None if has("data") => "data",
         None => match cubes[..] {
             [one] => one,
+            [] if file.listed.iter().any(|own| own.is_complex) => {
+                let names = file.listed.iter().filter(|own| own.is_complex).map(|own| own.name.as_str());
+                return Err(wrong(complex(&names.collect::<Vec<_>>().join(", "))));
+            }
             [] => {
-                let expected = "expected a variable 'scene', 'mcCOEF' or 'photons', or an array of three axes";
-                return Err(wrong(format!("it holds no scene: {expected}")));
+                let others = file.listed.iter().filter(|own| own.sides.len() == 3 && !own.is_numeric);
+                let names = others.map(|own| format!(", and its '{}' has no numbers that are read", own.name));
+                let expected =
+                    "expected a variable 'scene', 'mcCOEF' or 'photons', or an array of three axes outside structures";
+                return Err(wrong(format!("it holds no scene: {expected}{}", names.collect::<String>())));
             }
             _ => return Err(wrong(format!("it has several cubes, {}: expected --variable", cubes.join(", ")))),
         },
@@ -164,9 +171,16 @@ fn last_part(path: &str) -> &str {
     path.rsplit('/').next().unwrap_or(path)
 }
 
+fn complex(names: &str) -> String {
+    format!("its '{names}' has complex numbers, expected real ones: save their magnitudes (abs)")
+}
+
 /// Returns a variable as a cube of plain numbers.
 fn cube_of(path: &Path, file: &MatFile, name: &str, reading: &FileReading) -> Result<NumberCube, String> {
     let array = file.array(name)?.ok_or_else(|| format!("it has no variable '{name}'"))?;
+    if file.listed.iter().any(|own| own.name == name && own.is_complex) {
+        return Err(complex(name));
+    }
     let numbers = array.numbers().map_err(|what| format!("its '{name}' is {what}, expected numbers"))?;
     let packing = Packing::of(file.attributes_of(name));
     let waves = waves_of(file, name, &array.sides, reading.wavelengths_nm.is_some())?;

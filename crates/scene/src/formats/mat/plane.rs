@@ -60,6 +60,9 @@ pub(in super::super) fn read_plane(path: &Path, told: Option<&str>) -> Result<No
             return Err(wrong(format!("it has no array '{told}' of rows and columns, expected one of {names}")));
         }
         (None, [only]) => only,
+        (None, []) if file.listed.iter().any(|own| own.is_complex) => {
+            return Err(wrong("its arrays have complex numbers, expected real ones of depth".to_owned()));
+        }
         (None, []) => return Err(wrong("it has no array of rows and columns, expected one of depth".to_owned())),
         (None, _) => {
             let names = planes.iter().map(|own| own.name.as_str()).collect::<Vec<_>>().join(", ");
