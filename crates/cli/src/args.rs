@@ -259,6 +259,9 @@ pub(crate) struct RunArgs {
     /// Strength γ of ray bending, in place of that of its kind
     #[arg(long, value_name = "G", help_heading = heading::SIMULATION)]
     pub(crate) gamma: Option<f64>,
+    /// Point spread functions of a file (.npz) in place of those of the lens, as `psf LENS -o F.npz` writes them; 'none' for the lens's own
+    #[arg(long, value_name = "F.npz", help_heading = heading::SIMULATION)]
+    pub(crate) psfs: Option<PathBuf>,
     /// Light that surfaces of the lens reflect: 'off', it is left out; 'ghosts', what two of them reflect, once each, falls on the film
     /// [default: off]
     #[arg(long, value_name = "KIND", help_heading = heading::SIMULATION)]
@@ -451,6 +454,9 @@ pub(crate) struct PsfArgs {
     /// Width and height of the pictures, pixels [default: to hold the spot]
     #[arg(long, value_name = "N", help_heading = heading::RESULTS)]
     pub(crate) size: Option<usize>,
+    /// Point spread functions of a file (.npz) in place of those of the lens
+    #[arg(long, value_name = "F.npz", conflicts_with = "mode", help_heading = heading::SIMULATION)]
+    pub(crate) psfs: Option<PathBuf>,
     /// How the light is sampled
     #[arg(long, value_name = "MODE", value_enum, default_value_t = PsfMode::Pupil, help_heading = heading::SIMULATION)]
     pub(crate) mode: PsfMode,
@@ -469,7 +475,7 @@ pub(crate) struct PsfArgs {
     /// Adds MTF tables at these frequencies, cycles/mm
     #[arg(long, value_name = "LIST", help_heading = heading::RESULTS)]
     pub(crate) mtf_per_mm: Option<String>,
-    /// Writes the pictures: an EXR with a layer a PSF, or a PNG mosaic
+    /// Writes the pictures: an EXR with a layer a PSF, a PNG mosaic, or an archive of arrays (.npz) for `run --psfs`
     #[arg(long, short, value_name = "F", help_heading = heading::RESULTS)]
     pub(crate) output: Option<PathBuf>,
     /// Writes the table as CSV

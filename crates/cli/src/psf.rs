@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use dioptric_analysis::{AnalysisFilm, LensDefaults, PsfRequest, PsfRow, PsfSampling, PsfSet, psf_csv};
-use dioptric_pipeline::{REFERENCE_WAVELENGTH_NM, RetiredBank, Staged, parse_directions, parse_numbers};
+use dioptric_pipeline::{PsfFile, REFERENCE_WAVELENGTH_NM, RetiredBank, Staged, parse_directions, parse_numbers};
 use dioptric_report::{PsfFormat, chart_svg, psf_page, write_drawing, write_psfs};
 
 use crate::{
@@ -23,6 +23,7 @@ pub(crate) fn run(arguments: &PsfArgs, common: &Common) -> anyhow::Result<()> {
     let used = arguments.lens.open(common)?;
     let Points { fields_deg, distances_mm, wavelengths_nm, film, focus_nm, spectral_weights } =
         points(arguments, &used, common)?;
+    let stored = arguments.psfs.as_deref().map(PsfFile::read).transpose()?;
     let request = PsfRequest {
         fields_deg,
         distances_mm,
@@ -32,9 +33,10 @@ pub(crate) fn run(arguments: &PsfArgs, common: &Common) -> anyhow::Result<()> {
         diffraction: with_gamma(diffraction(arguments.diffraction), arguments.gamma)?,
         pixel_um: arguments.pixel_um,
         size: arguments.size,
-        sampling: match arguments.mode {
-            PsfMode::Pupil => PsfSampling::Pupil,
-            PsfMode::Paper => PsfSampling::Paper { n_across: arguments.rays, jitter: !arguments.exact_grid },
+        sampling: match (&stored, arguments.mode) {
+            (Some(file), _) => PsfSampling::Stored(file.array.clone()),
+            (None, PsfMode::Pupil) => PsfSampling::Pupil,
+            (None, PsfMode::Paper) => PsfSampling::Paper { n_across: arguments.rays, jitter: !arguments.exact_grid },
         },
         mtf_per_mm: match &arguments.mtf_per_mm {
             Some(list) => parse_numbers("--mtf-per-mm", list)?,
@@ -46,6 +48,8 @@ pub(crate) fn run(arguments: &PsfArgs, common: &Common) -> anyhow::Result<()> {
     let reference_nm = request.reference_nm(&used.lens)?;
     let lens = arguments.lens.state.apply(used, reference_nm, common)?.lens;
     let mut notes = lens.notes_on_glass_range(&request.wavelengths_nm);
+    notes.extend(stored.iter().filter_map(|file| file.note_on_ends(&request.fields_deg, &request.distances_mm)));
+    notes.extend(stored.into_iter().flat_map(|file| file.notes));
     let is_old = arguments.bank.is_some() || arguments.bank_error.is_some();
     notes.extend(is_old.then(|| RetiredBank::STATED.note()).flatten());
     tell(&notes, common);

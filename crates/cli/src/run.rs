@@ -251,6 +251,9 @@ fn change_lens(camera: &mut Camera, arguments: &RunArgs) -> anyhow::Result<()> {
     if arguments.bank.is_some() || arguments.bank_error.is_some() {
         camera.bank = RetiredBank::STATED;
     }
+    if let Some(path) = &arguments.psfs {
+        camera.psfs = Some(path.clone()).filter(|path| path.as_os_str() != "none");
+    }
     camera.lens_reflections = arguments.lens_reflections.unwrap_or(camera.lens_reflections);
     camera.blur = arguments.blur.unwrap_or(camera.blur);
     camera.border = arguments.border.unwrap_or(camera.border);

@@ -89,7 +89,8 @@ impl Layers {
     }
 
     /// Returns the bands at which PSFs are computed: first, last, and enough between them that the blur radius changes
-    /// by at most `step_px` from one to the next, all over the film and the depths.
+    /// by at most `step_px` from one to the next, all over the film and the depths. The bands next to a wavelength between which and the next one
+    /// the lens interpolates are among them.
     pub(crate) fn chromatic_knots(&self, step_px: f64, lens: &Blurs<'_>) -> Vec<usize> {
         let ends = [self.dioptres[0], self.dioptres[self.len() - 1]];
         let blurs = |band: usize| -> Vec<f64> {
@@ -97,8 +98,16 @@ impl Layers {
         };
         let all: Vec<Vec<f64>> = (0..lens.wavelengths_nm.len()).map(blurs).collect();
         let is_far = |(a, b): (&f64, &f64)| (a - b).abs() > step_px;
+        let nearest = |nm: &f64| {
+            let off = |band: &usize| (lens.wavelengths_nm[*band] - nm).abs();
+            (0..all.len()).min_by(|a, b| off(a).total_cmp(&off(b)))
+        };
+        let known: Vec<usize> = lens.lens.known_wavelengths_nm().iter().filter_map(nearest).collect();
         let mut knots = vec![0];
         for band in 1..all.len() {
+            if known.contains(&(band - 1)) && knots[knots.len() - 1] != band - 1 {
+                knots.push(band - 1);
+            }
             let last = knots[knots.len() - 1];
             // A blur may come back to what it was, so every band on the way counts.
             if band - last > 1 && (last + 1..=band).any(|between| all[last].iter().zip(&all[between]).any(is_far)) {

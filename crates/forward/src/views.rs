@@ -143,6 +143,10 @@ where
         false
     }
 
+    fn known_wavelengths_nm(&self) -> &[f64] {
+        self.lens.known_wavelengths_nm()
+    }
+
     fn film_map(&self, wavelength_nm: f64, reach_mm: f64) -> Arc<FilmMap> {
         let map = self.lens.film_map(wavelength_nm, reach_mm + self.center_mm.length());
         Arc::new(FilmMap::clone(&map).counted_from(self.center_mm))

@@ -39,6 +39,14 @@ pub enum PsfError {
         /// Why, and what can be done.
         reason: &'static str,
     },
+    /// Point spread functions of an array that cannot be used.
+    #[error("{key} of the point spread functions: {reason}")]
+    Array {
+        /// The axis, or what else is wrong.
+        key: &'static str,
+        /// What was found and what was expected.
+        reason: String,
+    },
     /// The work was stopped on request.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),

@@ -27,6 +27,11 @@ pub trait LensImage: Sync {
     /// Whether film points that mirror each other, about the axes or their diagonals, have kernels that do.
     fn is_symmetric(&self) -> bool;
 
+    /// The wavelengths, nm, at which kernels are known, where they are interpolated linearly between these; none where they are known at all.
+    fn known_wavelengths_nm(&self) -> &[f64] {
+        &[]
+    }
+
     /// Returns where film points up to `reach_mm` from the middle of the film look, and how much light reaches them. Beyond the
     /// light of the lens the directions go on smoothly.
     fn film_map(&self, wavelength_nm: f64, reach_mm: f64) -> Arc<FilmMap>;

@@ -1,7 +1,8 @@
 //! Point spread functions of lenses, and where the points of a film look.
 //!
 //! A [`LensImageModel`] describes a lens from its film, by rays traced back into the scene, and draws them on pixels with exact energy;
-//! [`LensImage`] is what imaging a scene asks of it. [`Picture`] measures any point spread function.
+//! [`LensImage`] is what imaging a scene asks of it. A [`PsfArray`] takes the place of the functions that it draws. [`Picture`] measures any
+//! point spread function.
 //!
 //! Lengths are millimetres in the lens and on the film, micrometres on pixels; wavelengths nanometres; fields are
 //! tangents at the entrance pupil and depths dioptres from it. Pictures are in the picture frame: the film turned by
@@ -29,6 +30,7 @@ mod narrow_gaussian;
 mod part_image;
 mod point_image;
 mod power;
+mod psf_array;
 mod pupil;
 mod pupil_division;
 mod raster;
@@ -38,6 +40,7 @@ mod settings;
 mod splat;
 mod spots;
 mod station;
+mod stored;
 mod survey;
 mod symmetry;
 mod traced;
@@ -52,6 +55,7 @@ pub use lens_image::{FilmQuery, LensImage};
 pub use metrics::{Picture, Profile};
 pub use model::LensImageModel;
 pub use point_image::PointImage;
+pub use psf_array::{ArrayFields, PsfArray, PsfArrayParts};
 pub use pupil_division::{PupilDivision, PupilSides, Sides};
 pub use raster::Raster;
 pub use render::ModelUse;

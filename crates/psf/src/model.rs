@@ -6,7 +6,9 @@ use dioptric_optics::Lens;
 use glam::DVec2;
 
 use crate::{
-    FilmMap, FilmQuery, ImageSettings, Kernel, LensImage, PointImage, PsfError, PupilDivision, part_image::PartImage,
+    FilmMap, FilmQuery, ImageSettings, Kernel, LensImage, PointImage, PsfArray, PsfError, PupilDivision,
+    part_image::PartImage,
+    stored::{StoredPoint, StoredPsfs},
     traced::Shared,
 };
 
@@ -18,6 +20,8 @@ use crate::{
 #[derive(Clone, Debug)]
 pub struct LensImageModel {
     shared: Arc<Shared>,
+    /// In place of the point spread functions of the lens.
+    stored: Option<Arc<StoredPsfs>>,
 }
 
 impl LensImageModel {
@@ -27,7 +31,35 @@ impl LensImageModel {
     /// When the settings make no sense, the lens has no index at a wavelength, or no light reaches the film.
     pub fn new(lens: &Lens, wavelengths_nm: &[f64], settings: &ImageSettings) -> Result<Self, PsfError> {
         let shared = Shared::new(lens, wavelengths_nm, settings)?;
-        Ok(Self { shared: Arc::new(shared) })
+        Ok(Self { shared: Arc::new(shared), stored: None })
+    }
+
+    /// Returns the image with these point spread functions in place of those of the lens, whatever its diffraction. Where points lie on the film
+    /// and how bright they are is still traced.
+    ///
+    /// # Errors
+    /// When the functions are not known at one of its wavelengths, or their points do not lie before the lens.
+    pub fn with_psfs(self, array: Arc<PsfArray>) -> Result<Self, PsfError> {
+        self.wavelengths_nm().iter().try_for_each(|&nm| array.check_at(nm))?;
+        let stored = StoredPsfs::behind(array, self.shared.projection_center_z_mm())?;
+        Ok(Self { stored: Some(Arc::new(stored)), ..self })
+    }
+
+    /// Returns the stored functions and what a point of the film asks of them.
+    fn stored_at(&self, query: FilmQuery) -> Option<(&Arc<StoredPsfs>, StoredPoint)> {
+        let stored = self.stored.as_ref()?;
+        let FilmQuery { place_mm, dioptres, wavelength_nm, .. } = query;
+        let direction = self.shared.direction(place_mm, wavelength_nm);
+        Some((stored, StoredPoint { direction, dioptres, wavelength_nm }))
+    }
+
+    fn stored_about(
+        &self,
+        place_mm: DVec2,
+        dioptres: f64,
+        wavelength_nm: f64,
+    ) -> Option<(&Arc<StoredPsfs>, StoredPoint)> {
+        self.stored_at(FilmQuery { place_mm, dioptres, wavelength_nm, pitch_um: 1.0 })
     }
 
     /// The lens.
@@ -53,6 +85,12 @@ impl LensImageModel {
     /// Returns the image of a point of the scene, traced forward, at these tangents of field angles; `None` if none of its light reaches the
     /// film, or the lens is not known at the wavelength.
     pub fn point(&self, field_tan: DVec2, dioptres: f64, wavelength_nm: f64) -> Option<PointImage> {
+        if let Some(stored) = &self.stored {
+            let map = self.shared.survey_of_film(&self.shared.color(wavelength_nm), 0.0).map.clone();
+            let place_mm = map.place_mm(field_tan).filter(|place_mm| map.irradiance_sr(*place_mm) > 0.0)?;
+            let point = StoredPoint { direction: field_tan.extend(1.0), dioptres, wavelength_nm };
+            return Some(PointImage::stored(stored.clone(), point, place_mm));
+        }
         PointImage::trace(self.lens(), self.settings(), field_tan, dioptres, wavelength_nm).ok().flatten()
     }
 
@@ -62,7 +100,7 @@ impl LensImageModel {
     /// It falls with the range of phases B over the pupil that the diffraction integral has to follow, on a scale of its
     /// logarithm: from 1 at B = 200 to 0 at B = 400, a blur of about ten waves of defocus.
     pub fn wave_fraction(&self, query: FilmQuery) -> f64 {
-        self.shared.wave_fraction(query)
+        if self.stored.is_some() { 0.0 } else { self.shared.wave_fraction(query) }
     }
 
     /// Returns the images through the parts of a division of the pupil, whose irradiances add up to that of the whole: views of the scene
@@ -71,8 +109,13 @@ impl LensImageModel {
     /// The pupil of each point of the film is divided as that point sees it, vignetted or not.
     ///
     /// # Errors
-    /// For diffraction integrals, which parts of a pupil do not add up to.
+    /// For diffraction integrals, which parts of a pupil do not add up to, and for point spread functions of an array.
     pub fn through(&self, division: PupilDivision) -> Result<Vec<Arc<dyn LensImage + Send>>, PsfError> {
+        if self.stored.is_some() {
+            return Err(PsfError::Undividable {
+                reason: "the point spread functions of an array are those of all of it",
+            });
+        }
         let images = PartImage::all(&self.shared, division)?;
         Ok(images.into_iter().map(|image| Arc::new(image) as Arc<dyn LensImage + Send>).collect())
     }
@@ -80,7 +123,12 @@ impl LensImageModel {
 
 impl LensImage for LensImageModel {
     fn is_symmetric(&self) -> bool {
-        self.shared.is_rotational() && self.shared.decenter().is_none()
+        let is_stored_so = self.stored.as_ref().is_none_or(|stored| stored.is_symmetric());
+        self.shared.is_rotational() && self.shared.decenter().is_none() && is_stored_so
+    }
+
+    fn known_wavelengths_nm(&self) -> &[f64] {
+        self.stored.as_ref().map_or(&[], |stored| &stored.array().parts().wavelengths_nm)
     }
 
     fn film_map(&self, wavelength_nm: f64, reach_mm: f64) -> Arc<FilmMap> {
@@ -88,15 +136,24 @@ impl LensImage for LensImageModel {
     }
 
     fn kernel(&self, query: FilmQuery) -> Kernel {
-        self.shared.kernel(query, None)
+        match self.stored_at(query) {
+            Some((stored, point)) => stored.kernel(&point, query.pitch_um),
+            None => self.shared.kernel(query, None),
+        }
     }
 
     fn blur_radius_mm(&self, place_mm: DVec2, dioptres: f64, wavelength_nm: f64) -> f64 {
-        self.shared.blur_radius_mm(place_mm, dioptres, wavelength_nm)
+        match self.stored_about(place_mm, dioptres, wavelength_nm) {
+            Some((stored, point)) => stored.blur_radius_mm(&point),
+            None => self.shared.blur_radius_mm(place_mm, dioptres, wavelength_nm),
+        }
     }
 
     fn spread_mm(&self, place_mm: DVec2, dioptres: f64, wavelength_nm: f64) -> f64 {
-        self.shared.spread_mm(place_mm, dioptres, wavelength_nm)
+        match self.stored_about(place_mm, dioptres, wavelength_nm) {
+            Some((stored, point)) => stored.spread_mm(&point),
+            None => self.shared.spread_mm(place_mm, dioptres, wavelength_nm),
+        }
     }
 
     fn through_parts(&self, n_parts: usize) -> Result<Vec<Arc<dyn LensImage + Send>>, PsfError> {

@@ -1,9 +1,11 @@
 //! Points of a scene, traced forward through a lens.
 
+use std::sync::Arc;
+
 use dioptric_diffraction::{StopRay, trace_stop_rays};
 use dioptric_optics::{FilmPoint, Lens, MonoLens, ObjectPoint, PupilBoundary, PupilPlane, Vignetting};
 use glam::{DVec2, IVec2};
-use ndarray::Array2;
+use ndarray::{Array2, s};
 
 use crate::{
     ImageSettings, Kernel, ModelUse, PsfError,
@@ -12,6 +14,7 @@ use crate::{
     pupil::Outline,
     render::{Layout, wave_energies},
     spots::{Node, Spots, cell_areas, clear_shares},
+    stored::{StoredPoint, StoredPsfs},
 };
 
 /// The image of one point of a scene at one wavelength, traced where it is: its place, its size and its point spread function.
@@ -19,14 +22,27 @@ use crate::{
 /// What a [`LensImageModel`](crate::LensImageModel) says of the film's points, said of the scene's.
 #[derive(Clone, Debug)]
 pub struct PointImage {
+    centroid_mm: DVec2,
+    blur_radius_mm: f64,
+    spread_mm: f64,
+    source: Source,
+}
+
+/// What a picture is drawn from.
+#[derive(Clone, Debug)]
+enum Source {
+    Traced(Box<Traced>),
+    Stored(Arc<StoredPsfs>, StoredPoint),
+}
+
+#[derive(Clone, Debug)]
+struct Traced {
     lens: MonoLens,
     point: ObjectPoint,
     settings: ImageSettings,
     /// About the centroid.
     spots: Spots,
     centroid_mm: DVec2,
-    blur_radius_mm: f64,
-    rms_radius_mm: f64,
 }
 
 impl PointImage {
@@ -104,11 +120,18 @@ impl PointImage {
         let centroid_mm = spots.centroid_mm();
         let spots = spots.about(centroid_mm);
         let blur_radius_mm = rim_over_rms() * signed_rms_mm(&spots, &targets);
-        let rms_radius_mm = spots.rms_mm();
-        Some(Self { lens, point, settings, spots, centroid_mm, blur_radius_mm, rms_radius_mm })
+        let spread_mm = rim_over_rms() * spots.rms_mm();
+        let source = Source::Traced(Box::new(Traced { lens, point, settings, spots, centroid_mm }));
+        Some(Self { centroid_mm, blur_radius_mm, spread_mm, source })
     }
 
-    /// The centroid of the light, mm from the middle of the film, picture frame.
+    /// Returns the image of a point whose function is stored, where its chief ray meets the film.
+    pub(crate) fn stored(psfs: Arc<StoredPsfs>, point: StoredPoint, place_mm: DVec2) -> Self {
+        let (blur_radius_mm, spread_mm) = (psfs.blur_radius_mm(&point), psfs.spread_mm(&point));
+        Self { centroid_mm: place_mm, blur_radius_mm, spread_mm, source: Source::Stored(psfs, point) }
+    }
+
+    /// The centroid of the light, mm from the middle of the film, picture frame; of a function of an array, the place of its middle sample.
     pub fn centroid_mm(&self) -> DVec2 {
         self.centroid_mm
     }
@@ -124,29 +147,48 @@ impl PointImage {
     /// The radius, mm, that holds 95 % of the light of an even disc of the rms radius of the rays: of the blur and of what aberrations leave
     /// in focus.
     pub fn spread_mm(&self) -> f64 {
-        rim_over_rms() * self.rms_radius_mm
+        self.spread_mm
     }
 
     /// How far from the centroid the farthest ray lands, mm.
     pub fn extent_mm(&self) -> f64 {
-        self.spots.extent_mm()
+        match &self.source {
+            Source::Traced(traced) => traced.spots.extent_mm(),
+            Source::Stored(psfs, point) => psfs.extent_mm(point),
+        }
     }
 
     /// Returns the point spread function about the centroid, and the model that drew it.
     ///
     /// The window holds the whole geometric picture, and of diffraction's Gaussians all but their far tails; the sum says how much.
     pub fn kernel(&self, pitch_um: f64) -> (Kernel, ModelUse) {
-        let layout = self.layout(pitch_um);
-        let (energies, model) = self.drawn(&layout, pitch_um);
-        (layout.kernel(&energies, pitch_um), model)
+        match &self.source {
+            Source::Traced(traced) => {
+                let layout = traced.layout(pitch_um);
+                let (energies, model) = traced.drawn(&layout, pitch_um);
+                (layout.kernel(&energies, pitch_um), model)
+            }
+            Source::Stored(psfs, point) => (psfs.kernel(point, pitch_um), AS_STORED),
+        }
     }
 
     /// Returns the energy on each pixel of a window of `size` × `size` about the centroid, in the picture frame, and the model that drew
     /// it. The energy of the point is 1; what falls outside is lost.
     pub fn picture(&self, pitch_um: f64, size: usize) -> (Array2<f64>, ModelUse) {
-        self.drawn(&self.layout(pitch_um).with_side(size), pitch_um)
+        match &self.source {
+            Source::Traced(traced) => traced.drawn(&traced.layout(pitch_um).with_side(size), pitch_um),
+            Source::Stored(psfs, point) => {
+                let window = psfs.window(point, pitch_um, size / 2);
+                (window.slice_move(s![..size, ..size]), AS_STORED)
+            }
+        }
     }
+}
 
+/// How a stored function is drawn.
+const AS_STORED: ModelUse = ModelUse { wave_fraction: 0.0, fallback: None };
+
+impl Traced {
     fn layout(&self, pitch_um: f64) -> Layout<'_> {
         Layout::about(IVec2::ZERO, &self.spots, bending(&self.lens, self.settings.diffraction), pitch_um)
     }

@@ -24,7 +24,7 @@ const TAILS: f64 = 12.0;
 /// Parts of a pixel, each way, on which light is drawn that hardly reaches beyond it: an odd number, so that one lies in the middle.
 pub(crate) const PARTS: usize = 3;
 /// How far from the middle light and λN together may reach to be drawn so, pixels.
-const NARROW: f64 = 3.0;
+pub(crate) const NARROW: f64 = 3.0;
 /// The largest range of phases, radians, at which a kernel is wave optics alone; at twice that there is none.
 const ALL_WAVE: f64 = 200.0;
 

@@ -6,7 +6,7 @@ use std::{
 };
 
 use dioptric_optics::{FilmCone, Lens, MonoLens, ObjectPoint, ReversedLens};
-use glam::{DVec2, IVec2};
+use glam::{DVec2, DVec3, IVec2};
 use ndarray::Array2;
 
 use crate::{
@@ -130,6 +130,15 @@ impl Shared {
 
     pub(crate) fn focus_dioptres(&self) -> f64 {
         self.focus_dioptres
+    }
+
+    pub(crate) fn projection_center_z_mm(&self) -> f64 {
+        self.reference.projection_center_z_mm()
+    }
+
+    /// Returns the direction that a point of the film sees, of any length.
+    pub(crate) fn direction(&self, place_mm: DVec2, wavelength_nm: f64) -> DVec3 {
+        self.survey_about(&self.color(wavelength_nm), place_mm).map.direction(place_mm)
     }
 
     fn new_color(&self, wavelength_nm: f64) -> Result<Color, PsfError> {

@@ -138,6 +138,8 @@ impl Camera {
     /// diffraction : {"none", "hurb", "hurb-scene3d", "hurb-calibrated", "wave"}
     /// gamma : float
     ///     Strength of HURB.
+    /// psfs : path
+    ///     A file of point spread functions (``.npz``) in place of those of the lens; "none" for the lens's own.
     /// blur : {"layered", "pointwise", "views:N"}
     ///     Layers of depth; each sample on its own, as in the paper; layers through N parts of the pupil.
     /// border : {"hold", "mirror", "black"}
@@ -185,7 +187,7 @@ impl Camera {
     /// name : str
     #[pyo3(signature = (**changes), text_signature = "($self, *, name=None, lens=None, f_number=None, stop_mm=None, coating=None, blades=None, blade_rotation_deg=None, blade_curvature=None, focus_mm=None, film_mm=None, tilt_deg=None, \
 swing_deg=None, rise_mm=None, shift_mm=None, sensor=None, film=None, crop=None, pixels=None, pixel_um=None, \
-dual_pixel=None, filters=None, diffraction=None, gamma=None, blur=None, border=None, lens_reflections=None, bank=None, bank_error=None, \
+dual_pixel=None, filters=None, diffraction=None, gamma=None, psfs=None, blur=None, border=None, lens_reflections=None, bank=None, bank_error=None, \
 scene=None, fov_deg=None, depth_m=None, width_mm=None, distance_mm=None, fill_depth=None, hidden=None, points=None, \
 white_level=None, quantity=None, unit=None, scale=None, scene_wavelengths_nm=None, variable=None, axes=None, \
 no_data=None, depth=None, depth_unit=None, depth_kind=None, depth_variable=None, view=None, panorama=None, illuminant=None, \

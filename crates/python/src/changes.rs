@@ -14,7 +14,7 @@ use pyo3::{
 
 use crate::{
     errors::{exception, wrong, wrong_type},
-    input::{number, numbers, type_name},
+    input::{number, numbers, path, type_name},
     lens::Lens,
     options::{count, diffraction, each_option, seed, with_gamma, word},
     scene::Scene,
@@ -58,6 +58,7 @@ const ALL: &[&str] = &[
     "filters",
     "diffraction",
     "gamma",
+    "psfs",
     "blur",
     "border",
     "lens_reflections",
@@ -326,6 +327,10 @@ fn set_imaging(camera: &mut Camera, key: &str, value: &Bound<'_, PyAny>) -> PyRe
     match key {
         "diffraction" => camera.diffraction = diffraction(key, value)?,
         "gamma" => camera.diffraction = with_gamma(camera.diffraction, number(key, value)?)?,
+        "psfs" => {
+            let named = path(key, value)?;
+            camera.psfs = Some(named).filter(|path| path.as_os_str() != "none");
+        }
         "blur" => {
             let found = word(key, value)?;
             let expected = "'layered', 'pointwise' or 'views:16'";

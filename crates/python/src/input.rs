@@ -11,6 +11,11 @@ pub(crate) fn type_name(value: &Bound<'_, PyAny>) -> String {
     value.get_type().name().map_or_else(|_| "an object".to_owned(), |name| name.to_string())
 }
 
+/// Returns the path that a value is.
+pub(crate) fn path(key: &str, value: &Bound<'_, PyAny>) -> PyResult<std::path::PathBuf> {
+    value.extract().map_err(|_| wrong_type(key, type_name(value), "a path"))
+}
+
 /// Returns a number.
 pub(crate) fn number(key: &str, value: &Bound<'_, PyAny>) -> PyResult<f64> {
     value.extract().map_err(|_| wrong_type(key, type_name(value), "a number"))

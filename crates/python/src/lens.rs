@@ -548,6 +548,8 @@ semi_aperture_mm=None, medium=None, stop=None, conic=None, coefficients=None, sh
     /// diffraction : {"hurb", "none", "hurb-scene3d", "hurb-calibrated", "wave"}
     /// gamma : float
     ///     Strength of HURB.
+    /// psfs : path
+    ///     A file of point spread functions (``.npz``) in place of those of the lens.
     /// rays : int
     ///     Counts this many rays along the side of a grid over the front rim, as the paper does, in place of exact energies.
     /// seed : int
@@ -560,7 +562,7 @@ semi_aperture_mm=None, medium=None, stop=None, conic=None, coefficients=None, sh
     /// each point over that of one on the axis: ``psf * psf.energy[..., None, None]`` has fields as bright as the lens shows them. ``x_mm``
     /// and ``y_mm`` are the centroids in the picture, from the axis.
     #[pyo3(signature = (**options), text_signature = "($self, *, field_deg=None, field_y_deg=None, film_xy_mm=None, distance_mm=None, wavelengths_nm=None, focus_mm=None, film_mm=None, \
-pixel_um=None, shape=None, diffraction=None, gamma=None, rays=None, exact_grid=None, seed=None)")]
+pixel_um=None, shape=None, diffraction=None, gamma=None, psfs=None, rays=None, exact_grid=None, seed=None)")]
     fn psf<'py>(&self, py: Python<'py>, options: Option<&Bound<'py, PyDict>>) -> PyResult<Bound<'py, PyAny>> {
         PsfOptions::read("psf", options, &self.used())?.pictures(py, &self.file.lens)
     }
@@ -568,7 +570,7 @@ pixel_um=None, shape=None, diffraction=None, gamma=None, rays=None, exact_grid=N
     /// Returns what is measured of point spread functions, a dictionary each: centroid, widths, encircled energy, energy and, where
     /// ``mtf_per_mm`` lists spatial frequencies, the MTF. Arguments as of `psf`; fields outermost, then distances, then wavelengths.
     #[pyo3(signature = (**options), text_signature = "($self, *, field_deg=None, field_y_deg=None, film_xy_mm=None, distance_mm=None, wavelengths_nm=None, focus_mm=None, film_mm=None, \
-pixel_um=None, shape=None, diffraction=None, gamma=None, rays=None, exact_grid=None, seed=None, \
+pixel_um=None, shape=None, diffraction=None, gamma=None, psfs=None, rays=None, exact_grid=None, seed=None, \
 mtf_per_mm=None)")]
     fn psf_table<'py>(&self, py: Python<'py>, options: Option<&Bound<'py, PyDict>>) -> PyResult<Bound<'py, PyAny>> {
         let set = PsfOptions::read("psf_table", options, &self.used())?.compute(py, &self.file.lens)?;

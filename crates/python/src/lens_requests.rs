@@ -7,7 +7,7 @@ use dioptric_analysis::{
     PsfSet,
 };
 use dioptric_optics::{Lens, glam::DVec2};
-use dioptric_pipeline::{Diffraction, REFERENCE_WAVELENGTH_NM};
+use dioptric_pipeline::{Diffraction, PsfFile, REFERENCE_WAVELENGTH_NM};
 use ndarray::{ArrayD, IxDyn};
 use pyo3::{
     IntoPyObjectExt,
@@ -17,7 +17,7 @@ use pyo3::{
 
 use crate::{
     errors::{exception, wrong},
-    input::{array_f64, is_single, number, numbers},
+    input::{array_f64, is_single, number, numbers, path},
     options::{count, diffraction, each_option, seed, with_gamma},
     view::view,
     worker::run_apart,
@@ -104,12 +104,13 @@ impl PsfOptions {
             "shape",
             "diffraction",
             "gamma",
+            "psfs",
             "rays",
             "exact_grid",
             "seed",
             "mtf_per_mm",
         ];
-        let mut is_exact_grid = false;
+        let (mut is_exact_grid, mut is_stated, mut stored) = (false, false, None);
         let (mut fields_deg, mut fields_y_deg, mut film) = (None, None, None);
         let mut film_xy_mm: Option<Vec<[f64; 2]>> = None;
         each_option(function, options, &known, |key, value| {
@@ -133,7 +134,8 @@ impl PsfOptions {
                 "film_mm" => film = Some(AnalysisFilm::FilmMm(number(key, value)?)),
                 "pixel_um" => request.pixel_um = number(key, value)?,
                 "shape" => request.size = Some(count(key, value)?),
-                "diffraction" => request.diffraction = diffraction(key, value)?,
+                "diffraction" => (request.diffraction, is_stated) = (diffraction(key, value)?, true),
+                "psfs" => stored = Some(PsfFile::read(&path(key, value)?).map_err(exception)?.array),
                 "gamma" => request.diffraction = with_gamma(request.diffraction, number(key, value)?)?,
                 "rays" => request.sampling = PsfSampling::Paper { n_across: count(key, value)?, jitter: true },
                 "exact_grid" => is_exact_grid = value.extract()?,
@@ -144,6 +146,14 @@ impl PsfOptions {
         })?;
         if let PsfSampling::Paper { jitter, .. } = &mut request.sampling {
             *jitter = !is_exact_grid;
+        }
+        if let Some(array) = stored {
+            if matches!(request.sampling, PsfSampling::Paper { .. }) {
+                return Err(wrong("rays", "a number".to_owned(), "none, with psfs of a file"));
+            }
+            request.sampling = PsfSampling::Stored(array);
+            // They have that of their own.
+            request.diffraction = if is_stated { request.diffraction } else { Diffraction::None };
         }
         if film_xy_mm.is_none() {
             request.fields_deg = pairs(fields_deg.as_deref(), fields_y_deg.as_deref())?;

@@ -89,6 +89,7 @@ fn paths(camera: &mut Camera) -> Vec<&mut PathBuf> {
     };
     lens.into_iter()
         .chain(camera.lens_reading.files_mut())
+        .chain(&mut camera.psfs)
         .chain(sensor)
         .chain(camera.filters.iter_mut().filter_map(FilterSpec::file_mut))
         .chain(scene)

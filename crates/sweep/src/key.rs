@@ -73,7 +73,7 @@ impl ItemKey {
         let stages = [
             of(&(&scene.source, scene.field_of_view_deg, scene.depth_m, scene.flat, &camera.wavelengths)),
             of(&((&camera.lens, &camera.lens_reading), (camera.stop, camera.iris), camera.movements)),
-            of(&((camera.focus, camera.film, camera.crop), sensor, camera.diffraction)),
+            of(&((camera.focus, camera.film, camera.crop), sensor, camera.diffraction, &camera.psfs)),
             of(&(camera.blur, camera.border, camera.lens_reflections, &camera.light_field)),
             of(&(&scene.illuminant, scene.illuminance_lux, &scene.light, (scene.mean_luminance_cd_m2, scene.mean_lux))),
             of(&(&camera.sensor, &camera.filters)),

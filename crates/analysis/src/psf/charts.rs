@@ -21,7 +21,7 @@ struct Plotted<'a> {
 }
 
 impl PsfSet {
-    /// Returns plots by name: `lsf`, `esf`, `mtf`, `encircled_energy`, `ensquared_energy` and `through_focus` of at
+    /// Returns plots by name: `lsf`, `esf`, `mtf`, `encircled_energy`, `ensquared_energy` and `through_focus` (where it is known) of at
     /// most nine point-spread functions, where there are more of a middle wavelength and evenly chosen; with several
     /// wavelengths also `polychromatic_mtf`, the modulation of the light of all wavelengths of each point.
     ///
@@ -47,8 +47,10 @@ impl PsfSet {
                 "ensquared_energy",
                 self.enclosed(&plotted, ("Ensquared energy", "half the side, µm"), Picture::ensquared),
             ),
-            ("through_focus", self.through_focus(through_focus)),
         ];
+        if !through_focus.rows.is_empty() {
+            charts.push(("through_focus", self.through_focus(through_focus)));
+        }
         if self.spectral_weights.len() > 1 {
             charts.push(("polychromatic_mtf", self.polychromatic_modulations(reach_per_mm)));
         }

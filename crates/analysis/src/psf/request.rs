@@ -1,9 +1,9 @@
 //! Which point-spread functions to compute, and how.
 
-use std::borrow::Cow;
+use std::{borrow::Cow, sync::Arc};
 
 use dioptric_optics::{Lens, MonoLens, ObjectPoint};
-use dioptric_psf::{Diffraction, ImageSettings, PointImage, PsfError};
+use dioptric_psf::{Diffraction, ImageSettings, LensImageModel, PointImage, PsfArray, PsfError};
 
 use crate::{
     AfocalView, AnalysisFilm, FilmPlace, FilmUse,
@@ -50,7 +50,7 @@ pub struct PsfRequest {
 }
 
 /// How the light of a point is sampled.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum PsfSampling {
     /// Rays through the true pupil, drawn with exact energy.
     Pupil,
@@ -62,6 +62,8 @@ pub enum PsfSampling {
         /// with the pixels, so that rows of them get several times the rays of their neighbors.
         jitter: bool,
     },
+    /// Not at all: point spread functions of an array take the place of those of the lens.
+    Stored(Arc<PsfArray>),
 }
 
 /// One point-spread function to compute.
@@ -82,6 +84,12 @@ impl Item {
     /// Returns the point, seen through the lens at the reference wavelength.
     pub(crate) fn point(&self, reference: &MonoLens) -> ObjectPoint {
         self.angles().point(reference, self.dioptres)
+    }
+
+    /// Returns the point as a lens with the functions of an array images it; `None` of a dark one.
+    pub(crate) fn stored_image(&self, model: &LensImageModel) -> Option<PointImage> {
+        let angles = self.angles();
+        model.point(angles.direction * angles.angle_deg.to_radians().tan(), self.dioptres, self.wavelength_nm)
     }
 
     /// Returns the point as the lens images it; `None` of a dark one.
@@ -131,6 +139,19 @@ impl PsfRequest {
         self.film.place(lens, self.film_use(self.reference_nm(lens)?))
     }
 
+    /// Returns the lens with the functions of an array, where they take the place of its own.
+    ///
+    /// # Errors
+    /// When they are not known at a wavelength, or no light reaches the film.
+    pub(crate) fn stored_model(
+        &self,
+        lens: &Lens,
+        settings: &ImageSettings,
+    ) -> Result<Option<LensImageModel>, PipelineError> {
+        let PsfSampling::Stored(array) = &self.sampling else { return Ok(None) };
+        Ok(Some(LensImageModel::new(lens, &self.wavelengths_nm, settings)?.with_psfs(array.clone())?))
+    }
+
     /// Returns the points: fields outermost, then distances, then wavelengths.
     pub(crate) fn items(&self, lens: &Lens) -> Result<Vec<Item>, PipelineError> {
         let reference = self.reference(lens)?;
@@ -173,14 +194,18 @@ impl PsfRequest {
                 return Err(self.wrong("distances_mm", &distance.to_string(), "numbers above 0, or inf"));
             }
         }
-        // The paper's rays go to a grid across the axis.
-        let is_paper = matches!(self.sampling, PsfSampling::Paper { .. });
+        // The paper's rays go to a grid across the axis, and stored functions are looked up by tangents.
+        let is_paper = !matches!(self.sampling, PsfSampling::Pupil);
         let nearest_mm = self.distances_mm.iter().copied().fold(f64::INFINITY, f64::min);
         for &field in &self.fields_deg {
             if !FieldAngles::are_known(field, if is_paper { 0.0 } else { nearest_mm }) {
                 let [x, y] = field;
                 let found = if x.abs() > y.abs() || x.is_nan() { x } else { y };
-                let expected = if is_paper { "angles below 90 degrees in the paper mode" } else { KNOWN_ANGLES };
+                let expected = match self.sampling {
+                    PsfSampling::Pupil => KNOWN_ANGLES,
+                    PsfSampling::Paper { .. } => "angles below 90 degrees in the paper mode",
+                    PsfSampling::Stored(_) => "angles below 90 degrees with functions of a file",
+                };
                 return Err(self.wrong("fields_deg", &found.to_string(), expected));
             }
         }
@@ -207,6 +232,13 @@ impl PsfRequest {
         }
         if matches!(self.sampling, PsfSampling::Paper { .. }) && self.diffraction == Diffraction::Wave {
             return Err(self.wrong("diffraction", "wave", "HURB or none in the paper mode"));
+        }
+        if matches!(self.sampling, PsfSampling::Stored(_)) && self.diffraction != Diffraction::None {
+            return Err(self.wrong(
+                "diffraction",
+                "of the lens",
+                "none, with functions of a file, which have their own",
+            ));
         }
         let (weights, n) = (&self.spectral_weights, self.wavelengths_nm.len());
         let are_weights = weights.iter().all(|w| w.is_finite() && *w >= 0.0) && weights.iter().any(|w| *w > 0.0);

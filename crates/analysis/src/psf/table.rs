@@ -6,8 +6,8 @@ use dioptric_diffraction::{
     PupilSamples, TransferFunction, TransferQuality, WaveQuality, WaveWindow, WindowCenter, wave_psf,
 };
 use dioptric_optics::{Lens, MonoLens, ObjectPoint, glam::DVec2};
-use dioptric_psf::{ImageSettings, ModelUse, Picture, PointImage};
-use dioptric_scene::{ExrSamples, write_planes_exr};
+use dioptric_psf::{ImageSettings, LensImageModel, ModelUse, Picture, PointImage};
+use dioptric_scene::{ExrSamples, write_npz_arrays, write_planes_exr};
 use dioptric_spectrum::Cancel;
 use ndarray::Array2;
 use rayon::prelude::*;
@@ -63,10 +63,14 @@ impl PsfRequest {
         }
         let items = self.items(lens)?;
         let settings = self.image_settings(lens, film_distance_mm)?;
+        let stored = self.stored_model(lens, &settings)?;
         let computed: Result<Vec<(PsfRow, Array2<f32>)>, PipelineError> = items
             .par_iter()
             .map(|item| {
-                cancel.check().map_err(PipelineError::from).and_then(|()| self.compute_one(item, lens, &settings))
+                cancel
+                    .check()
+                    .map_err(PipelineError::from)
+                    .and_then(|()| self.compute_one(item, (lens, stored.as_ref()), &settings))
             })
             .collect();
         let (mut rows, pictures): (Vec<PsfRow>, _) = computed?.into_iter().unzip();
@@ -88,25 +92,29 @@ impl PsfRequest {
     fn compute_one(
         &self,
         item: &Item,
-        lens: &Lens,
+        (lens, stored): (&Lens, Option<&LensImageModel>),
         settings: &ImageSettings,
     ) -> Result<(PsfRow, Array2<f32>), PipelineError> {
         let film_distance_mm = settings.film_distance_mm;
         let reference = self.reference(lens)?;
         let mono = lens.at(item.wavelength_nm)?;
         let point = item.point(&reference);
-        let (spot, picture, model, whole) = match self.sampling {
-            PsfSampling::Pupil => {
+        let (spot, picture, model, whole) = match &self.sampling {
+            PsfSampling::Pupil | PsfSampling::Stored(_) => {
                 let axial = ObjectPoint::from_field(&reference, DVec2::ZERO, item.dioptres);
                 let spot = Spot::through_pupil(&mono, &point, &axial, film_distance_mm);
-                let image = if spot.at_mm.is_empty() { None } else { item.image(lens, settings)? };
+                let image = match stored {
+                    _ if spot.at_mm.is_empty() => None,
+                    Some(model) => item.stored_image(model),
+                    None => item.image(lens, settings)?,
+                };
                 let drawn = image.as_ref().map(|image| self.draw(image));
                 let (picture, model) = drawn.map_or_else(|| (Array2::zeros((1, 1)), None), |(p, m)| (p, Some(m)));
                 let picture = self.size.map_or_else(|| picture.clone(), |size| resized(&picture, size));
                 let is_cut = f64::from(picture.sum()) < WHOLE && self.diffraction != Diffraction::Wave;
                 (spot, picture, model, image.filter(|_| is_cut).map(|image| on_coarse_pixels(&image, self.pixel_um)))
             }
-            PsfSampling::Paper { n_across, jitter } => {
+            &PsfSampling::Paper { n_across, jitter } => {
                 let paper = PaperRays { n_across, jitter, bending: self.diffraction.hurb(), seed: self.seed };
                 let spot = Spot::over_front(&mono, &point, film_distance_mm, &paper);
                 let picture = self.counted(&spot);
@@ -242,6 +250,52 @@ impl PsfSet {
             .collect();
         let planes: Vec<(&str, &Array2<f32>)> = named.iter().map(|(name, plane)| (name.as_str(), plane)).collect();
         Ok(write_planes_exr(path, &planes, ExrSamples::Single)?)
+    }
+
+    /// Writes the pictures as an archive of `NumPy` that takes the place of the point spread functions of a lens
+    /// ([`PsfFile`](dioptric_pipeline::PsfFile)): each of sum 1.
+    ///
+    /// # Errors
+    /// When a field is dark, or the file cannot be written.
+    pub fn write_npz(&self, path: &Path) -> Result<(), PipelineError> {
+        if let Some(dark) = self.rows.iter().find(|row| row.is_dark()) {
+            let reason = format!(
+                "no light of the field of {}/{} degrees reaches the film, expected lit fields for an archive of point spread functions",
+                dark.field_deg, dark.field_y_deg
+            );
+            return Err(PipelineError::Write { path: path.to_owned(), reason });
+        }
+        let side = self.side();
+        let whole = self.pictures.iter().flat_map(|picture| {
+            let sum: f32 = picture.sum();
+            resized(picture, side).mapv(|v| v / sum).into_iter()
+        });
+        let samples: Vec<f32> = whole.collect();
+        let n_colors = self.spectral_weights.len();
+        let first =
+            |row: &&PsfRow| (row.field_deg, row.field_y_deg) == (self.rows[0].field_deg, self.rows[0].field_y_deg);
+        let n_distances = self.rows.iter().take_while(first).count() / n_colors;
+        let n_fields = self.rows.len() / (n_distances * n_colors);
+        let of_fields: Vec<&PsfRow> = self.rows.iter().step_by(n_distances * n_colors).collect();
+        let is_to_the_right = of_fields.iter().all(|row| row.field_y_deg == 0.0 && row.field_deg >= 0.0);
+        let fields_deg: Vec<f32> = match is_to_the_right {
+            true => of_fields.iter().map(|row| row.field_deg as f32).collect(),
+            false => of_fields.iter().flat_map(|row| [row.field_deg as f32, row.field_y_deg as f32]).collect(),
+        };
+        let distances_mm: Vec<f32> =
+            self.rows.iter().step_by(n_colors).take(n_distances).map(|row| row.distance_mm as f32).collect();
+        let wavelengths_nm: Vec<f32> = self.rows.iter().take(n_colors).map(|row| row.wavelength_nm as f32).collect();
+        let sides_of_fields = if is_to_the_right { vec![n_fields] } else { vec![n_fields, 2] };
+        Ok(write_npz_arrays(
+            path,
+            &[
+                ("psf", &[n_fields, n_distances, n_colors, side, side], &samples),
+                ("fields_deg", &sides_of_fields, &fields_deg),
+                ("distances_mm", &[n_distances], &distances_mm),
+                ("wavelengths_nm", &[n_colors], &wavelengths_nm),
+                ("pitch_um", &[], &[self.pixel_um as f32]),
+            ],
+        )?)
     }
 
     /// Pixels along the side of the largest picture.

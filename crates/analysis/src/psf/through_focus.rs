@@ -40,7 +40,8 @@ impl PsfRequest {
     /// so much that the sharpest of the pictures is blurred past it.
     ///
     /// Only what plots show is followed, on pixels as coarse as the frequency allows; the modulation is that of the
-    /// pixels asked for. Light that falls outside 75 periods counts as unmodulated.
+    /// pixels asked for. Light that falls outside 75 periods counts as unmodulated. Functions of an array know of no other film: of them nothing
+    /// is followed.
     ///
     /// # Errors
     /// Those of [`compute`](Self::compute).
@@ -61,7 +62,7 @@ impl PsfRequest {
             _ => 1.0,
         };
         let shifts_mm: Vec<f64> = (-STEPS..=STEPS).map(|i| extent_mm * f64::from(i) / f64::from(STEPS)).collect();
-        let rows = set.plotted();
+        let rows = if let PsfSampling::Stored(_) = self.sampling { vec![] } else { set.plotted() };
         let all = self.items(lens)?;
         let items: Vec<Item> = rows.iter().map(|row| all[*row]).collect();
         let mut modulations = vec![Vec::with_capacity(shifts_mm.len()); rows.len()];
@@ -93,13 +94,14 @@ struct Here<'a> {
 impl Here<'_> {
     /// Returns the tangential and the sagittal modulation of each point.
     fn modulations(&self) -> Result<Vec<(f64, f64)>, PipelineError> {
-        match self.request.sampling {
+        match &self.request.sampling {
+            PsfSampling::Stored(_) => Ok(vec![]),
             PsfSampling::Pupil => {
                 let settings = self.request.image_settings(self.lens, self.film_distance_mm)?;
                 let modulation = |item: &Item| Ok(self.of_picture(item, item.image(self.lens, &settings)?.as_ref()));
                 self.items.par_iter().map(modulation).collect()
             }
-            PsfSampling::Paper { n_across, jitter } => {
+            &PsfSampling::Paper { n_across, jitter } => {
                 let rays =
                     PaperRays { n_across, jitter, bending: self.request.diffraction.hurb(), seed: self.request.seed };
                 self.items.par_iter().map(|item| self.of_rays(item, &rays)).collect()

@@ -91,6 +91,11 @@ pub struct Camera {
     /// Diffraction at the stop.
     #[serde(default)]
     pub diffraction: Diffraction,
+    /// A file of point spread functions (`.npz`) in place of those of the lens and of its diffraction; the lens still says where points lie on the
+    /// film, how bright they are and which depth is in focus.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "schema", schemars(extend("default" = null)))]
+    pub psfs: Option<PathBuf>,
     /// Of older files.
     #[serde(default, skip_serializing)]
     #[cfg_attr(feature = "schema", schemars(skip))]
@@ -349,6 +354,7 @@ impl Camera {
             checker.wrong(key, &found.to_string(), expected)?;
         }
         self.blur.check(self.diffraction, checker)?;
+        self.check_psfs(checker)?;
         self.exposure.check().map_err(|error| checker.of_sensor(error))?;
         self.processing.check().map_err(|error| checker.of_sensor(error))?;
         match &self.wavelengths {
@@ -429,6 +435,34 @@ impl Camera {
         Ok(())
     }
 
+    /// Checks what does not go with point spread functions of a file, which are those of a whole pupil.
+    fn check_psfs(&self, checker: &Checker<'_>) -> Result<(), PipelineError> {
+        if self.psfs.is_none() {
+            return Ok(());
+        }
+        let with = |what: &str| format!("{what}, with psfs of a file, which are those of the whole pupil");
+        if let BlurSpec::Views(_) = self.blur {
+            checker.wrong("blur", &self.blur.to_string(), &with("layered or pointwise"))?;
+        }
+        if self.dual_pixel.is_some() {
+            checker.wrong("dual_pixel", "photodiodes", &with("none"))?;
+        }
+        if matches!(self.light_field, Some(LightFieldSpec::Array(_))) {
+            checker.wrong("light_field", "an array before the film", &with("none"))?;
+        }
+        let Movements { tilt_deg, swing_deg, .. } = self.movements;
+        for (key, turned_deg) in [("tilt_deg", tilt_deg), ("swing_deg", swing_deg)] {
+            if turned_deg != 0.0 {
+                checker.wrong(
+                    key,
+                    &turned_deg.to_string(),
+                    "0, with psfs of a file, which are those of a lens before its film",
+                )?;
+            }
+        }
+        Ok(())
+    }
+
     /// Checks the film, and what goes with a part of it or an array before it.
     fn check_film(&self, checker: &Checker<'_>) -> Result<(), PipelineError> {
         if let FilmSpec::Pixels { columns, rows, pitch_um } = self.film {
@@ -457,7 +491,7 @@ impl Camera {
         if let Some(path) = self.lens.file_mut() {
             *path = folder.join(&path);
         }
-        for path in self.lens_reading.files_mut() {
+        for path in self.lens_reading.files_mut().chain(&mut self.psfs) {
             *path = folder.join(&path);
         }
         if let SensorSpec::File(path) = &mut self.sensor {

@@ -25,5 +25,9 @@ pub(super) fn build(
         Quality::Preview => settings.for_preview(),
         Quality::Sketch => ImageSettings { n_rings: SKETCH.0, n_azimuths: SKETCH.1, ..settings },
     };
-    Ok(LensImageModel::new(&lens.lens, grid.centers_nm(), &settings)?)
+    let model = LensImageModel::new(&lens.lens, grid.centers_nm(), &settings)?;
+    Ok(match &lens.psfs {
+        Some(psfs) => model.with_psfs(psfs.array.clone())?,
+        None => model,
+    })
 }

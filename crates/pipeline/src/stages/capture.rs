@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use dioptric_psf::ArrayFields;
 use dioptric_sensor::{Developed, ElectronRate, GainMode, Processing, Sensor};
 use dioptric_spectrum::{Bands, Illuminant, WavelengthGrid};
 
@@ -52,6 +53,10 @@ pub struct Capture {
     pub(super) rates: Arc<PixelRates>,
 }
 
+/// Pixels by which the radius of the blur may change between two stored distances, before that is told: as far apart as the layers of the imaging,
+/// between which kernels are mixed too.
+const MIXED_BLURS_PX: f64 = 2.0;
+
 impl Capture {
     /// The bands.
     pub fn grid(&self) -> &WavelengthGrid {
@@ -80,9 +85,63 @@ impl Capture {
             .notes_at(self.grid().centers_nm())
             .into_iter()
             .chain(on_angles)
+            .chain(self.notes_on_psfs())
             .chain(self.note_on_gain())
             .chain(self.camera.bank.note())
             .collect()
+    }
+
+    /// Says what the point spread functions of a file leave open on this film and before this scene.
+    fn notes_on_psfs(&self) -> Vec<String> {
+        let Some(psfs) = &self.lens.psfs else { return vec![] };
+        let (Self { scene, place, lens, .. }, parts) = (self, psfs.array.parts());
+        let mut notes = psfs.notes.clone();
+        let name = lens.lens.name();
+        let finest_um = parts.pitch_um.iter().copied().fold(f64::INFINITY, f64::min);
+        let pixel_um = place.pixel_pitch_um();
+        if finest_um > pixel_um * (1.0 + 1e-6) {
+            notes.push(format!(
+                "psfs: their samples of {finest_um} µm are wider than the pixels of {pixel_um} µm, and the light of each is spread evenly over it"
+            ));
+        }
+        let center_m = 1e-3 * lens.reference.projection_center_z_mm();
+        let ends_m =
+            [parts.distances_mm.first(), parts.distances_mm.last()].map(|mm| mm.map(|mm| 1e-3 * mm + center_m));
+        if let [Some(near_m), Some(far_m)] = ends_m
+            && parts.distances_mm.len() > 1
+            && (scene.near_m < near_m * (1.0 - 1e-6) || scene.far_m > far_m * (1.0 + 1e-6))
+        {
+            notes.push(format!(
+                "psfs: they are of {near_m:.3} to {far_m:.3} m, the scene lies at {:.3} to {:.3} m: beyond their ends they are those of the end",
+                scene.near_m, scene.far_m
+            ));
+        }
+        let step_px = 1e3 * psfs.array.largest_blur_step_mm() / pixel_um;
+        if step_px > MIXED_BLURS_PX {
+            notes.push(format!(
+                "psfs: their blur changes by up to {step_px:.0} pixels from one distance to the next, and points between are given a mixture of \
+                 both: more distances make it one blur"
+            ));
+        }
+        let last_deg = match &parts.fields {
+            ArrayFields::Heights(heights) if heights.len() > 1 => heights.last().copied(),
+            ArrayFields::Grid { x_deg, y_deg } => {
+                let reach = |axis: &[f64]| axis.iter().map(|deg| deg.abs()).fold(0.0, f64::max);
+                let tan = |deg: f64| deg.to_radians().tan();
+                Some(tan(reach(x_deg)).hypot(tan(reach(y_deg))).atan().to_degrees())
+            }
+            _ => None,
+        };
+        let film = place.film();
+        let corner_mm = (film.half_size_mm() + film.center_mm.abs()).length();
+        let corner_deg = (corner_mm / lens.reference.film_scale_mm(place.film_distance_mm).abs()).atan().to_degrees();
+        if let Some(last_deg) = last_deg.filter(|last_deg| corner_deg > last_deg * 1.01 + 0.01) {
+            notes.push(format!(
+                "psfs: they go to {last_deg:.2} degrees, the corner of the film to some {corner_deg:.1} by the focal length of {name}: beyond \
+                 their ends they are those of the end"
+            ));
+        }
+        notes
     }
 
     /// Says that the sensor has no other readout than the usual one, where another was asked for.

@@ -87,8 +87,14 @@ impl Chain<'_> {
     }
 
     pub(super) fn world_render(&self, inputs: &IrradianceInputs) -> Result<WorldRender, PipelineError> {
-        let world = self.world(&inputs.scene.geometry)?;
         let film = &inputs.plan.bank.film;
+        if film.lens.psfs.is_some() {
+            let reason =
+                "are no lens that rays from the film could go through, expected none for a world with method: Backward"
+                    .to_owned();
+            return Err(PipelineError::Unsuitable { what: "psfs", reason });
+        }
+        let world = self.world(&inputs.scene.geometry)?;
         let grid = self.summary(&inputs.scene)?.grid()?;
         let (lens, place) = (self.lens(&film.lens)?, self.film(film, &inputs.scene)?);
         WorldRender::through_lens(world, inputs, (&lens, &place), grid)

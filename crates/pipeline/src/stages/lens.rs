@@ -7,7 +7,7 @@ use dioptric_sensor::{Layer, Sensor};
 use dioptric_spectrum::{Spectrum, WavelengthGrid};
 
 use super::spec::LensInputs;
-use crate::{PipelineError, REFERENCE_WAVELENGTH_NM, with_blades};
+use crate::{PipelineError, PsfFile, REFERENCE_WAVELENGTH_NM, with_blades};
 
 /// A lens ready for use.
 #[derive(Clone, Debug)]
@@ -18,6 +18,8 @@ pub struct ResolvedLens {
     pub reference: MonoLens,
     /// What its file states and this program does otherwise or not at all, a sentence each.
     pub notes: Vec<String>,
+    /// The point spread functions that take the place of its own.
+    pub psfs: Option<PsfFile>,
     /// The distance of the object that it is made for, mm from the first vertex.
     object_distance_mm: f64,
     /// What of the light on its axis it lets through, found once.
@@ -80,16 +82,18 @@ pub(super) fn resolve(inputs: &LensInputs) -> Result<ResolvedLens, PipelineError
     let lens = inputs.movements.apply(lens)?;
     let reference = lens.at(REFERENCE_WAVELENGTH_NM)?;
     // What limits the light is that of the lens's own object.
+    let psfs = inputs.psfs.as_deref().map(PsfFile::read).transpose()?;
     let object_distance_mm = file.object_distance_mm.unwrap_or(f64::INFINITY);
     let note_on_limit = reference.note_on_limit(object_distance_mm);
     let notes = file.notes.into_iter().chain(note_on_stop).chain(note_on_iris).chain(note_on_limit).collect();
-    Ok(ResolvedLens { lens, reference, notes, object_distance_mm, transmittance: OnceLock::new() })
+    Ok(ResolvedLens { lens, reference, notes, psfs, object_distance_mm, transmittance: OnceLock::new() })
 }
 
-/// Checks that every medium of the lens is known at bands that are known before the scene is.
+/// Checks that every medium of the lens, and its point spread functions of a file, are known at bands that are known before the scene is.
 pub(super) fn check_glasses(lens: &ResolvedLens, grid: Option<&WavelengthGrid>) -> Result<(), PipelineError> {
     for &wavelength_nm in grid.iter().flat_map(|grid| grid.centers_nm()) {
         lens.lens.at(wavelength_nm)?;
+        lens.psfs.as_ref().map_or(Ok(()), |psfs| psfs.array.check_at(wavelength_nm))?;
     }
     Ok(())
 }

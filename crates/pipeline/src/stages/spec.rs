@@ -72,6 +72,8 @@ pub(crate) struct LensInputs {
     pub(crate) stop: StopSpec,
     pub(crate) iris: Option<Iris>,
     pub(crate) movements: Movements,
+    /// The file of the point spread functions that take the place of its own.
+    pub(crate) psfs: Option<PathBuf>,
     files: Vec<FileStamp>,
 }
 
@@ -247,7 +249,7 @@ fn check_patch(camera: &Camera, sensor: &Sensor) -> Result<(), PipelineError> {
 impl LensInputs {
     pub(crate) fn of(camera: &Camera, given: &GivenParts) -> Self {
         let lens_file = camera.lens.file().filter(|_| given.lens.is_none()).map_or_else(Vec::new, FileStamp::all_of);
-        let named = camera.lens_reading.files().map(FileStamp::of);
+        let named = camera.lens_reading.files().chain(camera.psfs.as_deref()).map(FileStamp::of);
         Self {
             given: given.lens.clone(),
             choice: camera.lens.clone(),
@@ -255,6 +257,7 @@ impl LensInputs {
             stop: camera.stop,
             iris: camera.iris,
             movements: camera.movements,
+            psfs: camera.psfs.clone(),
             files: lens_file.into_iter().chain(named).collect(),
         }
     }

@@ -138,17 +138,19 @@ pub enum PsfFormat {
     Exr,
     /// A labelled [mosaic](psf_mosaic) (`.png`).
     Png,
+    /// An archive of `NumPy` that a camera takes in place of the functions of its lens (`.npz`).
+    Npz,
 }
 
 impl PsfFormat {
     /// Returns the format that the name of a file ends in, of any case.
     ///
     /// # Errors
-    /// When it ends in neither.
+    /// When it ends in none of them.
     pub fn of(path: &Path) -> Result<Self, PipelineError> {
         let cannot = |what: String| PipelineError::Write {
             path: path.to_owned(),
-            reason: format!("{what} is no format of pictures here; expected .exr or .png"),
+            reason: format!("{what} is no format of pictures here; expected .exr, .npz or .png"),
         };
         if path.extension().is_none() && is_stream(path) {
             return Ok(Self::Exr);
@@ -157,6 +159,7 @@ impl PsfFormat {
         match extension.to_string_lossy().to_lowercase().as_str() {
             "exr" => Ok(Self::Exr),
             "png" => Ok(Self::Png),
+            "npz" => Ok(Self::Npz),
             other => Err(cannot(format!("'.{other}'"))),
         }
     }
@@ -170,6 +173,7 @@ pub fn write_psfs(set: &PsfSet, path: &Path, format: PsfFormat) -> Result<(), Pi
     let cannot = |e: std::io::Error| PipelineError::Write { path: path.to_owned(), reason: e.to_string() };
     match format {
         PsfFormat::Exr => set.write_exr(path),
+        PsfFormat::Npz => set.write_npz(path),
         PsfFormat::Png => std::fs::write(path, png_bytes(&psf_mosaic(set)?)?).map_err(cannot),
     }
 }

@@ -96,6 +96,7 @@ pub use mat::{
     IsetIrradiance, holds_iset_irradiance, read_iset_display, read_iset_irradiance, write_iset_irradiance,
     write_iset_scene,
 };
+pub use npz::{NamedArray, read_npz_arrays, write_npz_arrays};
 pub use photons::joules_per_photon;
 pub use picture::{PictureSamples, notes_on_samples, read_picture, read_picture_samples};
 pub use point_table::PointTable;

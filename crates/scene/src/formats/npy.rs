@@ -98,7 +98,29 @@ fn header_of(bytes: &[u8]) -> Result<Header, String> {
 
 /// Reads the array of these bytes.
 pub(super) fn parse(bytes: &[u8]) -> Result<NpyArray, String> {
-    let Header { sides, kind, is_big_endian, is_fortran, n_bytes } = header_of(bytes)?;
+    numbers_of(header_of(bytes)?, bytes)
+}
+
+/// Reads an array of real or complex numbers; of complex ones the last axis has the real and the imaginary part. Returns whether they are.
+pub(super) fn parse_complex(bytes: &[u8]) -> Result<(NpyArray, bool), String> {
+    let mut header = header_of(bytes)?;
+    let part = match header.kind.as_str() {
+        "c8" => "f4",
+        "c16" => "f8",
+        _ => return Ok((numbers_of(header, bytes)?, false)),
+    };
+    if header.is_fortran && header.sides.len() > 1 {
+        return Err("its complex numbers are in the order of Fortran, expected that of C".to_owned());
+    }
+    header.kind = part.to_owned();
+    header.sides.push(2);
+    header.is_fortran = false;
+    Ok((numbers_of(header, bytes)?, true))
+}
+
+/// Reads the numbers behind a header.
+fn numbers_of(header: Header, bytes: &[u8]) -> Result<NpyArray, String> {
+    let Header { sides, kind, is_big_endian, is_fortran, n_bytes } = header;
     let Some((size, top, number)) = element(&kind) else {
         return Err(match kind.strip_prefix('c') {
             Some(_) => {
@@ -137,6 +159,19 @@ pub(super) fn parse(bytes: &[u8]) -> Result<NpyArray, String> {
         (0..n).map(value).collect()
     };
     Ok(NpyArray { sides, values, top, n_more: data.len() - n * size })
+}
+
+/// Returns the bytes of an array of single floats: version 1, its numbers after a multiple of 64 bytes.
+pub(super) fn npy_bytes(sides: &[usize], values: &[f32]) -> Vec<u8> {
+    let shape: String = sides.iter().map(|side| format!("{side}, ")).collect();
+    let mut header = format!("{{'descr': '<f4', 'fortran_order': False, 'shape': ({}), }}", shape.trim_end());
+    while !(10 + header.len() + 1).is_multiple_of(64) {
+        header.push(' ');
+    }
+    header.push('\n');
+    let mut bytes = [MAGIC, &[1, 0], &(header.len() as u16).to_le_bytes(), header.as_bytes()].concat();
+    bytes.extend(values.iter().flat_map(|v| v.to_le_bytes()));
+    bytes
 }
 
 /// Whether an array of these bytes has sides that are wanted and numbers; complex ones are refused when they are read.
@@ -228,6 +263,24 @@ pub(super) mod tests {
         let fortran = parse(&npy("|u1", true, "(2, 3)", &[0, 1, 2, 3, 4, 5])).unwrap();
         assert_eq!(fortran.values, [0.0, 2.0, 4.0, 1.0, 3.0, 5.0]);
         assert_eq!(parse(&npy("|u1", false, "(3,)", &[1, 2, 3])).unwrap().sides, [3]);
+    }
+
+    #[test]
+    fn written_arrays_are_read_again() {
+        for sides in [vec![], vec![3], vec![2, 3]] {
+            let values: Vec<f32> = (0..sides.iter().product()).map(|i| i as f32 + 0.5).collect();
+            let array = parse(&npy_bytes(&sides, &values)).unwrap();
+            assert_eq!((array.sides, array.values, array.n_more), (sides, values, 0));
+        }
+    }
+
+    #[test]
+    fn complex_numbers_are_two_on_the_last_axis() {
+        let data: Vec<u8> = [1.0_f32, 2.0, 3.0, 4.0].into_iter().flat_map(f32::to_le_bytes).collect();
+        let (array, is_complex) = parse_complex(&npy("<c8", false, "(2,)", &data)).unwrap();
+        assert_eq!((array.sides, array.values, is_complex), (vec![2, 2], vec![1.0, 2.0, 3.0, 4.0], true));
+        assert!(!parse_complex(&npy("<f4", false, "(4,)", &data)).unwrap().1);
+        assert!(parse_complex(&npy("<c8", true, "(1, 2)", &data)).unwrap_err().contains("Fortran"));
     }
 
     #[test]

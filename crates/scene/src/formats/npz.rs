@@ -2,20 +2,21 @@
 
 use std::{
     fs::File,
-    io::{BufReader, Read},
+    io::{BufReader, Read, Write},
     path::Path,
 };
 
-use zip::{ZipArchive, result::ZipError};
+use dioptric_files::Staged;
+use zip::{CompressionMethod, ZipArchive, ZipWriter, result::ZipError, write::SimpleFileOptions};
 
 use super::{
     axes,
     contents::Cube,
     mat::{DEPTHS, WAVES, is_called},
-    npy::{NpyArray, is_array_of, parse},
+    npy::{NpyArray, is_array_of, npy_bytes, parse, parse_complex},
     read_options::ReadOptions,
     stated::{Noted, name_of, note_of, short},
-    unusable::{check_memory, unreadable},
+    unusable::{check_memory, open_new, unreadable, unwritable},
     wavelength_unit::listed_nm,
 };
 use crate::SceneError;
@@ -46,6 +47,15 @@ impl<'a> Archive<'a> {
     }
 
     fn read(&mut self, name: &str) -> Result<NpyArray, SceneError> {
+        self.read_any(name, |bytes| Ok((parse(bytes)?, false))).map(|(array, _)| array)
+    }
+
+    /// Reads an array, and whether its numbers are complex.
+    fn read_any(
+        &mut self,
+        name: &str,
+        parse: impl Fn(&[u8]) -> Result<(NpyArray, bool), String>,
+    ) -> Result<(NpyArray, bool), SceneError> {
         let (path, length) = (self.path, self.length);
         let wrong = |reason: String| unreadable(path, format!("its '{}': {reason}", short(name)));
         let mut entry = self.zip.by_name(name).map_err(|error| wrong(error.to_string()))?;
@@ -54,7 +64,8 @@ impl<'a> Archive<'a> {
         let mut bytes = vec![];
         let limit = entry.size();
         entry.by_ref().take(limit).read_to_end(&mut bytes).map_err(|error| wrong(error.to_string()))?;
-        Ok(parse(&bytes).map_err(wrong)?.noted(Path::new(name)).told_in(&mut self.notes))
+        let (array, is_complex) = parse(&bytes).map_err(wrong)?;
+        Ok((array.noted(Path::new(name)).told_in(&mut self.notes), is_complex))
     }
 
     /// Returns the file of the array of this name.
@@ -169,6 +180,61 @@ pub(super) fn read_npz_plane(path: &Path, told: Option<&str>) -> Result<Noted<(S
         archive.names.iter().filter(|name| **name != chosen).map(|name| bare(name).to_owned()).collect();
     let notes = archive.notes.into_iter().chain(note_of(path, "array", &unused));
     Ok(Noted::new((bare(&chosen).to_owned(), array), notes))
+}
+
+/// An array of an archive.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NamedArray {
+    /// Its name.
+    pub name: String,
+    /// The lengths of its axes, the slowest first; none of a single number. Of complex numbers the last axis has the real and the imaginary part.
+    pub sides: Vec<usize>,
+    /// Whether its numbers are complex.
+    pub is_complex: bool,
+    /// Its numbers in that order.
+    pub values: Vec<f32>,
+}
+
+impl NamedArray {
+    /// Returns its numbers as they were written in decimals, of which singles keep seven digits.
+    pub fn decimals(&self) -> Vec<f64> {
+        self.values.iter().map(|v| v.to_string().parse().unwrap_or(f64::NAN)).collect()
+    }
+}
+
+/// Reads those arrays of an archive of `NumPy` (`.npz`) that have one of these names; what else it has is named in a note.
+///
+/// # Errors
+/// When it is no archive, or one of these arrays cannot be read.
+pub fn read_npz_arrays(path: &Path, wanted: &[&str]) -> Result<Noted<Vec<NamedArray>>, SceneError> {
+    let mut archive = Archive::open(path)?;
+    let (known, unused): (Vec<String>, Vec<String>) =
+        archive.names.clone().into_iter().partition(|name| wanted.contains(&bare(name)));
+    let mut arrays = vec![];
+    for name in known {
+        let (array, is_complex) = archive.read_any(&name, parse_complex)?;
+        arrays.push(NamedArray { name: bare(&name).to_owned(), sides: array.sides, is_complex, values: array.values });
+    }
+    let unused: Vec<String> = unused.iter().map(|name| bare(name).to_owned()).collect();
+    let notes = archive.notes.into_iter().chain(note_of(path, "array", &unused));
+    Ok(Noted::new(arrays, notes))
+}
+
+/// Writes arrays of real numbers as single floats into an archive of `NumPy` (`.npz`), uncompressed as `numpy.savez` has them.
+///
+/// # Errors
+/// When it cannot be written.
+pub fn write_npz_arrays(path: &Path, arrays: &[(&str, &[usize], &[f32])]) -> Result<(), SceneError> {
+    let cannot = |error: &dyn std::fmt::Display| unwritable(path, error);
+    let staged = Staged::file(path)?;
+    let mut zip = ZipWriter::new(open_new(&staged, path)?);
+    let options = SimpleFileOptions::default().compression_method(CompressionMethod::Stored).large_file(true);
+    for (name, sides, values) in arrays {
+        zip.start_file(format!("{name}.npy"), options).map_err(|error| cannot(&error))?;
+        zip.write_all(&npy_bytes(sides, values)).map_err(|error| cannot(&error))?;
+    }
+    zip.finish().map_err(|error| cannot(&error))?;
+    Ok(staged.commit()?)
 }
 
 fn shown<'a>(names: impl Iterator<Item = &'a String>) -> String {

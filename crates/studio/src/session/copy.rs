@@ -182,6 +182,11 @@ impl Telling {
             self.text("diffraction", word);
             self.made.diffraction = camera.diffraction;
         }
+        if camera.psfs != self.made.psfs {
+            let named = camera.psfs.as_ref().map_or_else(|| "none".to_owned(), |path| path.display().to_string());
+            self.text("psfs", &named);
+            self.made.psfs.clone_from(&camera.psfs);
+        }
         if camera.blur != self.made.blur {
             self.text("blur", &camera.blur.to_string());
             self.made.blur = camera.blur;
