@@ -9,7 +9,7 @@ use multiversion::multiversion;
 pub(crate) const BATCH: usize = 8;
 
 /// Returns the smallest size of at least `n` whose transform is fast: a multiple of 4 with the factors 2 and 3, or of 8 with one of 5, 7 and 11 besides. Others are up to
-/// four times as slow a sample (docs/PERFORMANCE.md).
+/// four times as slow a sample (docs/notes/2026-11-performance.md).
 pub(crate) fn fast_size(n: usize) -> usize {
     let without = |mut m: usize, factor: usize| {
         while m.is_multiple_of(factor) {
