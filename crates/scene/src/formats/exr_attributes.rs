@@ -109,6 +109,11 @@ pub(super) fn words_of(text: &Text) -> String {
 }
 
 impl Attributes {
+    /// Returns what is known of them, without what else there is.
+    pub(super) fn known(&self) -> Self {
+        Self { others: Stated::new("attribute", vec![]), ..self.clone() }
+    }
+
     /// Returns what is taken in place of camera data that the header should state beside its focal length.
     pub(super) fn note_of_center(&self, path: &Path) -> Option<String> {
         let is_whole = self.center_x_px.is_some() && self.center_y_px.is_some();

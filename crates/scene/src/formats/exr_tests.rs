@@ -489,3 +489,57 @@ fn the_real_files_are_read() {
         assert_eq!(back.depth.is_some(), has_depth, "{name}");
     }
 }
+
+/// Parts of one channel each, of this name and value.
+fn write_parts(path: &PathBuf, parts: &[(&str, &str, f32)]) {
+    let layers: exr::image::Layers<_> = parts
+        .iter()
+        .map(|(part, channel, value)| {
+            let list: SmallVec<[_; 4]> = SmallVec::from_iter([AnyChannel::new(*channel, flat(*value))]);
+            Layer::new((2, 2), LayerAttributes::named(*part), Encoding::FAST_LOSSLESS, AnyChannels::sort(list))
+        })
+        .collect();
+    let window = exr::meta::attribute::IntegerBounds::from_dimensions((2, 2));
+    Image::from_layers(exr::meta::header::ImageAttributes::new(window), layers).write().to_file(path).unwrap();
+}
+
+#[test]
+fn a_part_that_is_called_like_a_band_is_that_band() {
+    for channel in ["R", "Y", "value"] {
+        let file = file();
+        write_parts(&file.path, &[("450nm", channel, 1.0), ("500nm", channel, 2.0), ("T.nothing", channel, 9.0)]);
+        let mut notes = vec![];
+        let image = read_spectral_exr(&file.path).unwrap().told_in(&mut notes).image;
+        assert_eq!(image.grid().centers_nm(), [450.0, 500.0]);
+        assert_eq!([0, 1].map(|band| image.planes()[band][(1, 1)]), [1.0, 2.0]);
+        assert!(matches!(&notes[..], [note] if note.contains("T.nothing")), "{notes:?}");
+    }
+    // A band that is stated is not renamed.
+    let file = file();
+    write_parts(&file.path, &[("450nm", "S0.460nm", 1.0), ("500nm", "Y", 2.0)]);
+    assert_eq!(read_spectral_exr(&file.path).unwrap().of_own_file().image.grid().centers_nm(), [460.0, 500.0]);
+}
+
+#[test]
+fn layers_of_bands_are_asked_for_by_name() {
+    let layers = vec![
+        ("a.S0.450nm", flat(1.0)),
+        ("a.S0.550nm", flat(1.0)),
+        ("b.S0.450nm", flat(2.0)),
+        ("b.S0.550nm", flat(2.0)),
+        ("b.Z", flat(3.0)),
+    ];
+    let file = file();
+    write_raw(&file.path, layers, &[]);
+    let read = |variable: Option<&str>| {
+        let reading = FileReading { variable: variable.map(str::to_owned), ..FileReading::default() };
+        read_scene(&file.path, &ReadOptions { reading, ..ReadOptions::default() })
+    };
+    let first = read(None).unwrap();
+    assert_eq!(first.radiance.planes()[0][(0, 0)], 1.0);
+    assert!(first.notes.iter().any(|note| note.contains("part 'b'")), "{:?}", first.notes);
+    let second = read(Some("b")).unwrap();
+    assert_eq!((second.radiance.planes()[1][(1, 1)], second.depth.unwrap().range_m()), (2.0, (3.0, 3.0)));
+    let message = read(Some("c")).unwrap_err().to_string();
+    assert!(message.contains("'a', 'b'") && message.contains("--variable") && !message.ends_with("but"), "{message}");
+}

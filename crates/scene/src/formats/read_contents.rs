@@ -161,7 +161,7 @@ fn of_npy(path: &Path, options: &ReadOptions) -> Result<Contents, SceneError> {
 fn of_exr(path: &Path, options: &ReadOptions) -> Result<Contents, SceneError> {
     let reading = &options.reading;
     let depth = reading.depth_variable.as_deref().filter(|_| reading.depth.is_none());
-    let asked = AskedChannels { depth, colors: reading.variable.as_deref(), texts: &[] };
+    let asked = AskedChannels { depth, layer: reading.variable.as_deref(), texts: &[] };
     let RawFile { image, depth, view, frame, panorama, light, hidden, mut notes } = read_raw_exr(path, asked)?;
     let choice = reading.no_data.unwrap_or_default();
     let view = view.map(|view| CameraData::of_view(path, view));
