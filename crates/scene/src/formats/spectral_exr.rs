@@ -93,9 +93,9 @@ pub fn read_spectral_exr(path: &Path) -> Result<Noted<SpectralFile>, SceneError>
     };
     image.check_samples().map_err(values)?;
     let hidden = match hidden {
-        Some((radiance, depth)) => {
-            radiance.check_samples().map_err(values)?;
-            Some(HiddenLayer { radiance, depth: DepthMap::new(depth.values).map_err(values)? })
+        Some(RawHidden { image, depth, .. }) => {
+            image.check_samples().map_err(values)?;
+            Some(HiddenLayer { radiance: image, depth: DepthMap::new(depth.values).map_err(values)? })
         }
         None => None,
     };
@@ -117,8 +117,8 @@ pub(super) struct RawFile {
     /// Whether it says that it is a picture of all directions.
     pub(super) panorama: Option<Panorama>,
     pub(super) light: Option<SceneLight>,
-    /// Radiance and depth of the layer behind.
-    pub(super) hidden: Option<(SpectralImage, RawDepth)>,
+    /// The layer behind.
+    pub(super) hidden: Option<RawHidden>,
     /// What of the file is not used.
     pub(super) notes: Vec<String>,
 }
@@ -133,6 +133,14 @@ pub(super) enum RawImage {
         /// The luminance of white, cd/m².
         white_cd_m2: Option<f64>,
     },
+}
+
+/// Light, or reflectances, and depth of the layer behind.
+pub(super) struct RawHidden {
+    pub(super) image: SpectralImage,
+    /// Whether its unit is stated, by itself or of the first layer.
+    pub(super) is_unit_stated: bool,
+    pub(super) depth: RawDepth,
 }
 
 /// What is asked for by name of an EXR file.
@@ -193,6 +201,7 @@ pub(super) fn read_raw_exr(path: &Path, asked: AskedChannels<'_>) -> Result<RawF
     } else {
         let is_unit_stated = !matches!(attributes.unit, Ok(None));
         let image = image_of(path, &attributes, bands)?;
+        notes.extend(attributes.note_of_unit(path).filter(|_| image.quantity() != Quantity::Reflectance));
         let image = match attributes.pitch_um {
             Some(pitch_um) => image.with_pitch_um(pitch_um),
             None => image,
@@ -207,7 +216,13 @@ pub(super) fn read_raw_exr(path: &Path, asked: AskedChannels<'_>) -> Result<RawF
     if channels.get(&opacity).is_some_and(|plane| plane.iter().all(|v| *v == 1.0)) {
         channels.take(&opacity);
     }
+    let is_behind =
+        channels.names().any(|name| name.strip_prefix(HIDDEN_LAYER).is_some_and(|rest| rest.starts_with('.')));
     notes.extend(channels.note(path, |_| false));
+    if is_behind && hidden.is_none() {
+        let expected = "a layer 'hidden' has bands (S0.… or T.…) and a channel Z to be what lies behind, or is a file of its own (--hidden)";
+        notes.push(format!("{}: {expected}", name_of(path)));
+    }
     let hidden = match hidden {
         Some(layer) if layer.position != position => {
             return Err(unreadable(
@@ -215,7 +230,10 @@ pub(super) fn read_raw_exr(path: &Path, asked: AskedChannels<'_>) -> Result<RawF
                 "its layer 'hidden' lies elsewhere in the picture than its first, expected it there",
             ));
         }
-        Some(layer) => {
+        Some(mut layer) => {
+            if layer.attributes.unit == Ok(None) {
+                layer.attributes.unit.clone_from(&attributes.unit);
+            }
             let kind = "attribute of the layer 'hidden'";
             notes.extend(note_of(path, kind, &attributes.other_of(&layer.attributes)));
             Some(hidden_of(path, layer, &mut notes)?)
@@ -312,15 +330,18 @@ fn depth_of(
 }
 
 /// Returns radiance and depth of the layer behind; what else it has is named.
-fn hidden_of(path: &Path, layer: RawLayer, notes: &mut Vec<String>) -> Result<(SpectralImage, RawDepth), SceneError> {
+fn hidden_of(path: &Path, layer: RawLayer, notes: &mut Vec<String>) -> Result<RawHidden, SceneError> {
     let mut channels = Stated::new("channel of the layer 'hidden'", layer.planes);
     let bands = channels.take_all(|name| band_name::parse(name).is_some());
     let image = image_of(path, &layer.attributes, bands)?;
+    let unit = layer.attributes.note_of_unit(path).filter(|_| image.quantity() != Quantity::Reflectance);
+    notes.extend(unit.filter(|note| !notes.contains(note)));
     let z_m = channels.take("Z").ok_or_else(|| unreadable(path, "the layer 'hidden' has no channel 'Z'"))?;
     notes.extend(channels.note(path, |name| ["R", "G", "B"].contains(&name)));
     let attributes = layer.attributes.others.note(path, is_harmless);
     notes.extend(attributes.map(|note| format!("{note} (of the layer 'hidden')")));
-    Ok((image, RawDepth::in_file(path, "channel 'Z' of the layer 'hidden'".to_owned(), z_m, DepthKind::Axial)))
+    let depth = RawDepth::in_file(path, "channel 'Z' of the layer 'hidden'".to_owned(), z_m, DepthKind::Axial);
+    Ok(RawHidden { image, is_unit_stated: layer.attributes.unit != Ok(None), depth })
 }
 
 /// Planes of samples, each with the name of its channel.
