@@ -138,7 +138,7 @@ impl Sum {
     /// Returns the sum of the exponents of a text; `None` of what is no product of units.
     fn of(text: &str) -> Option<Self> {
         let text = symbols(text);
-        let mut sum = Sum::default();
+        let mut sum = Self::default();
         let mut rest = text.trim();
         let mut below = Below::No;
         while let Some(first) = rest.chars().next() {
