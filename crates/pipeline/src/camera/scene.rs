@@ -204,6 +204,16 @@ impl SceneSpec {
         if self.white_level.is_some() && !matches!(self.source, SceneSource::File(_)) {
             checker.wrong("white_level", "what is said of a file", "a source that is a file")?;
         }
+        if self.fill_depth.is_some() && !matches!(self.source, SceneSource::File(_)) {
+            checker.wrong(
+                "fill_depth",
+                "what is said of a file",
+                "a source that is a file: others have all their depths",
+            )?;
+        }
+        if self.depth_m.is_some() && matches!(self.source, SceneSource::StillLife { .. }) {
+            checker.wrong("depth_m", "one depth", "none: the still life has depths of its own")?;
+        }
         if self.hidden.is_some() && !matches!(self.source, SceneSource::File(_)) {
             checker.wrong("hidden", "a file", "a source that is a file as well")?;
         }
@@ -519,6 +529,24 @@ mod tests {
         }
         let of_file = SceneSpec { flat: Some(flat), ..SceneSpec::of_file(PathBuf::from("wafer.exr")) };
         assert!(of_file.open(None).unwrap_err().to_string().contains("through a lens"));
+    }
+
+    #[test]
+    fn what_is_said_of_files_is_refused_of_others() {
+        let checker = Checker::of_settings("test");
+        let life = SceneSource::StillLife { columns: 48, rows: 32 };
+        let target = SceneSource::Target { pattern: Pattern::Uniform, columns: 32, rows: 32 };
+        let of = |source: &SceneSource| SceneSpec { source: source.clone(), ..SceneSpec::of_file(PathBuf::new()) };
+        assert!(of(&life).check(&checker).is_ok());
+        let refused = |spec: SceneSpec| spec.check(&checker).unwrap_err().to_string();
+        let message = refused(SceneSpec { depth_m: Some(5.0), ..of(&life) });
+        assert!(message.contains("depth_m") && message.contains("depths of its own"), "{message}");
+        let seen = SceneSpec { field_of_view_deg: Some(14.0), depth_m: Some(2.0), ..of(&target) };
+        assert!(seen.check(&checker).is_ok());
+        for spec in [of(&life), seen] {
+            let message = refused(SceneSpec { fill_depth: Some(FillDepth::Far), ..spec });
+            assert!(message.contains("fill_depth") && message.contains("a file"), "{message}");
+        }
     }
 
     #[test]

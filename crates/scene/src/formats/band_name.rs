@@ -3,6 +3,8 @@
 
 use dioptric_spectrum::Quantity;
 
+use super::wavelength_unit::PLAUSIBLE_NM;
+
 /// Metres a second.
 const SPEED_OF_LIGHT: f64 = 299_792_458.0;
 
@@ -45,6 +47,20 @@ pub(crate) fn parse(name: &str) -> Option<(BandKind, f64)> {
         return is_bin.then_some((BandKind::Emissive, 0.5 * (first_nm + last_nm)));
     }
     Some((BandKind::Emissive, wavelength_nm(name)?))
+}
+
+/// Returns the name of the layer that a band is in: `a` of `a.S0.550nm`; `None` of a band that is in none, of polarised and fluorescent channels, and of others.
+pub(super) fn layer_of(name: &str) -> Option<&str> {
+    let is_layer = |prefix: &str| {
+        let last = prefix.rsplit('.').next().unwrap_or_default();
+        !prefix.is_empty() && !["S0", "S1", "S2", "S3", "T"].contains(&last) && parse(prefix).is_none()
+    };
+    let is_band = |band: &str| parse(band).is_some_and(|(_, nm)| PLAUSIBLE_NM.contains(&nm));
+    if parse(name).is_some() {
+        return None;
+    }
+    let found = name.match_indices('.').find(|(at, _)| is_layer(&name[..*at]) && is_band(&name[at + 1..]));
+    found.map(|(at, _)| &name[..at])
 }
 
 /// Returns the wavelength (nm) of a number with a unit.
@@ -173,6 +189,23 @@ mod tests {
             "1e-7",
         ] {
             assert_eq!(parse(name), None, "{name}");
+        }
+    }
+
+    #[test]
+    fn bands_lie_in_layers() {
+        for (name, layer) in [
+            ("a.S0.450,5nm", Some("a")),
+            ("a.b.T.450nm", Some("a.b")),
+            ("a.450.5nm", Some("a")),
+            ("S0.450.5nm", None),
+            ("S1.450nm", None),
+            ("a.S1.450nm", None),
+            ("T.400nm.550nm", None),
+            ("depth.1m", None),
+            ("a.R", None),
+        ] {
+            assert_eq!(layer_of(name), layer, "{name}");
         }
     }
 

@@ -49,8 +49,6 @@ pub(super) struct Contents {
 pub(super) struct Hidden {
     pub(super) file: PathBuf,
     pub(super) contents: Contents,
-    /// Whether the file has nothing else.
-    pub(super) is_own_file: bool,
 }
 
 /// The samples of a file.
@@ -326,7 +324,9 @@ impl Cube {
                 _ => "W/m^2/sr/nm",
             };
             let own = self.unit.as_ref().map(|(_, words)| words.as_str());
-            return Ok((1.0, format!("radiance in {}", short(reading.unit.as_deref().or(own).unwrap_or(usual)))));
+            let words = reading.unit.as_deref().or(own).unwrap_or(usual);
+            let understood = if LightUnit::lacks_wavelength(words) { ", a nanometre understood" } else { "" };
+            return Ok((1.0, format!("radiance in {}{understood}", short(words))));
         }
         match (options.white_level, self.top) {
             (Some(level), _) => Ok((level, format!("reflectance, {level} being a perfect white"))),

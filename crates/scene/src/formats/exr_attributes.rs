@@ -10,7 +10,7 @@ use exr::{
 use super::{
     camera::SAME_FOCAL,
     light_unit::LightUnit,
-    stated::{Stated, name_of},
+    stated::{Stated, name_of, short},
 };
 use crate::{SceneError, SceneLight, View};
 
@@ -29,6 +29,8 @@ const LIGHT: &str = "sceneLight";
 pub(crate) struct Attributes {
     /// Of radiance or irradiance, `None` where nothing is said; or the text of a unit that is not known.
     pub(super) unit: Result<Option<LightUnit>, String>,
+    /// The words of that unit, where it names no length of wavelength outside the layout that understands a nanometre.
+    open_unit: Option<String>,
     pub(crate) pitch_um: Option<f64>,
     focal_px: Option<f64>,
     center_x_px: Option<f64>,
@@ -109,6 +111,21 @@ pub(super) fn words_of(text: &Text) -> String {
 }
 
 impl Attributes {
+    /// Returns what is known of them, without what else there is.
+    pub(super) fn known(&self) -> Self {
+        Self { others: Stated::new("attribute", vec![]), ..self.clone() }
+    }
+
+    /// Returns what is understood of a unit that does not state it.
+    pub(super) fn note_of_unit(&self, path: &Path) -> Option<String> {
+        let words = self.open_unit.as_ref()?;
+        Some(format!(
+            "{}: its {UNITS} '{}' names no length of wavelength: a nanometre is understood",
+            name_of(path),
+            short(words)
+        ))
+    }
+
     /// Returns what is taken in place of camera data that the header should state beside its focal length.
     pub(super) fn note_of_center(&self, path: &Path) -> Option<String> {
         let is_whole = self.center_x_px.is_some() && self.center_y_px.is_some();
@@ -210,8 +227,13 @@ pub(crate) fn from_layer(layer: &LayerAttributes) -> Attributes {
         }
         _ => Ok(None),
     };
+    let open_unit = match get(UNITS).filter(|_| get(LAYOUT_VERSION).is_none()) {
+        Some(AttributeValue::Text(text)) => Some(words_of(text)).filter(|text| LightUnit::lacks_wavelength(text)),
+        _ => None,
+    };
     Attributes {
         light,
+        open_unit,
         white_cd_m2: layer.white_luminance.map(f64::from),
         environment: layer.environment_map,
         others: Stated::new("attribute", others.into_iter().map(|name| (name, ())).collect()),

@@ -50,6 +50,19 @@ pub(super) fn colors_of(
         })
         .filter(|prefix| ["G", "B"].iter().all(|letter| names.contains(&full(prefix, letter))))
         .collect();
+    // Gray layers, where none has colors or one is asked for by name; neither X, Y and Z nor a depth.
+    let is_gray = |prefix: &&str| {
+        let has = |letter: &str| names.contains(&full(prefix, letter));
+        let last = prefix.rsplit('.').next().unwrap_or_default();
+        !(has("RY") || has("BY") || has("X") && has("Z") || last.eq_ignore_ascii_case("depth"))
+    };
+    let grays = names.iter().filter_map(|name| if name == "Y" { Some("") } else { name.strip_suffix(".Y") });
+    let grays: Vec<&str> = grays.filter(is_gray).filter(|gray| !prefixes.contains(gray)).collect();
+    let is_xyz = ["X", "Y", "Z"].iter().all(|letter| channels.get(letter).is_some());
+    let prefixes = match told {
+        None if is_xyz || !prefixes.is_empty() => prefixes,
+        _ => [prefixes, grays].concat(),
+    };
     let shown = |prefix: &&str| if prefix.is_empty() { "one without a name".to_owned() } else { format!("'{prefix}'") };
     let listed = || prefixes.iter().map(shown).collect::<Vec<_>>().join(", ");
     let is_called = |prefix: &&&str| is_called_picture(prefix);
@@ -57,7 +70,8 @@ pub(super) fn colors_of(
     let prefix = match told {
         Some(told) => {
             let found = prefixes.iter().find(|prefix| **prefix == told);
-            let reason = || format!("it has no layer '{told}' of red, green and blue (--variable), but {}", listed());
+            let has = if prefixes.is_empty() { "expected it without".to_owned() } else { format!("but {}", listed()) };
+            let reason = || format!("it has no layer '{told}' of red, green and blue, or gray (--variable), {has}");
             Some(found.ok_or_else(|| unreadable(path, reason()))?)
         }
         None => of_picture().or_else(|| prefixes.first().filter(|_| prefixes.len() == 1)),
@@ -65,21 +79,24 @@ pub(super) fn colors_of(
     let no_bands = || SceneError::NoBands { file: path.to_owned(), expected: EXPECTED };
     if let Some(prefix) = prefix.map(|prefix| (*prefix).to_owned()) {
         let mut take = |letter| channels.take(&full(&prefix, letter)).ok_or_else(no_bands);
-        let planes = [take("R")?, take("G")?, take("B")?];
+        let planes = if ["R", "G", "B"].iter().all(|letter| names.contains(&full(&prefix, letter))) {
+            [take("R")?, take("G")?, take("B")?]
+        } else {
+            let gray = take("Y")?;
+            [gray.clone(), gray.clone(), gray]
+        };
         return Ok((prefix, ColorsOf::Primaries, planes));
     }
     if prefixes.len() > 1 {
         let reason = format!("it has several layers of colors, {}: expected --variable with the name of one", listed());
         return Err(unreadable(path, reason));
     }
-    if ["X", "Y", "Z"].iter().all(|letter| channels.get(letter).is_some()) {
+    if is_xyz {
         let mut take = |letter| channels.take(letter).ok_or_else(no_bands);
         let planes = [take("X")?, take("Y")?, take("Z")?];
         return Ok((String::new(), ColorsOf::Xyz, planes));
     }
-    let has_chroma = ["RY", "BY"].iter().any(|name| channels.get(name).is_some());
-    let gray = if has_chroma { None } else { channels.take("Y") }.ok_or_else(no_bands)?;
-    Ok((String::new(), ColorsOf::Primaries, [gray.clone(), gray.clone(), gray]))
+    Err(no_bands())
 }
 
 /// Returns the matrix from CIE XYZ, of which the white of D65 has a Y of 1, to linear sRGB.
@@ -159,6 +176,7 @@ mod tests {
                 .map(|(prefix, ..)| (prefix, channels.names().map(str::to_owned).collect::<Vec<_>>()))
         };
         let take = |names: &[&str]| take_of(names, None);
+        let pair = |a: &str, b: &str| vec![a.to_owned(), b.to_owned()];
         let pass = |pass: &str| ["R", "G", "B"].map(|letter| format!("{pass}.{letter}"));
         let both = [pass("V.Noisy Image"), pass("V.Combined")].concat();
         let names: Vec<&str> = both.iter().map(String::as_str).collect();
@@ -167,6 +185,13 @@ mod tests {
         assert_eq!(take(&["Y"]).unwrap().0, "");
         assert_eq!(take(&["A", "X", "Y", "Z"]).unwrap().1, ["A"]);
         assert!(take(&["Y", "RY", "BY"]).is_err() && take(&["R", "G"]).is_err());
+        // Gray layers, where there are no others.
+        assert_eq!(take(&["gray.Y", "gray.Z", "Depth.Y"]).unwrap(), ("gray".to_owned(), pair("gray.Z", "Depth.Y")));
+        assert_eq!(take(&["mask.Y", "Y"]).unwrap().0, "");
+        assert_eq!(take(&["mask.Y", "X", "Y", "Z"]).unwrap().1, ["mask.Y"]);
+        assert_eq!(take_of(&["gray.Y", "mask.Y"], Some("mask")).unwrap().0, "mask");
+        let message = take(&["gray.Y", "mask.Y"]).unwrap_err().to_string();
+        assert!(message.contains("'gray', 'mask'") && message.contains("--variable"), "{message}");
         // Of two passes neither of which is called a picture none is chosen.
         let two = [pass("x"), pass("y")].concat();
         let two: Vec<&str> = two.iter().map(String::as_str).collect();

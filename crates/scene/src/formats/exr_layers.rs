@@ -52,12 +52,21 @@ pub(super) struct RawLayer {
 }
 
 impl RawLayer {
-    /// Puts the name of the layer before those of its channels that have none; a layer that is called like a band is that band.
-    pub(super) fn name_channels(&mut self) {
-        if band_name::parse(&self.name).is_some() && self.planes.len() == 1 {
-            self.planes[0].0.clone_from(&self.name);
+    /// Gives the one channel beside opacity and depth of a layer that is called like a band the name of that band, where it has none of its own.
+    fn name_band(&mut self) {
+        if band_name::parse(&self.name).is_none() {
             return;
         }
+        let mut own = self.planes.iter_mut().filter(|(name, _)| !["A", "Z"].contains(&name.as_str()));
+        if let (Some((name, _)), None) = (own.next(), own.next())
+            && band_name::parse(name).is_none()
+        {
+            name.clone_from(&self.name);
+        }
+    }
+
+    /// Puts the name of the layer before those of its channels that have none.
+    pub(super) fn name_channels(&mut self) {
         // A part that is called as its channel is.
         if let [(name, _)] = &self.planes[..]
             && name.eq_ignore_ascii_case(&self.name)
@@ -78,9 +87,42 @@ impl RawLayer {
     }
 
     pub(super) fn has_bands(&self) -> bool {
-        let is_band = band_name::parse(&self.name).is_some() && self.planes.len() == 1;
-        is_band || self.planes.iter().any(|(name, _)| band_name::parse(name).is_some())
+        self.planes.iter().any(|(name, _)| band_name::parse(name).is_some())
     }
+
+    /// Splits off what stands behind the name of a layer of bands and a point, as `a.S0.550nm` and `a.Z` of `a`.
+    fn split(mut self) -> Vec<Self> {
+        let mut names: Vec<String> = vec![];
+        for prefix in self.planes.iter().filter_map(|(name, _)| band_name::layer_of(name)) {
+            if names.iter().all(|own| own != prefix) {
+                names.push(prefix.to_owned());
+            }
+        }
+        let mut parts = vec![];
+        for layer in names {
+            let rest = |name: &str| name.strip_prefix(&layer)?.strip_prefix('.').map(str::to_owned);
+            let (inner, outer): (Vec<_>, Vec<_>) =
+                std::mem::take(&mut self.planes).into_iter().partition(|(name, _)| rest(name).is_some());
+            self.planes = outer;
+            let planes = inner.into_iter().map(|(name, plane)| (rest(&name).unwrap_or(name), plane)).collect();
+            // What is stated beside is named once, of the part.
+            let attributes = self.attributes.known();
+            let (view, size, position) = (self.view.clone(), self.size, self.position);
+            parts.push(Self { name: layer, view, attributes, planes, size, position });
+        }
+        if self.planes.is_empty()
+            && let Some(first) = parts.first_mut()
+        {
+            first.attributes = self.attributes;
+            return parts;
+        }
+        std::iter::once(self).chain(parts).collect()
+    }
+}
+
+/// Splits parts that have layers of bands into these.
+pub(super) fn split_layers(layers: Vec<RawLayer>) -> Vec<RawLayer> {
+    layers.into_iter().flat_map(RawLayer::split).collect()
 }
 
 /// Leaves the layers of the first view, and those of none, and returns the names of the other views.
@@ -142,14 +184,16 @@ fn raw_layer(path: &Path, layer: Layer<AnyChannels<FlatSamples>>) -> Result<RawL
     let planes: Result<Vec<_>, _> =
         layer.channel_data.list.into_iter().map(|channel| plane_of(path, channel, rows, columns)).collect();
     let position = layer.attributes.layer_position;
-    Ok(RawLayer {
+    let mut layer = RawLayer {
         size: (rows, columns),
         position: (position.0.into(), position.1.into()),
         name: layer.attributes.layer_name.as_ref().map(words_of).unwrap_or_default(),
         view: layer.attributes.view_name.as_ref().map(words_of),
         attributes: exr_attributes::from_layer(&layer.attributes),
         planes: planes?,
-    })
+    };
+    layer.name_band();
+    Ok(layer)
 }
 
 fn plane_of(

@@ -489,3 +489,152 @@ fn the_real_files_are_read() {
         assert_eq!(back.depth.is_some(), has_depth, "{name}");
     }
 }
+
+/// Parts of one channel each, of this name and value.
+fn write_parts(path: &PathBuf, parts: &[(&str, &str, f32)]) {
+    let layers: exr::image::Layers<_> = parts
+        .iter()
+        .map(|(part, channel, value)| {
+            let list: SmallVec<[_; 4]> = SmallVec::from_iter([AnyChannel::new(*channel, flat(*value))]);
+            Layer::new((2, 2), LayerAttributes::named(*part), Encoding::FAST_LOSSLESS, AnyChannels::sort(list))
+        })
+        .collect();
+    let window = exr::meta::attribute::IntegerBounds::from_dimensions((2, 2));
+    Image::from_layers(exr::meta::header::ImageAttributes::new(window), layers).write().to_file(path).unwrap();
+}
+
+#[test]
+fn a_part_that_is_called_like_a_band_is_that_band() {
+    for channel in ["R", "Y", "value"] {
+        let file = file();
+        write_parts(&file.path, &[("450nm", channel, 1.0), ("500nm", channel, 2.0), ("T.nothing", channel, 9.0)]);
+        let mut notes = vec![];
+        let image = read_spectral_exr(&file.path).unwrap().told_in(&mut notes).image;
+        assert_eq!(image.grid().centers_nm(), [450.0, 500.0]);
+        assert_eq!([0, 1].map(|band| image.planes()[band][(1, 1)]), [1.0, 2.0]);
+        assert!(matches!(&notes[..], [note] if note.contains("T.nothing")), "{notes:?}");
+    }
+    // A band that is stated is not renamed.
+    let file = file();
+    write_parts(&file.path, &[("450nm", "S0.460nm", 1.0), ("500nm", "Y", 2.0)]);
+    assert_eq!(read_spectral_exr(&file.path).unwrap().of_own_file().image.grid().centers_nm(), [460.0, 500.0]);
+}
+
+#[test]
+fn layers_of_bands_are_asked_for_by_name() {
+    let layers = vec![
+        ("a.S0.450nm", flat(1.0)),
+        ("a.S0.550nm", flat(1.0)),
+        ("b.S0.450nm", flat(2.0)),
+        ("b.S0.550nm", flat(2.0)),
+        ("b.Z", flat(3.0)),
+    ];
+    let file = file();
+    write_raw(&file.path, layers, &[]);
+    let read = |variable: Option<&str>| {
+        let reading = FileReading { variable: variable.map(str::to_owned), ..FileReading::default() };
+        read_scene(&file.path, &ReadOptions { reading, ..ReadOptions::default() })
+    };
+    let first = read(None).unwrap();
+    assert_eq!(first.radiance.planes()[0][(0, 0)], 1.0);
+    assert!(first.notes.iter().any(|note| note.contains("part 'b'")), "{:?}", first.notes);
+    let second = read(Some("b")).unwrap();
+    assert_eq!((second.radiance.planes()[1][(1, 1)], second.depth.unwrap().range_m()), (2.0, (3.0, 3.0)));
+    let message = read(Some("c")).unwrap_err().to_string();
+    assert!(message.contains("'a', 'b'") && message.contains("--variable") && !message.ends_with("but"), "{message}");
+}
+
+/// Bands of light or of reflectances and a depth.
+type Bands<'a> = (&'a str, &'a [(&'a str, &'a str)], f32, f32);
+
+/// Reads a file of two parts, each of bands of this kind (`S0`, `T`) with attributes, samples and a depth.
+fn read_with_hidden(front: Bands<'_>, behind: Bands<'_>, reading: FileReading) -> Scene {
+    let part = |name: &str, (kind, attributes, value, z_m): Bands<'_>| {
+        let mut list: SmallVec<[_; 4]> = SmallVec::new();
+        for nm in [450, 550, 650] {
+            list.push(AnyChannel::new(format!("{kind}.{nm}nm").as_str(), flat(value)));
+        }
+        list.push(AnyChannel::new("Z", flat(z_m)));
+        let mut layer = LayerAttributes::named(name);
+        for (name, value) in attributes {
+            layer.other.insert(Text::from(*name), AttributeValue::Text(Text::from(*value)));
+        }
+        Layer::new((2, 2), layer, Encoding::FAST_LOSSLESS, AnyChannels::sort(list))
+    };
+    let file = file();
+    let layers: exr::image::Layers<_> = [part("visible", front), part("hidden", behind)].into_iter().collect();
+    let window = exr::meta::attribute::IntegerBounds::from_dimensions((2, 2));
+    Image::from_layers(exr::meta::header::ImageAttributes::new(window), layers).write().to_file(&file.path).unwrap();
+    let options = ReadOptions { horizontal_fov_deg: Some(20.0), reading, ..ReadOptions::default() };
+    read_scene(&file.path, &options).unwrap()
+}
+
+#[track_caller]
+fn check_layers(scene: &Scene, expected: [f32; 4], words: &[&str]) {
+    let hidden = scene.hidden.as_ref().unwrap();
+    let depths = [scene.depth.as_ref().unwrap(), &hidden.depth].map(|depth| depth.range_m().0 as f32);
+    let found = [scene.radiance.planes()[1][(1, 1)], hidden.radiance.planes()[1][(1, 1)], depths[0], depths[1]];
+    assert_eq!(found, expected);
+    for word in words {
+        assert_eq!(scene.notes.iter().filter(|note| note.contains(word)).count(), 1, "{word}: {:?}", scene.notes);
+    }
+}
+
+#[test]
+fn what_is_said_of_a_file_is_said_of_its_hidden_part() {
+    let per_nm = [("emissiveUnits", "W.m^-2.sr^-1.nm^-1")];
+    let per_um = [("emissiveUnits", "W.m^-2.sr^-1.um^-1")];
+    let plain = FileReading::default;
+    let told = "behind the first surface";
+    let both = FileReading { scale: Some(2.0), depth_unit: Some("mm".to_owned()), ..plain() };
+    let scene = read_with_hidden(("S0", &per_nm, 1.0, 1000.0), ("S0", &per_nm, 4.0, 5000.0), both);
+    check_layers(&scene, [2.0, 8.0, 1.0, 5.0], &["(--scale) counts for it too", told]);
+    // A part that states no unit has that of the first, and one that does its own.
+    let scene = read_with_hidden(("S0", &per_um, 1000.0, 1.0), ("S0", &[], 4000.0, 5.0), plain());
+    check_layers(&scene, [1.0, 4.0, 1.0, 5.0], &["behind the first surface, radiance"]);
+    let scene = read_with_hidden(("S0", &per_um, 1000.0, 1.0), ("S0", &per_nm, 4.0, 5.0), plain());
+    check_layers(&scene, [1.0, 4.0, 1.0, 5.0], &[told]);
+    // What is told of a first surface without a unit does not count for what states its own.
+    let unit = FileReading { unit: Some("W/m^2/sr/um".to_owned()), ..plain() };
+    let scene = read_with_hidden(("S0", &[], 1000.0, 1.0), ("S0", &per_nm, 4.0, 5.0), unit.clone());
+    check_layers(&scene, [1.0, 4.0, 1.0, 5.0], &["(--unit) does not count for it"]);
+    let scene = read_with_hidden(("S0", &[], 1000.0, 1.0), ("S0", &[], 4000.0, 5.0), unit);
+    check_layers(&scene, [1.0, 4.0, 1.0, 5.0], &["(--unit) counts for it too"]);
+    // Reflectances behind light are under a light that is named.
+    let scene = read_with_hidden(("S0", &per_nm, 1.0, 1.0), ("T", &[], 0.5, 5.0), plain());
+    let words = "behind the first surface, reflectance, under a light of x, y 0.313, 0.329 and 1000 lx";
+    assert_eq!(scene.notes.iter().filter(|note| note.contains(words)).count(), 1, "{:?}", scene.notes);
+}
+
+#[test]
+fn channels_of_a_layer_hidden_are_what_lies_behind() {
+    let bands = [("S0.450nm", flat(1.0)), ("S0.550nm", flat(1.0)), ("Z", flat(1.0))];
+    let behind = [("hidden.S0.450nm", flat(4.0)), ("hidden.S0.550nm", flat(4.0)), ("hidden.Z", flat(5.0))];
+    let read = |channels: Vec<(&str, FlatSamples)>| {
+        let file = file();
+        write_raw(&file.path, channels, &[("emissiveUnits", "W.m^-2.sr^-1.nm^-1")]);
+        read_scene(&file.path, &ReadOptions { horizontal_fov_deg: Some(20.0), ..ReadOptions::default() }).unwrap()
+    };
+    let scene = read(bands.iter().chain(&behind).cloned().collect());
+    check_layers(&scene, [1.0, 4.0, 1.0, 5.0], &["behind the first surface"]);
+    let colors = [("hidden.R", flat(1.0)), ("hidden.Z", flat(5.0))];
+    let scene = read(bands.iter().chain(&colors).cloned().collect());
+    assert!(scene.hidden.is_none() && scene.notes.iter().any(|note| note.contains("--hidden")), "{:?}", scene.notes);
+}
+
+#[test]
+fn a_unit_without_a_wavelength_is_named() {
+    let notes = |attributes: &[(&str, &str)]| {
+        let file = file();
+        write_raw(&file.path, vec![("S0.450nm", flat(1.0)), ("S0.550nm", flat(1.0))], attributes);
+        let mut notes = vec![];
+        let _ = read_spectral_exr(&file.path).unwrap().told_in(&mut notes);
+        notes
+    };
+    let bare = ("emissiveUnits", "W.m^-2.sr^-1");
+    assert!(matches!(&notes(&[bare])[..], [note] if note.contains("'W.m^-2.sr^-1'") && note.contains("nanometre")));
+    // The layout understands a nanometre.
+    assert!(notes(&[bare, ("spectralLayoutVersion", "1.0")]).is_empty());
+    assert!(notes(&[("emissiveUnits", "W.m^-2.sr^-1.nm^-1")]).is_empty());
+    assert!(notes(&[("emissiveUnits", "W.m^-3.sr^-1")]).is_empty());
+}

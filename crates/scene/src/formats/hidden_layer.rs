@@ -55,7 +55,7 @@ pub(super) fn read_hidden(
             format!("{}: its {} is not used, but that of {}", name_of(file), unused.join(", "), name_of(first))
         }),
     );
-    Ok(Hidden { file: file.to_owned(), contents, is_own_file: true })
+    Ok(Hidden { file: file.to_owned(), contents })
 }
 
 /// Reads a file under what is said of the numbers of the first surface, where it says not itself what its own are.
@@ -107,7 +107,7 @@ pub(super) fn hidden_layer(
     options: &ReadOptions,
     notes: &mut Vec<String>,
 ) -> Result<HiddenLayer, SceneError> {
-    let Hidden { file, mut contents, is_own_file } = hidden;
+    let Hidden { file, mut contents } = hidden;
     let (rows, columns) = contents.size();
     let lacks = || unreadable(&file, "a hidden layer needs a depth, expected a channel 'Z' or a NAME.depth.png");
     let depth = contents.depth.take().ok_or_else(lacks)?.resized(rows, columns)?;
@@ -134,18 +134,16 @@ pub(super) fn hidden_layer(
         what += &under(&light);
     }
     let layer = HiddenLayer { radiance, depth: behind(&file, z_m, front.depth)? };
-    if is_own_file {
-        let grid = own.unwrap_or_else(|| layer.radiance.grid().clone());
-        notes.push(format!(
-            "{}: behind the first surface, {what}, {}{}; depth {} {}, known of {n_known} of {} samples",
-            name_of(&file),
-            bands(&grid),
-            brightness(&layer.radiance),
-            range(&layer.depth),
-            depth.describe(),
-            rows * columns
-        ));
-    }
+    let grid = own.unwrap_or_else(|| layer.radiance.grid().clone());
+    notes.push(format!(
+        "{}: behind the first surface, {what}, {}{}; depth {} {}, known of {n_known} of {} samples",
+        name_of(&file),
+        bands(&grid),
+        brightness(&layer.radiance),
+        range(&layer.depth),
+        depth.describe(),
+        rows * columns
+    ));
     Ok(layer)
 }
 

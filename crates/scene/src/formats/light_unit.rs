@@ -21,28 +21,12 @@ impl LightUnit {
     /// Returns the unit of a text, or `None` where it is no unit of spectral light. A nanometre is understood where no length
     /// of wavelength is stated.
     pub(super) fn parse(text: &str) -> Option<Self> {
-        let text = symbols(text);
-        let mut sum = Sum::default();
-        let mut rest = text.trim();
-        let mut below = Below::No;
-        while let Some(first) = rest.chars().next() {
-            match first {
-                '/' => (below, rest) = (Below::Next, &rest[1..]),
-                '(' if below == Below::Next => (below, rest) = (Below::Group, &rest[1..]),
-                ')' if below == Below::Group => (below, rest) = (Below::No, &rest[1..]),
-                _ if first.is_whitespace() || matches!(first, '.' | '*' | '·') => rest = &rest[first.len_utf8()..],
-                _ => {
-                    let (name, exponent, after) = power(rest)?;
-                    let sign = if below == Below::No { 1 } else { -1 };
-                    sum.add(name, sign * exponent)?;
-                    if below == Below::Next {
-                        below = Below::No;
-                    }
-                    rest = after;
-                }
-            }
-        }
-        if below == Below::No { sum.unit() } else { None }
+        Sum::of(text)?.unit()
+    }
+
+    /// Whether a unit of spectral light states no length of wavelength, so that a nanometre is understood.
+    pub(super) fn lacks_wavelength(text: &str) -> bool {
+        Sum::of(text).is_some_and(|sum| sum.wavelengths == 0 && sum.metres != -3)
     }
 
     /// Whether it counts photons, and not their energy.
@@ -151,6 +135,32 @@ struct Sum {
 }
 
 impl Sum {
+    /// Returns the sum of the exponents of a text; `None` of what is no product of units.
+    fn of(text: &str) -> Option<Self> {
+        let text = symbols(text);
+        let mut sum = Self::default();
+        let mut rest = text.trim();
+        let mut below = Below::No;
+        while let Some(first) = rest.chars().next() {
+            match first {
+                '/' => (below, rest) = (Below::Next, &rest[1..]),
+                '(' if below == Below::Next => (below, rest) = (Below::Group, &rest[1..]),
+                ')' if below == Below::Group => (below, rest) = (Below::No, &rest[1..]),
+                _ if first.is_whitespace() || matches!(first, '.' | '*' | '·') => rest = &rest[first.len_utf8()..],
+                _ => {
+                    let (name, exponent, after) = power(rest)?;
+                    let sign = if below == Below::No { 1 } else { -1 };
+                    sum.add(name, sign * exponent)?;
+                    if below == Below::Next {
+                        below = Below::No;
+                    }
+                    rest = after;
+                }
+            }
+        }
+        (below == Below::No).then_some(sum)
+    }
+
     fn add(&mut self, name: &str, exponent: i32) -> Option<()> {
         let (what, log10) = match name {
             "W" | "watt" | "watts" => (&mut self.watts, 0),

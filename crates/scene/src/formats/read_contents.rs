@@ -12,6 +12,7 @@ use super::{
     contents::{Contents, Cube, Heeds, Hidden, Image, MATLAB_OR_HDF5, is_of},
     cube_folder::CubeFolder,
     envi::{contents_of_envi, header_of},
+    light_unit::LightUnit,
     mat::{MatScene, read_mat},
     no_data::mend,
     npy::read_npy,
@@ -21,11 +22,11 @@ use super::{
     picture_parts::notes_on_parts,
     primaries::into_srgb,
     radiance_header::RadianceHeader,
-    raw_depth::RawDepth,
+    raw_depth::{DepthWords, RawDepth},
     read_options::ReadOptions,
-    reading::{DepthKind, FileQuantity, light_unit},
+    reading::{DepthKind, FileQuantity, FileReading, light_unit},
     reduced::reduced_size,
-    spectral_exr::{AskedChannels, RawFile, RawImage, read_raw_exr},
+    spectral_exr::{AskedChannels, RawFile, RawHidden, RawImage, read_raw_exr},
     stated::{name_of, note_of},
     tiff_file::{RAW, TiffAs, TiffFile, TiffStack, is_tiff, read_tiff},
     unusable::{starts_with, unreadable},
@@ -161,70 +162,120 @@ fn of_npy(path: &Path, options: &ReadOptions) -> Result<Contents, SceneError> {
 fn of_exr(path: &Path, options: &ReadOptions) -> Result<Contents, SceneError> {
     let reading = &options.reading;
     let depth = reading.depth_variable.as_deref().filter(|_| reading.depth.is_none());
-    let asked = AskedChannels { depth, colors: reading.variable.as_deref(), texts: &[] };
+    let asked = AskedChannels { depth, layer: reading.variable.as_deref(), texts: &[] };
     let RawFile { image, depth, view, frame, panorama, light, hidden, mut notes } = read_raw_exr(path, asked)?;
-    let choice = reading.no_data.unwrap_or_default();
     let view = view.map(|view| CameraData::of_view(path, view));
     let (image, what, heeds) = match image {
         RawImage::Spectral { image, is_unit_stated } => {
-            if image.quantity() == Quantity::Irradiance {
-                let reason =
-                    "it holds the irradiance on a film, which is no scene: `dioptric sense` exposes a sensor to it";
-                return Err(SceneError::Units { file: path.to_owned(), reason: reason.to_owned() });
-            }
-            let is_light = image.quantity() != Quantity::Reflectance;
-            let says_other = match reading.quantity {
-                Some(FileQuantity::Reflectance) => is_light,
-                Some(_) => !is_light,
-                None => false,
-            };
-            let is_unit_open = is_light && !is_unit_stated;
-            if says_other || (reading.unit.is_some() && !is_unit_open) {
-                let what = if is_light { "light, whose unit it states" } else { "reflectances" };
-                let reason = format!("it holds {what}, and --quantity or --unit says something else");
-                return Err(SceneError::Units { file: path.to_owned(), reason });
-            }
-            let told = reading.unit.as_deref().map(light_unit).transpose()?;
-            if let Some(told) = told {
-                reading.check_quantity(path, told)?;
-            }
-            let unit = told.or_else(|| reading.quantity.and_then(FileQuantity::light_unit)).filter(|_| is_unit_open);
-            let scale = reading.scale.unwrap_or(1.0);
             // Of a film, which a scene is none.
             let pitch = image.pitch_um().map(|_| "samplePitchUm".to_owned());
             notes.extend(note_of(path, "attribute", pitch.as_slice()));
-            let (quantity, grid) = (image.quantity(), image.grid().clone());
-            let mut planes = image.into_planes();
-            for (plane, &nm) in planes.iter_mut().zip(grid.centers_nm()) {
-                let factor = scale * unit.map_or(1.0, |unit| unit.factor_at(nm));
-                if factor != 1.0 {
-                    plane.mapv_inplace(|v| (f64::from(v) * factor) as f32);
-                }
-            }
-            notes.extend(mend(path, &grid, &mut planes, choice)?.note(path, choice));
-            let values = |reason: SpectrumError| SceneError::Values { file: path.to_owned(), reason };
-            let image = SpectralImage::new(quantity, grid, planes).map_err(values)?;
-            let what = match (is_light, is_unit_stated) {
-                (false, _) => "reflectance".to_owned(),
-                (true, true) => "radiance".to_owned(),
-                (true, false) => {
-                    format!("radiance, taken for {}", reading.unit.as_deref().unwrap_or("W/m^2/sr/nm"))
-                }
-            };
-            (Image::Spectral(image), what, if is_unit_open { Heeds::Unit } else { Heeds::Scale })
+            let unit = told_unit(path, &image, is_unit_stated, reading)?;
+            let contents = of_bands(path, image, is_unit_stated, (unit, reading))?;
+            notes.extend(contents.notes);
+            (contents.image, contents.what, contents.heeds)
         }
         RawImage::Rgb { planes, white_cd_m2 } => {
             let what = "linear colors as a display shows them".to_owned();
             (Image::Linear { planes, white_cd_m2 }, what, Heeds::Scale)
         }
     };
-    let hidden = hidden.map(|(image, depth)| {
-        image.check_samples().map_err(|reason| SceneError::Values { file: path.to_owned(), reason })?;
-        let contents = Contents { depth: Some(depth), ..Contents::of(Image::Spectral(image), "radiance") };
-        Ok::<_, SceneError>(Box::new(Hidden { file: path.to_owned(), contents, is_own_file: false }))
-    });
+    let hidden = hidden.map(|hidden| layer_behind(path, hidden, options).map(Box::new));
     let hidden = hidden.transpose()?;
     Ok(Contents { depth, view, frame: Some(frame), panorama, light, hidden, notes, heeds, ..Contents::of(image, what) })
+}
+
+/// Returns the unit that is told of bands of which none is stated.
+fn told_unit(
+    path: &Path,
+    image: &SpectralImage,
+    is_unit_stated: bool,
+    reading: &FileReading,
+) -> Result<Option<LightUnit>, SceneError> {
+    if image.quantity() == Quantity::Irradiance {
+        let reason = "it holds the irradiance on a film, which is no scene: `dioptric sense` exposes a sensor to it";
+        return Err(SceneError::Units { file: path.to_owned(), reason: reason.to_owned() });
+    }
+    let is_light = image.quantity() != Quantity::Reflectance;
+    let says_other = match reading.quantity {
+        Some(FileQuantity::Reflectance) => is_light,
+        Some(_) => !is_light,
+        None => false,
+    };
+    let is_unit_open = is_light && !is_unit_stated;
+    if says_other || (reading.unit.is_some() && !is_unit_open) {
+        let what = if is_light { "light, whose unit it states" } else { "reflectances" };
+        let reason = format!("it holds {what}, and --quantity or --unit says something else");
+        return Err(SceneError::Units { file: path.to_owned(), reason });
+    }
+    let told = reading.unit.as_deref().map(light_unit).transpose()?;
+    if let Some(told) = told {
+        reading.check_quantity(path, told)?;
+    }
+    Ok(told.or_else(|| reading.quantity.and_then(FileQuantity::light_unit)).filter(|_| is_unit_open))
+}
+
+/// Returns bands of an EXR file in the unit and by the factor that are told.
+fn of_bands(
+    path: &Path,
+    image: SpectralImage,
+    is_unit_stated: bool,
+    (unit, reading): (Option<LightUnit>, &FileReading),
+) -> Result<Contents, SceneError> {
+    let (quantity, grid) = (image.quantity(), image.grid().clone());
+    let is_light = quantity != Quantity::Reflectance;
+    let (scale, choice) = (reading.scale.unwrap_or(1.0), reading.no_data.unwrap_or_default());
+    let mut planes = image.into_planes();
+    for (plane, &nm) in planes.iter_mut().zip(grid.centers_nm()) {
+        let factor = scale * unit.map_or(1.0, |unit| unit.factor_at(nm));
+        if factor != 1.0 {
+            plane.mapv_inplace(|v| (f64::from(v) * factor) as f32);
+        }
+    }
+    let notes: Vec<String> = mend(path, &grid, &mut planes, choice)?.note(path, choice).into_iter().collect();
+    let values = |reason: SpectrumError| SceneError::Values { file: path.to_owned(), reason };
+    let image = SpectralImage::new(quantity, grid, planes).map_err(values)?;
+    let what = match (is_light, is_unit_stated) {
+        (false, _) => "reflectance".to_owned(),
+        (true, true) => "radiance".to_owned(),
+        (true, false) => format!("radiance, taken for {}", reading.unit.as_deref().unwrap_or("W/m^2/sr/nm")),
+    };
+    let heeds = if is_light && !is_unit_stated { Heeds::Unit } else { Heeds::Scale };
+    Ok(Contents { notes, heeds, ..Contents::of(Image::Spectral(image), what) })
+}
+
+/// Returns what lies behind the first surface in a layer of its file, under what is said of that where the layer does not say itself what it is.
+fn layer_behind(path: &Path, hidden: RawHidden, options: &ReadOptions) -> Result<Hidden, SceneError> {
+    let RawHidden { image, is_unit_stated, depth } = hidden;
+    let told = &options.reading;
+    let (unit, reading, words) = match told_unit(path, &image, is_unit_stated, told) {
+        Ok(unit) => (unit, told.clone(), "counts for it too"),
+        Err(error @ SceneError::Units { .. }) => {
+            let reading = FileReading { quantity: None, unit: None, scale: None, ..told.clone() };
+            let unit = told_unit(path, &image, is_unit_stated, &reading).map_err(|_| error)?;
+            (unit, reading, "does not count for it, which says itself what it is")
+        }
+        Err(error) => return Err(error),
+    };
+    let mut contents = of_bands(path, image, is_unit_stated, (unit, &reading))?;
+    let given =
+        [("--quantity", told.quantity.is_some()), ("--unit", told.unit.is_some()), ("--scale", told.scale.is_some())];
+    let names: Vec<&str> = given.into_iter().filter(|(_, is_given)| *is_given).map(|(name, _)| name).collect();
+    let note = (!names.is_empty()).then(|| {
+        let told = names.join(", ");
+        format!("{}, layer 'hidden': what was said of the first surface ({told}) {words}", name_of(path))
+    });
+    contents.notes.extend(note);
+    // What is told of a file of depth is told of that of the first surface.
+    let depth = match told.depth {
+        Some(_) => depth,
+        None => depth.told(DepthWords {
+            kind: told.depth_kind,
+            unit: told.depth_unit.as_deref(),
+            ..DepthWords::default()
+        })?,
+    };
+    Ok(Hidden { file: path.to_owned(), contents: Contents { depth: Some(depth), ..contents } })
 }
 
 /// Depths that differ are taken as distances from the camera, as renderers leave them; depths that are all alike are those of a

@@ -11,7 +11,7 @@ use super::{
     exr_attributes::{Attributes, is_harmless},
     exr_colors::{ColorsOf, EXPECTED, colors_of, is_called_picture, srgb_from, srgb_from_xyz},
     exr_depth,
-    exr_layers::{RawLayer, leave_other_views, read_headers, read_layers},
+    exr_layers::{RawLayer, leave_other_views, read_headers, read_layers, split_layers},
     light_unit::LightUnit,
     primaries::into_srgb,
     raw_depth::RawDepth,
@@ -93,9 +93,9 @@ pub fn read_spectral_exr(path: &Path) -> Result<Noted<SpectralFile>, SceneError>
     };
     image.check_samples().map_err(values)?;
     let hidden = match hidden {
-        Some((radiance, depth)) => {
-            radiance.check_samples().map_err(values)?;
-            Some(HiddenLayer { radiance, depth: DepthMap::new(depth.values).map_err(values)? })
+        Some(RawHidden { image, depth, .. }) => {
+            image.check_samples().map_err(values)?;
+            Some(HiddenLayer { radiance: image, depth: DepthMap::new(depth.values).map_err(values)? })
         }
         None => None,
     };
@@ -117,8 +117,8 @@ pub(super) struct RawFile {
     /// Whether it says that it is a picture of all directions.
     pub(super) panorama: Option<Panorama>,
     pub(super) light: Option<SceneLight>,
-    /// Radiance and depth of the layer behind.
-    pub(super) hidden: Option<(SpectralImage, RawDepth)>,
+    /// The layer behind.
+    pub(super) hidden: Option<RawHidden>,
     /// What of the file is not used.
     pub(super) notes: Vec<String>,
 }
@@ -135,13 +135,21 @@ pub(super) enum RawImage {
     },
 }
 
+/// Light, or reflectances, and depth of the layer behind.
+pub(super) struct RawHidden {
+    pub(super) image: SpectralImage,
+    /// Whether its unit is stated, by itself or of the first layer.
+    pub(super) is_unit_stated: bool,
+    pub(super) depth: RawDepth,
+}
+
 /// What is asked for by name of an EXR file.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct AskedChannels<'a> {
     /// The channel of the depth.
     pub(super) depth: Option<&'a str>,
-    /// The layer of red, green and blue.
-    pub(super) colors: Option<&'a str>,
+    /// The layer of bands, or of red, green and blue.
+    pub(super) layer: Option<&'a str>,
     /// Attributes that whoever asks reads besides.
     pub(super) texts: &'a [&'a str],
 }
@@ -153,10 +161,17 @@ pub(super) struct AskedChannels<'a> {
 pub(super) fn read_raw_exr(path: &Path, asked: AskedChannels<'_>) -> Result<RawFile, SceneError> {
     let (head, mut layers) = read_layers(path)?;
     let mut notes: Vec<String> = note_of(path, "view", &leave_other_views(&mut layers)).into_iter().collect();
+    let mut layers = split_layers(layers);
     let hidden = layers.iter().position(|layer| layer.name == HIDDEN_LAYER && layer.has_bands());
     let hidden = hidden.filter(|_| layers.len() > 1).map(|index| layers.remove(index));
     let panorama = panorama_of(path, &layers, &mut notes);
-    let first = joined(path, layers, asked.texts, &mut notes)?;
+    let band_layers: Vec<String> = layers
+        .iter()
+        .filter(|layer| layer.has_bands() && !layer.name.is_empty())
+        .map(|layer| format!("'{}'", layer.name))
+        .collect();
+    let first = joined(path, layers, asked, &mut notes)?;
+    let is_layer_told = asked.layer == Some(first.name.as_str());
     let ((rows, columns), position, attributes) = (first.size, first.position, first.attributes);
     let frame = head.frame_of(position);
     let view = attributes.view(columns, rows).map_err(|error| unreadable(path, error))?;
@@ -164,7 +179,7 @@ pub(super) fn read_raw_exr(path: &Path, asked: AskedChannels<'_>) -> Result<RawF
     let mut channels = Stated::new("channel", first.planes);
     let bands = channels.take_all(|name| band_name::parse(name).is_some());
     let (image, prefix) = if bands.is_empty() {
-        let (prefix, what, mut planes) = colors_of(path, &mut channels, asked.colors)?;
+        let (prefix, what, mut planes) = colors_of(path, &mut channels, asked.layer)?;
         if what == ColorsOf::Xyz {
             into_srgb(&mut planes, &srgb_from_xyz());
             let what = "channels X, Y and Z are taken for CIE XYZ under D65, whose white has a Y of 1: they become linear sRGB";
@@ -177,14 +192,16 @@ pub(super) fn read_raw_exr(path: &Path, asked: AskedChannels<'_>) -> Result<RawF
             notes.push(format!("{}: its primaries become those of sRGB, its white D65", name_of(path)));
         }
         (RawImage::Rgb { planes, white_cd_m2: attributes.white_cd_m2.filter(|white| *white > 0.0) }, prefix)
-    } else if asked.colors.is_some() {
-        return Err(unreadable(
-            path,
-            "it has spectral bands: a layer of colors (--variable) cannot be asked for beside",
-        ));
+    } else if let Some(told) = asked.layer.filter(|_| !is_layer_told) {
+        let expected = match band_layers.is_empty() {
+            true => "in no layer with a name: expected it without --variable".to_owned(),
+            false => format!("in {}: expected one of them (--variable), not '{told}'", band_layers.join(", ")),
+        };
+        return Err(unreadable(path, format!("it has spectral bands, {expected}")));
     } else {
         let is_unit_stated = !matches!(attributes.unit, Ok(None));
         let image = image_of(path, &attributes, bands)?;
+        notes.extend(attributes.note_of_unit(path).filter(|_| image.quantity() != Quantity::Reflectance));
         let image = match attributes.pitch_um {
             Some(pitch_um) => image.with_pitch_um(pitch_um),
             None => image,
@@ -199,7 +216,13 @@ pub(super) fn read_raw_exr(path: &Path, asked: AskedChannels<'_>) -> Result<RawF
     if channels.get(&opacity).is_some_and(|plane| plane.iter().all(|v| *v == 1.0)) {
         channels.take(&opacity);
     }
+    let is_behind =
+        channels.names().any(|name| name.strip_prefix(HIDDEN_LAYER).is_some_and(|rest| rest.starts_with('.')));
     notes.extend(channels.note(path, |_| false));
+    if is_behind && hidden.is_none() {
+        let expected = "a layer 'hidden' has bands (S0.… or T.…) and a channel Z to be what lies behind, or is a file of its own (--hidden)";
+        notes.push(format!("{}: {expected}", name_of(path)));
+    }
     let hidden = match hidden {
         Some(layer) if layer.position != position => {
             return Err(unreadable(
@@ -207,7 +230,10 @@ pub(super) fn read_raw_exr(path: &Path, asked: AskedChannels<'_>) -> Result<RawF
                 "its layer 'hidden' lies elsewhere in the picture than its first, expected it there",
             ));
         }
-        Some(layer) => {
+        Some(mut layer) => {
+            if layer.attributes.unit == Ok(None) {
+                layer.attributes.unit.clone_from(&attributes.unit);
+            }
             let kind = "attribute of the layer 'hidden'";
             notes.extend(note_of(path, kind, &attributes.other_of(&layer.attributes)));
             Some(hidden_of(path, layer, &mut notes)?)
@@ -233,20 +259,21 @@ fn panorama_of(path: &Path, layers: &[RawLayer], notes: &mut Vec<String>) -> Opt
     }
 }
 
-/// Returns the layer with bands, or else that of the colors of a picture, with the channels of others of the same samples; of several the largest,
+/// Returns the layer of bands that is asked for, or else that with bands, or else that of the colors of a picture, with the channels of others of the same samples; of several the largest,
 /// of as large ones the first. The names of others are told, as are those of parts whose bands are there already, and what headers state that
 /// nobody knows.
 fn joined(
     path: &Path,
     mut layers: Vec<RawLayer>,
-    texts: &[&str],
+    asked: AskedChannels<'_>,
     notes: &mut Vec<String>,
 ) -> Result<RawLayer, SceneError> {
     let has_bands = layers.iter().any(RawLayer::has_bands);
     let rank = |layer: &RawLayer| {
         let is_picture = layer.name.is_empty() || is_called_picture(&layer.name);
         let has_colors = !has_bands && layer.has_colors();
-        (layer.has_bands(), has_colors, has_colors && is_picture, layer.size.0 * layer.size.1)
+        let is_told = layer.has_bands() && asked.layer == Some(layer.name.as_str());
+        (is_told, layer.has_bands(), has_colors, has_colors && is_picture, layer.size.0 * layer.size.1)
     };
     // Of equals the last is the greatest: the first in the order turned round.
     let index = (0..layers.len()).rev().max_by_key(|index| rank(&layers[*index]));
@@ -274,7 +301,7 @@ fn joined(
             first.planes.append(&mut layer.planes);
         }
     }
-    notes.extend(stated.note(path, |name| is_harmless(name) || texts.contains(&name)));
+    notes.extend(stated.note(path, |name| is_harmless(name) || asked.texts.contains(&name)));
     notes.extend(note_of(path, "part", &unused));
     Ok(first)
 }
@@ -303,15 +330,18 @@ fn depth_of(
 }
 
 /// Returns radiance and depth of the layer behind; what else it has is named.
-fn hidden_of(path: &Path, layer: RawLayer, notes: &mut Vec<String>) -> Result<(SpectralImage, RawDepth), SceneError> {
+fn hidden_of(path: &Path, layer: RawLayer, notes: &mut Vec<String>) -> Result<RawHidden, SceneError> {
     let mut channels = Stated::new("channel of the layer 'hidden'", layer.planes);
     let bands = channels.take_all(|name| band_name::parse(name).is_some());
     let image = image_of(path, &layer.attributes, bands)?;
+    let unit = layer.attributes.note_of_unit(path).filter(|_| image.quantity() != Quantity::Reflectance);
+    notes.extend(unit.filter(|note| !notes.contains(note)));
     let z_m = channels.take("Z").ok_or_else(|| unreadable(path, "the layer 'hidden' has no channel 'Z'"))?;
     notes.extend(channels.note(path, |name| ["R", "G", "B"].contains(&name)));
     let attributes = layer.attributes.others.note(path, is_harmless);
     notes.extend(attributes.map(|note| format!("{note} (of the layer 'hidden')")));
-    Ok((image, RawDepth::in_file(path, "channel 'Z' of the layer 'hidden'".to_owned(), z_m, DepthKind::Axial)))
+    let depth = RawDepth::in_file(path, "channel 'Z' of the layer 'hidden'".to_owned(), z_m, DepthKind::Axial);
+    Ok(RawHidden { image, is_unit_stated: layer.attributes.unit != Ok(None), depth })
 }
 
 /// Planes of samples, each with the name of its channel.

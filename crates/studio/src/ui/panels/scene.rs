@@ -61,9 +61,11 @@ pub(super) fn show(ui: &mut Ui, camera: &mut Camera, desk: &Desk<'_>) {
     );
     optional(ui, view, &mut camera.scene.field_of_view_deg, 36.0);
     if kind_of(&camera.scene.source) != Kind::World {
-        let words = "One depth for a scene that has none, from the entrance pupil";
-        let depth = NumberField::by_factors("depth", "m", 1e-4..=1e6, 0.1..=100.0, words);
-        optional(ui, depth, &mut camera.scene.depth_m, 2.0);
+        if kind_of(&camera.scene.source) != Kind::StillLife {
+            let words = "One depth for a scene that has none, from the entrance pupil";
+            let depth = NumberField::by_factors("depth", "m", 1e-4..=1e6, 0.1..=100.0, words);
+            optional(ui, depth, &mut camera.scene.depth_m, 2.0);
+        }
         light(ui, &mut camera.scene);
         CollapsingHeader::new("More of the scene").show(ui, |ui| more(ui, &mut camera.scene));
     }
@@ -194,7 +196,10 @@ fn change_kind(camera: &mut Camera, kind: Kind) {
         scene.reading = FileReading::default();
     }
     scene.source = match kind {
-        Kind::StillLife => SceneSource::StillLife { columns, rows },
+        Kind::StillLife => {
+            (scene.depth_m, scene.flat) = (None, None);
+            SceneSource::StillLife { columns, rows }
+        }
         Kind::Target => {
             scene.field_of_view_deg.get_or_insert(36.0);
             scene.depth_m.get_or_insert(2.0);
