@@ -287,7 +287,9 @@ mod tests {
             let depth = z_m(name, DepthWords::default());
             assert!(depth[(0, 1)].is_nan() && depth[(0, 0)] == 2.0 && depth.row(1).to_vec() == [0.5, 0.7], "{depth}");
             let notes = read_depth(&at(name), DepthWords::default()).unwrap().notes;
-            assert_eq!(notes, [format!("{name}: its description 'depth_scale=5000' is not used")]);
+            assert_eq!(notes[0], format!("{name}: its description 'depth_scale=5000' is not used"));
+            // A number of depth is no light, and what is marked is said.
+            assert_eq!(notes.get(1).is_some_and(|note| note.contains("0 is white")), white_zero, "{notes:?}");
         }
     }
 

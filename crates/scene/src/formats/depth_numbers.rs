@@ -89,7 +89,8 @@ pub(super) fn depth_numbers(path: &Path, told: Option<&str>) -> Result<Noted<Dep
         "txt" | "csv" | "asc" => of(read_text_depth(path)?.told_in(&mut notes), None),
         _ => {
             let gray = read_gray(path, told)?.told_in(&mut notes);
-            of(gray.values, gray.top)
+            let top = gray.top;
+            of(gray.into_stored(path, &mut notes), top)
         }
     };
     Ok(Noted::new(numbers, notes))
