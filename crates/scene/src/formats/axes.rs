@@ -42,6 +42,128 @@ pub(super) fn planes(
     Ok((0..sides[b]).map(plane).collect())
 }
 
+/// Names of rows, of columns and of bands, in small letters and without what stands between words.
+const NAMES: [(char, [&str; 12]); 3] = [
+    (
+        'y',
+        [
+            "y",
+            "lat",
+            "latitude",
+            "row",
+            "line",
+            "height",
+            "northing",
+            "downtrack",
+            "alongtrack",
+            "scanline",
+            "scan",
+            "v",
+        ],
+    ),
+    (
+        'x',
+        [
+            "x",
+            "lon",
+            "longitude",
+            "column",
+            "col",
+            "width",
+            "easting",
+            "crosstrack",
+            "acrosstrack",
+            "sample",
+            "pixel",
+            "u",
+        ],
+    ),
+    (
+        'b',
+        [
+            "b",
+            "band",
+            "wavelength",
+            "wave",
+            "lambda",
+            "wl",
+            "channel",
+            "spectral",
+            "spectrum",
+            "wavelengthnm",
+            "c",
+            "spectralband",
+        ],
+    ),
+];
+
+/// Returns the order of axes that is told, or that their names have; and in a sentence what is wrong with names, where they say something
+/// else or not all of it.
+pub(super) fn order(names: &[String], told: Option<&str>) -> (Option<String>, Option<String>) {
+    let own = Named::of(names);
+    let shown = || names.iter().map(|name| format!("'{name}'")).collect::<Vec<_>>().join(", ");
+    match (told, own) {
+        (Some(told), Named::Whole(own)) if own != told => {
+            (Some(told.to_owned()), Some(format!("its axes are named {}, and --axes says otherwise", shown())))
+        }
+        (Some(told), _) => (Some(told.to_owned()), None),
+        (None, Named::Whole(own)) => (Some(own), None),
+        (None, Named::Nothing) => (None, None),
+        (None, Named::Doubt(own)) => (
+            own,
+            Some(format!(
+                "its axes are named {}, which does not tell all of rows, columns and bands: --axes does",
+                shown()
+            )),
+        ),
+    }
+}
+
+/// What the names of axes say of their order.
+enum Named {
+    Nothing,
+    /// Not which are rows and which columns; the order if that is as usual, where the bands are known.
+    Doubt(Option<String>),
+    Whole(String),
+}
+
+impl Named {
+    fn of(names: &[String]) -> Self {
+        if names.len() != 3 || names.iter().all(String::is_empty) {
+            return Self::Nothing;
+        }
+        let kinds: Vec<Option<char>> = names.iter().map(|name| kind_of(name)).collect();
+        let n = |kind: char| kinds.iter().filter(|own| **own == Some(kind)).count();
+        let missing: Vec<char> = ['y', 'x', 'b'].into_iter().filter(|kind| n(*kind) == 0).collect();
+        if ['y', 'x', 'b'].into_iter().any(|kind| n(kind) > 1) {
+            return Self::Doubt(None);
+        }
+        let mut rest = missing.iter();
+        let order = kinds.iter().filter_map(|own| own.or_else(|| rest.next().copied())).collect();
+        match missing[..] {
+            [] | [_] => Self::Whole(order),
+            ['y', 'x'] => Self::Doubt(Some(order)),
+            _ => Self::Doubt(None),
+        }
+    }
+}
+
+/// Returns which axis one of this name is.
+fn kind_of(name: &str) -> Option<char> {
+    let bare: String = name.to_lowercase().chars().filter(|c| c.is_ascii_alphanumeric()).collect();
+    let is = |own: &str| {
+        let counted = ["n", "num", "dim"].iter().any(|start| bare.strip_prefix(start).is_some_and(|rest| rest == own));
+        bare == own || counted
+    };
+    let is_any = |own: &&str| is(own) || is(&format!("{own}s"));
+    NAMES.iter().find(|(_, names)| names.iter().any(is_any)).map(|(kind, _)| *kind)
+}
+
+/// Whether the names of two axes say that the first runs over columns and the second over rows.
+pub(super) fn are_turned(names: &[String]) -> bool {
+    matches!(names, [first, second] if kind_of(first) == Some('x') && kind_of(second) == Some('y'))
+}
+
 /// Returns in a sentence which axis is taken for bands, where others are as long as there are bands and nothing is told.
 pub(super) fn note(sides: &[usize], told: Option<&str>, n_bands: Option<usize>) -> Option<String> {
     let &[a, b, c] = sides else { return None };
@@ -56,6 +178,28 @@ pub(super) fn note(sides: &[usize], told: Option<&str>, n_bands: Option<usize>) 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn names_of_axes_say_their_order() {
+        let of = |names: [&str; 3], told: Option<&str>| order(&names.map(str::to_owned), told);
+        for (names, expected) in [
+            (["x", "y", "wavelength"], "xyb"),
+            (["Lambda", "lat", "lon"], "byx"),
+            (["downtrack", "crosstrack", "bands"], "yxb"),
+            (["n_cols", "channel", "nrows"], "xby"),
+            (["phony_dim_0", "x", "y"], "bxy"),
+        ] {
+            assert_eq!(of(names, None), (Some(expected.to_owned()), None), "{names:?}");
+        }
+        assert_eq!(of(["", "", ""], None), (None, None));
+        for (names, expected) in [(["x", "x", "b"], None), (["p", "q", "band"], Some("yxb")), (["x", "p", "q"], None)] {
+            let (order, note) = of(names, None);
+            assert!(order.as_deref() == expected && note.is_some_and(|note| note.contains("--axes")), "{names:?}");
+        }
+        let (order, note) = of(["x", "y", "wavelength"], Some("yxb"));
+        assert!(order.as_deref() == Some("yxb") && note.is_some_and(|note| note.contains("'wavelength'")));
+        assert_eq!(of(["x", "y", "wavelength"], Some("xyb")).1, None);
+    }
 
     #[test]
     fn axes_are_told_or_found_by_the_number_of_bands() {

@@ -5,12 +5,13 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use ndarray::Array2;
 use rayon::prelude::*;
 
 use super::{
     contents::Cube,
     gray_picture::{GrayPicture, read_gray},
+    read_options::ReadOptions,
+    reading::FileQuantity,
     stated::{merged, name_of, note_of},
     unusable::unreadable,
     wavelength_unit::{PLAUSIBLE_NM, without_unit},
@@ -34,7 +35,14 @@ const TELLING: [&str; 11] = ["json", "txt", "csv", "xml", "yaml", "yml", "ini", 
 ///
 /// # Errors
 /// When there is no such picture, wavelengths are missing, or the pictures differ in size.
-pub(super) fn band_folder(folder: &Path, told_nm: Option<&[f64]>) -> Result<Cube, SceneError> {
+pub(super) fn band_folder(folder: &Path, options: &ReadOptions) -> Result<Cube, SceneError> {
+    let reading = &options.reading;
+    let told_nm = reading.wavelengths_nm.as_deref();
+    // What one code stands for holds of those of any bits.
+    let is_code_told = options.white_level.is_some()
+        || reading.scale.is_some()
+        || reading.unit.is_some()
+        || reading.quantity.is_some_and(|quantity| quantity != FileQuantity::Reflectance);
     let Listing { pictures, unused, files } = listing(folder)?;
     if pictures.is_empty() {
         return Err(SceneError::NoBands {
@@ -75,7 +83,17 @@ pub(super) fn band_folder(folder: &Path, told_nm: Option<&[f64]>) -> Result<Cube
     let pictures: Vec<Numbered> =
         wavelengths_nm.iter().copied().zip(pictures.into_iter().map(|(_, path)| path)).collect();
     check_bands(folder, &pictures)?;
-    let (planes, top) = planes_of(&pictures, &mut notes)?;
+    let (mut grays, top) = grays_of(&pictures, &mut notes)?;
+    let tops: Vec<f64> = grays.iter().filter_map(|gray| gray.top).collect();
+    if let Some(other) = tops.iter().find(|own| Some(**own) != top) {
+        let (name, top) = (name_of(folder), top.unwrap_or_default());
+        let how = if is_code_told { "all are taken as they stand" } else { "each is counted of its own" };
+        notes.push(format!("{name}: the largest codes of its pictures are {other} and {top}: {how}"));
+    }
+    if !is_code_told {
+        grays.iter_mut().for_each(|gray| gray.stretch(top));
+    }
+    let planes = grays.into_iter().map(|gray| gray.values).collect();
     Ok(Cube { planes, top, wavelengths_nm: Some(wavelengths_nm), quantity: None, unit: None, notes })
 }
 
@@ -94,8 +112,8 @@ fn check_bands(folder: &Path, pictures: &[Numbered]) -> Result<(), SceneError> {
     Ok(())
 }
 
-/// Returns the numbers of all pictures, each with its wavelength, and the largest of whole numbers: codes of fewer bits are so many times as large.
-fn planes_of(pictures: &[Numbered], notes: &mut Vec<String>) -> Result<(Vec<Array2<f32>>, Option<f64>), SceneError> {
+/// Returns all pictures, and the largest code that there can be in any of them.
+fn grays_of(pictures: &[Numbered], notes: &mut Vec<String>) -> Result<(Vec<GrayPicture>, Option<f64>), SceneError> {
     let read: Result<Vec<_>, _> = pictures.par_iter().map(|(_, path)| read_gray(path, None)).collect();
     let mut told = vec![];
     let mut grays = vec![];
@@ -126,11 +144,19 @@ fn planes_of(pictures: &[Numbered], notes: &mut Vec<String>) -> Result<(Vec<Arra
         let reason = "it holds floats, but others of the folder whole numbers: expected one kind";
         return Err(unreadable(&pictures[index].1, reason));
     }
-    let plane = |gray: GrayPicture| match (gray.top, top) {
-        (Some(own), Some(top)) if own < top => gray.values.mapv(|code| (f64::from(code) * top / own) as f32),
-        _ => gray.values,
-    };
-    Ok((grays.into_iter().map(plane).collect(), top))
+    Ok((grays, top))
+}
+
+impl GrayPicture {
+    /// Makes codes of fewer bits so many times as large.
+    fn stretch(&mut self, top: Option<f64>) {
+        if let (Some(own), Some(top)) = (self.top, top)
+            && own < top
+        {
+            self.values.mapv_inplace(|code| (f64::from(code) * top / own) as f32);
+            self.top = Some(top);
+        }
+    }
 }
 
 /// A picture with the number that its name ends in.
@@ -218,13 +244,16 @@ fn wavelengths_of(folder: &Path, pictures: &[(f64, PathBuf)]) -> Result<Vec<f64>
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{ReadOptions, formats::contents::Image};
+    use crate::{FileReading, formats::contents::Image};
     use dioptric_pictures::save;
     use dioptric_spectrum::{Quantity, SpectralImage, WavelengthGrid};
     use image::{ImageBuffer, Luma};
 
     fn read_band_folder(folder: &Path, told_nm: Option<&[f64]>) -> Result<SpectralImage, SceneError> {
-        match band_folder(folder, told_nm)?.into_contents(folder, &ReadOptions::default())?.image {
+        let wavelengths_nm = told_nm.map(<[f64]>::to_vec);
+        let options =
+            ReadOptions { reading: FileReading { wavelengths_nm, ..FileReading::default() }, ..ReadOptions::default() };
+        match band_folder(folder, &options)?.into_contents(folder, &options)?.image {
             Image::Spectral(image) => Ok(image),
             _ => panic!("a picture"),
         }
@@ -256,9 +285,57 @@ mod tests {
         for name in ["exposure.json", "README.txt", "wavelengths.csv"] {
             fs::write(folder.path().join(name), "450, 550").unwrap();
         }
-        let notes = band_folder(folder.path(), None).unwrap().notes.join(" ");
+        let notes = band_folder(folder.path(), &ReadOptions::default()).unwrap().notes.join(" ");
         let named = ["'depth.png'", "'exposure.json'", "readme.md", "README.txt", "wavelengths.csv"];
         assert_eq!(named.map(|name| notes.contains(name)), [true, true, false, false, false], "{notes}");
+    }
+
+    #[test]
+    fn a_level_is_one_of_codes_of_any_bits() {
+        let folder = folder_of(&["a_450.png"]);
+        save(&ImageBuffer::from_pixel(3, 2, Luma([10_u8])).into(), &folder.path().join("a_550.png")).unwrap();
+        let of = |white_level: Option<f64>| {
+            let options = ReadOptions { white_level, ..ReadOptions::default() };
+            let contents =
+                band_folder(folder.path(), &options).unwrap().into_contents(folder.path(), &options).unwrap();
+            let Image::Spectral(image) = contents.image else { panic!("a picture") };
+            (image.spectrum_at(0, 0), contents.notes.join(" "))
+        };
+        let (told, own) = (of(Some(1000.0)), of(None));
+        assert_eq!(told.0.iter().map(|v| *v as f32).collect::<Vec<_>>(), [0.1, 0.01]);
+        assert_eq!(own.0.iter().map(|v| *v as f32).collect::<Vec<_>>(), [100.0 / 65535.0, 10.0 / 255.0]);
+        assert!(told.1.contains("255 and 65535: all are") && own.1.contains("each is counted"), "{} {}", told.1, own.1);
+    }
+
+    #[test]
+    fn what_is_counted_from_white_is_the_light_of_a_stack() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name);
+        fs::create_dir(path("bands")).unwrap();
+        let write = |path: &Path, n: usize| {
+            let mut encoder = tiff::encoder::TiffEncoder::new(fs::File::create(path).unwrap()).unwrap();
+            for _ in 0..n {
+                let mut page = encoder.new_image::<tiff::encoder::colortype::Gray16>(2, 1).unwrap();
+                page.encoder().write_tag(tiff::tags::Tag::PhotometricInterpretation, 0_u16).unwrap();
+                page.encoder().write_tag(tiff::tags::Tag::GdalNodata, "9999").unwrap();
+                page.write_data(&[1000, 9999]).unwrap();
+            }
+        };
+        write(&path("bands/b_450.tif"), 1);
+        write(&path("bands/b_550.tif"), 1);
+        write(&path("stack.tif"), 2);
+        let no_data = Some(crate::NoData::Black);
+        let wavelengths_nm = Some(vec![450.0, 550.0]);
+        let quantity = Some(FileQuantity::Reflectance);
+        let reading = FileReading { no_data, wavelengths_nm, quantity, ..FileReading::default() };
+        let options = ReadOptions { reading, ..ReadOptions::default() };
+        for name in ["bands", "stack.tif"] {
+            let contents = crate::formats::read_contents::contents_of(&path(name), &options).unwrap();
+            let Image::Spectral(image) = contents.image else { panic!("{name}: a picture") };
+            for (column, expected) in [(0, 64_535.0_f32 / 65_535.0), (1, 0.0)] {
+                assert_eq!(image.spectrum_at(0, column), [f64::from(expected); 2], "{name}, {column}");
+            }
+        }
     }
 
     #[test]

@@ -32,6 +32,11 @@ const ENDINGS: [&str; 12] = [
     ".depth.npy",
     "_depth.npy",
 ];
+/// Endings of files that can be a map of depth, read or not.
+const MAPS: [&str; 19] = [
+    "png", "tif", "tiff", "exr", "pfm", "npy", "npz", "dpt", "jpg", "jpeg", "webp", "bmp", "ppm", "pgm", "pnm", "hdr",
+    "txt", "csv", "asc",
+];
 /// The depth that one code of 16 bits stands for where nothing states it, m: depth cameras write millimetres.
 const UNIT_M: f64 = 1e-3;
 /// Codes of depth cameras end below; a map that goes on to the last code is stretched to all of them.
@@ -69,8 +74,7 @@ pub(super) fn likely_beside(picture: &Path) -> Vec<String> {
     let is_likely = |path: &PathBuf| {
         let name = name_of(path).to_lowercase();
         let ending = name.rsplit('.').next().unwrap_or_default();
-        let is_map =
-            ["png", "tif", "tiff", "exr", "pfm", "npy", "npz", "dpt"].contains(&ending) || is_of(path, MATLAB_OR_HDF5);
+        let is_map = MAPS.contains(&ending) || is_of(path, MATLAB_OR_HDF5);
         const WORDS: [&str; 2] = ["depth", "disp"];
         let is_end = |c: Option<char>| c.is_none_or(|c| !c.is_alphanumeric());
         // The stem is a word by itself, or stands before one of ours.
@@ -137,6 +141,11 @@ fn unit_m_of(path: &Path, numbers: &DepthNumbers, words: DepthWords<'_>) -> Resu
     }
     if words.unit.is_some() || of_other_kind {
         return Ok(1.0);
+    }
+    if numbers.is_no_length && words.kind.is_none() {
+        return wrong(
+            "its words say that it holds disparities or inverse distances: expected --depth-kind, as disparity:BASELINE_M or inverse",
+        );
     }
     if let Some(unit_m) = words.unit_m {
         return Ok(unit_m);
@@ -257,6 +266,41 @@ mod tests {
     }
 
     #[test]
+    fn words_of_arrays_say_what_they_count() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.h5");
+        let read = |name: &str, long_name: &str| {
+            let mut file = hdf5_pure::FileBuilder::new();
+            let array = file.create_dataset(name).with_data(&[1.0_f32; 4]).with_shape(&[2, 2]);
+            array.set_attr("long_name", hdf5_pure::AttrValue::String(long_name.to_owned()));
+            let array = file.create_dataset("other").with_data(&[1.0_f32; 4]).with_shape(&[2, 2]);
+            array.set_attr("long_name", hdf5_pure::AttrValue::String("distance from the camera".to_owned()));
+            fs::write(&path, file.finish().unwrap()).unwrap();
+            read_depth(&path, DepthWords { variable: Some("other").filter(|_| name == "x"), ..DepthWords::default() })
+        };
+        for (name, words, kind) in [
+            ("depth", "distance along the ray", DepthKind::Radial),
+            ("depth", "Euclidean range", DepthKind::Radial),
+            ("depth", "depth of the array", DepthKind::Axial),
+            ("distance", "distance along the optical axis", DepthKind::Axial),
+            ("distance", "", DepthKind::Radial),
+            ("x", "", DepthKind::Radial),
+        ] {
+            let found = read(name, words);
+            assert!(found.as_ref().is_ok_and(|depth| depth.kind == kind), "{name}, {words}: {:?}", found.err());
+        }
+        for (name, words) in [("depth", "inverse depth"), ("disparity", "")] {
+            let message = read(name, words).err().unwrap().to_string();
+            assert!(message.contains("--depth-kind"), "{message}");
+        }
+        assert!(likely_beside(&folder.path().join("b.png")).is_empty());
+        for name in ["b.depth.jpg", "b_depth.webp", "b.disp.png"] {
+            fs::write(folder.path().join(name), "").unwrap();
+        }
+        assert_eq!(likely_beside(&folder.path().join("b.png")), ["b.depth.jpg", "b.disp.png", "b_depth.webp"]);
+    }
+
+    #[test]
     fn codes_are_the_numbers_whatever_they_are_counted_from() {
         let folder = tempfile::tempdir().unwrap();
         let at = |name: &str| folder.path().join(name);
@@ -287,7 +331,9 @@ mod tests {
             let depth = z_m(name, DepthWords::default());
             assert!(depth[(0, 1)].is_nan() && depth[(0, 0)] == 2.0 && depth.row(1).to_vec() == [0.5, 0.7], "{depth}");
             let notes = read_depth(&at(name), DepthWords::default()).unwrap().notes;
-            assert_eq!(notes, [format!("{name}: its description 'depth_scale=5000' is not used")]);
+            assert_eq!(notes[0], format!("{name}: its description 'depth_scale=5000' is not used"));
+            // A number of depth is no light, and what is marked is said.
+            assert_eq!(notes.get(1).is_some_and(|note| note.contains("0 is white")), white_zero, "{notes:?}");
         }
     }
 

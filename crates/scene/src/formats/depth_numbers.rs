@@ -6,6 +6,7 @@ use ndarray::Array2;
 
 use super::{
     contents::{MATLAB_OR_HDF5, is_of},
+    envi::header_of,
     exr_depth_file::{DepthChannel, read_depth_exr},
     gray_picture::read_gray,
     length_unit::length_in_name,
@@ -16,7 +17,7 @@ use super::{
     reading::{DepthKind, Frame},
     stated::{Noted, name_of},
     text_depth::read_text_depth,
-    unusable::unreadable,
+    unusable::{starts_with, unreadable},
 };
 use crate::SceneError;
 
@@ -27,6 +28,8 @@ pub(super) struct DepthNumbers {
     pub(super) top: Option<f64>,
     /// What the names in the file say that they count.
     pub(super) kind: DepthKind,
+    /// Whether the names in the file say that they are no lengths, but disparities or inverse distances.
+    pub(super) is_no_length: bool,
     /// The length of 1, m, where the file states it.
     pub(super) unit_m: Option<f64>,
     /// The picture of which they are a part, where the file tells.
@@ -41,6 +44,7 @@ pub(super) fn depth_numbers(path: &Path, told: Option<&str>) -> Result<Noted<Dep
         values,
         top,
         kind: DepthKind::Axial,
+        is_no_length: false,
         unit_m: None,
         frame: None,
         from: name_of(path),
@@ -66,12 +70,12 @@ pub(super) fn depth_numbers(path: &Path, told: Option<&str>) -> Result<Noted<Dep
         "npz" => {
             let (name, array) = read_npz_plane(path, told)?.told_in(&mut notes);
             let (values, top) = plane_of(path, array)?;
-            let (kind, unit_m) = (kind_of_array(&name), length_in_name(&name));
-            DepthNumbers { from: named(&name), kind, unit_m, ..of(values, top) }
+            let (kind, unit_m, is_no_length) = (kind_of_array(&name, ""), length_in_name(&name), is_no_length(&name));
+            DepthNumbers { from: named(&name), kind, unit_m, is_no_length, ..of(values, top) }
         }
         _ if is_of(path, MATLAB_OR_HDF5) => {
-            let Plane { name, values, top, unit_m } = read_plane(path, told)?.told_in(&mut notes);
-            let (kind, named_m) = (kind_of_array(&name), length_in_name(&name));
+            let Plane { name, values, top, unit_m, words } = read_plane(path, told)?.told_in(&mut notes);
+            let (kind, named_m) = (kind_of_array(&name, &words), length_in_name(&name));
             if let (Some(unit_m), Some(named_m)) = (unit_m, named_m)
                 && unit_m != named_m
             {
@@ -79,7 +83,8 @@ pub(super) fn depth_numbers(path: &Path, told: Option<&str>) -> Result<Noted<Dep
                 return Err(unreadable(path, reason));
             }
             let unit_m = unit_m.or(named_m);
-            DepthNumbers { from: named(&name), kind, unit_m, ..of(values, top) }
+            let is_no_length = is_no_length(&name) || is_no_length(&words);
+            DepthNumbers { from: named(&name), kind, unit_m, is_no_length, ..of(values, top) }
         }
         "exr" => {
             let DepthChannel { name, plane, kind, frame } = read_depth_exr(path, told)?.told_in(&mut notes);
@@ -87,18 +92,40 @@ pub(super) fn depth_numbers(path: &Path, told: Option<&str>) -> Result<Noted<Dep
             DepthNumbers { from, kind, unit_m: length_in_name(&name), frame: Some(frame), ..of(plane, None) }
         }
         "txt" | "csv" | "asc" => of(read_text_depth(path)?.told_in(&mut notes), None),
+        _ if is_envi(path, &ending) => {
+            let reason = "it is an ENVI cube, of which no band is taken for a depth: expected the band as a TIFF of floats, .npy, .pfm or .exr";
+            return Err(unreadable(path, reason));
+        }
         _ => {
             let gray = read_gray(path, told)?.told_in(&mut notes);
-            of(gray.values, gray.top)
+            let top = gray.top;
+            of(gray.into_stored(path, &mut notes), top)
         }
     };
     Ok(Noted::new(numbers, notes))
 }
 
-/// What the name of an array says that it counts.
-fn kind_of_array(name: &str) -> DepthKind {
+/// What an array counts by its name, or by the words that the file has for it.
+fn kind_of_array(name: &str, words: &str) -> DepthKind {
     let last = name.rsplit('/').next().unwrap_or(name);
-    if last.eq_ignore_ascii_case("distance") { DepthKind::Radial } else { DepthKind::Axial }
+    let lower = words.to_lowercase();
+    let has = |word: &&str| lower.split(|c: char| !c.is_alphanumeric()).any(|own| own == *word);
+    let says_axis = ["axis", "axial", "planar", "perpendicular"].iter().any(has);
+    let says_ray = ["ray", "rays", "radial", "euclidean", "slant", "sight"].iter().any(has)
+        || ["distance from ", "distance to "].iter().any(|start| lower.contains(start));
+    if !says_axis && (says_ray || last.eq_ignore_ascii_case("distance")) { DepthKind::Radial } else { DepthKind::Axial }
+}
+
+/// Whether words speak of what is no length.
+fn is_no_length(words: &str) -> bool {
+    let lower = words.to_lowercase();
+    lower.contains("disparit") || lower.contains("inverse")
+}
+
+/// Whether a file is the header of an ENVI cube, or has one.
+fn is_envi(path: &Path, ending: &str) -> bool {
+    let is_picture = ["png", "jpg", "jpeg", "tif", "tiff", "webp", "bmp", "ppm", "pgm", "pnm"].contains(&ending);
+    if ending == "hdr" { starts_with(path, b"ENVI").unwrap_or(false) } else { !is_picture && header_of(path).is_some() }
 }
 
 /// Returns an array of rows and columns, whatever its sides of 1.

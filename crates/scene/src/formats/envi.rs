@@ -181,7 +181,7 @@ impl EnviFile {
     /// Reads the header and finds the file of numbers. Bands whose wavelengths nothing states are those wanted, where there are as many.
     fn open(header_path: &Path, told_nm: Option<&[f64]>, wanted_nm: Option<&[f64]>) -> Result<Self, SceneError> {
         let mut header = envi_header::parse(header_path, &header_text(header_path)?)?;
-        let mut notes: Vec<String> = header.note.take().into_iter().chain(header.note_of_order.take()).collect();
+        let mut notes = std::mem::take(&mut header.notes);
         let wrong = |key: &str, reason: String| SceneError::Header {
             file: header_path.to_owned(),
             line: 0,

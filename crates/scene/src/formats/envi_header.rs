@@ -77,10 +77,8 @@ pub(crate) struct EnviHeader {
     pub(crate) settings: Vec<(String, String)>,
     /// `data units`, as written.
     pub(crate) data_units: Option<String>,
-    /// What of the header is not used.
-    pub(crate) note: Option<String>,
-    /// What is taken for the order of bytes where it does not state it.
-    pub(crate) note_of_order: Option<String>,
+    /// What of the header is not used, or contradicts itself, a sentence each.
+    pub(crate) notes: Vec<String>,
 }
 
 /// A `key = value` of the header and the line it starts on.
@@ -178,7 +176,7 @@ pub(crate) fn parse(path: &Path, text: &str) -> Result<EnviHeader, SceneError> {
     let are_gains_of_reflectance = reflecting.iter().any(Option::is_some) && plain.iter().all(Option::is_none);
     let [gains, offsets] = if are_gains_of_reflectance { reflecting.clone() } else { plain };
     let bad_bands =
-        entries.list("bbl", bands)?.map_or_else(Vec::new, |list| list.iter().map(|good| *good == 0.0).collect());
+        entries.list("bbl", bands)?.map_or_else(Vec::new, |list| list.iter().map(|good| *good <= 0.0).collect());
     let wavelengths_nm = entries.wavelengths_nm()?;
     let frame_offsets = entries.frame_offsets()?;
     let mut header = EnviHeader {
@@ -205,8 +203,7 @@ pub(crate) fn parse(path: &Path, text: &str) -> Result<EnviHeader, SceneError> {
         exposures: entries.exposures(),
         settings: entries.settings(),
         data_units: entries.get("data units").map(|entry| entry.value.trim_matches(['{', '}']).trim().to_owned()),
-        note: None,
-        note_of_order: None,
+        notes: vec![],
     };
     if header.columns == 0 || header.rows == 0 || header.bands == 0 {
         return Err(entries.wrong("samples", "a cube without samples".to_owned()));
@@ -223,10 +220,13 @@ pub(crate) fn parse(path: &Path, text: &str) -> Result<EnviHeader, SceneError> {
         // Both kinds of gains: those of radiance are used, the others named.
         entries.used.retain(|key| !key.starts_with("data reflectance"));
     }
-    header.note = entries.note();
+    header.notes = entries.note().into_iter().collect();
+    header.notes.extend(entries.note_of_shape());
+    header.notes.extend(header.wavelengths_nm.as_deref().and_then(|list| entries.note_of_names(list)));
+    header.notes.extend(entries.note_of_good_bands());
     if entries.list.iter().all(|entry| entry.key != "byte order") && header.data_type.bytes() > 1 {
-        header.note_of_order =
-            Some(format!("{}: it does not state the order of bytes: the lowest is taken to be first", name_of(path)));
+        let note = format!("{}: it does not state the order of bytes: the lowest is taken to be first", name_of(path));
+        header.notes.push(note);
     }
     Ok(header)
 }
@@ -249,6 +249,68 @@ impl Entries<'_> {
         let is_known = |key: &String| self.used.contains(key) || HARMLESS.contains(&key.as_str());
         let left: Vec<String> = self.list.iter().map(|entry| entry.key.clone()).filter(|key| !is_known(key)).collect();
         note_of(self.path, "key", &left)
+    }
+
+    /// Returns the words of a list in braces, which is looked at but not used.
+    fn words(&self, key: &str) -> Vec<&str> {
+        let entry = self.list.iter().find(|entry| entry.key == key);
+        let list = entry.map_or("", |entry| entry.value.trim_matches(['{', '}']));
+        list.split(',').map(str::trim).filter(|word| !word.is_empty()).collect()
+    }
+
+    /// Returns what is said of samples that are not square, and of a map that they are turned on.
+    fn note_of_shape(&self) -> Option<String> {
+        let side = |word: Option<&&str>| word.and_then(|word| word.parse::<f64>().ok()).filter(|side| *side > 0.0);
+        let (sizes, map) = (self.words("pixel size"), self.words("map info"));
+        // A projection, two numbers of a sample and two of its place stand before the sides of samples on the map.
+        let stated = [("pixel size", [sizes.first(), sizes.get(1)]), ("map info", [map.get(5), map.get(6)])];
+        let shapes = stated.into_iter().filter_map(|(key, [across, down])| {
+            let (across, down) = (side(across)?, side(down)?);
+            ((across / down - 1.0).abs() > 0.01).then(|| format!("'{key}' states samples of {across} × {down}"))
+        });
+        let turned = map.iter().find_map(|word| {
+            let (key, angle) = word.split_once('=')?;
+            let degrees: f64 = angle.trim().parse().ok()?;
+            (key.trim().eq_ignore_ascii_case("rotation") && degrees != 0.0)
+                .then(|| format!("'map info' states that north is turned by {degrees}°"))
+        });
+        let all: Vec<String> = shapes.chain(turned).collect();
+        (!all.is_empty()).then(|| {
+            format!(
+                "{}: its {}: samples are taken to be square and to lie as stored",
+                name_of(self.path),
+                all.join(", its ")
+            )
+        })
+    }
+
+    /// Returns what is said of names of bands that state other wavelengths.
+    fn note_of_names(&self, wavelengths_nm: &[f64]) -> Option<String> {
+        let names = self.words("band names");
+        let other = names.iter().zip(wavelengths_nm).find(|(name, nm)| {
+            named_nm(name).is_some_and(|(own_nm, half_nm)| (own_nm - **nm).abs() > half_nm.max(1.0))
+        });
+        other.map(|(name, nm)| {
+            format!(
+                "{}: its band names state other wavelengths ('{}' of the band at {} nm): those of 'wavelength' are used",
+                name_of(self.path),
+                shown(name),
+                stated::shown(*nm)
+            )
+        })
+    }
+
+    /// Returns what is said of marks of bands that are neither good nor bad.
+    fn note_of_good_bands(&self) -> Option<String> {
+        let odd = self
+            .words("bbl")
+            .into_iter()
+            .find(|word| word.parse::<f64>().is_ok_and(|mark| mark != 0.0 && mark != 1.0))?;
+        Some(format!(
+            "{}: its bbl has {}, expected 0 (bad) or 1 (good): bands above 0 are taken to be good",
+            name_of(self.path),
+            shown(odd)
+        ))
     }
 
     /// Refuses a key that says two things.
@@ -425,6 +487,22 @@ impl Entries<'_> {
     }
 }
 
+/// Returns the wavelength that the name of a band ends in or has in brackets, and half its last digit, nm: `550 nm`, `Red (0.66 Micrometers)`.
+fn named_nm(name: &str) -> Option<(f64, f64)> {
+    let words: Vec<&str> =
+        name.split(|c: char| c.is_whitespace() || "()[]:_".contains(c)).filter(|w| !w.is_empty()).collect();
+    words.iter().enumerate().find_map(|(index, word)| {
+        let end = word.find(|c: char| !(c.is_ascii_digit() || c == '.')).unwrap_or(word.len());
+        let (number, unit) = word.split_at(end);
+        let unit = if unit.is_empty() { words.get(index + 1).copied()? } else { unit };
+        // A letter alone is a name.
+        let unit = Some(unit).filter(|unit| unit.len() > 1)?;
+        let digits = number.split_once('.').map_or(0, |(_, digits)| digits.len());
+        let own = in_nm(unit, &[number.parse().ok()?, 0.5 * 0.1_f64.powi(digits as i32)])?;
+        PLAUSIBLE_NM.contains(&own[0]).then(|| (own[0], own[1]))
+    })
+}
+
 /// Returns a key as it is known, whatever its spaces.
 fn known_key(key: &str) -> String {
     let squeezed = |text: &str| text.chars().filter(|c| !c.is_whitespace() && *c != '_').collect::<String>();
@@ -487,7 +565,7 @@ mod tests {
         assert_eq!((header.data_type, header.interleave), (DataType::U16, Interleave::Bil));
         assert!(header.is_big_endian);
         assert_eq!((header.wavelengths_nm, header.reflectance_scale), (Some(vec![500.0, 600.0]), Some(10000.0)));
-        assert_eq!(header.note, None);
+        assert_eq!(header.notes, [""; 0]);
     }
 
     #[test]
@@ -498,7 +576,36 @@ mod tests {
         let header = parse(Path::new("folder/a.hdr"), &text).unwrap();
         assert_eq!((header.columns, header.frame_offsets, header.ignored), (4, [8, 4], Some(-9999.0)));
         assert_eq!((header.bad_bands, header.gains), (vec![false, true], Some(vec![2.0, 3.0])));
-        assert_eq!(header.note.as_deref(), Some("a.hdr: its key 'frobnicate' is not used"));
+        assert_eq!(header.notes, ["a.hdr: its key 'frobnicate' is not used"]);
+    }
+
+    #[test]
+    fn what_contradicts_the_numbers_is_said() {
+        let notes = |more: &str| parse(Path::new("a.hdr"), &format!("{GOOD}{more}\n")).unwrap().notes.join(" ");
+        for more in [
+            "pixel size = {2, 2, units=Meters}",
+            "map info = {UTM, 1, 1, 5e5, 4e6, 30, 30, 13, North, WGS-84, units=Meters, rotation=0}",
+            "band names = {500 nm, Red (0.6 Micrometers)}",
+            "band names = {Band 1, Band 2}",
+            "band names = {2 m, 600 nm}",
+            "bbl = {1, 1}",
+        ] {
+            assert_eq!(notes(more), "", "{more}");
+        }
+        for (more, words) in [
+            ("pixel size = {1, 2, units=Meters}", "'pixel size' states samples of 1 × 2"),
+            (
+                "map info = {UTM, 1, 1, 5e5, 4e6, 10, 20, 13, North, rotation=30}",
+                "of 10 × 20, its 'map info' states that north",
+            ),
+            ("band names = {600 nm, 500 nm}", "'600 nm' of the band at 500 nm"),
+            ("band names = {a (0.50 um), b (0.72 Micrometers)}", "of the band at 600 nm"),
+            ("bbl = {1, 2}", "its bbl has 2"),
+        ] {
+            assert!(notes(more).contains(words), "{more}: {}", notes(more));
+        }
+        let bad = parse(Path::new("a.hdr"), &format!("{GOOD}bbl = {{-1, 1}}\n")).unwrap();
+        assert!(bad.bad_bands == [true, false] && bad.notes[0].contains("-1"), "{:?}", bad.notes);
     }
 
     #[test]

@@ -14,7 +14,7 @@ use super::{
 };
 use crate::SceneError;
 
-/// The numbers of a gray picture as they stand in its file.
+/// The numbers of a gray picture, counted from black.
 pub(super) struct GrayPicture {
     /// What stands for none is no number.
     pub(super) values: Array2<f32>,
@@ -22,6 +22,23 @@ pub(super) struct GrayPicture {
     pub(super) top: Option<f64>,
     /// The wavelength that the file states, nm.
     pub(super) wavelength_nm: Option<f64>,
+    /// Whether the file counts from white, so that the numbers are not those that stand there.
+    is_white_zero: bool,
+}
+
+impl GrayPicture {
+    /// Returns the numbers as they stand in the file, of which light is not what they count.
+    pub(super) fn into_stored(self, path: &Path, notes: &mut Vec<String>) -> Array2<f32> {
+        if !self.is_white_zero {
+            return self.values;
+        }
+        notes.push(format!(
+            "{}: its mark that 0 is white (tag 262) is not used: its numbers are taken as they stand",
+            name_of(path)
+        ));
+        let top = self.top.unwrap_or(1.0) as f32;
+        self.values.mapv(|v| top - v)
+    }
 }
 
 /// Reads a gray picture, which may be saved as a colored one; of a TIFF of several planes that of the number told, from 1.
@@ -64,10 +81,13 @@ fn of_tiff(
             notes.extend(page.note_of_orientation(path));
             codes_of(path, notes)?
         }
-        TiffFile::Linear([values, ..], _) => GrayPicture { values, top: None, wavelength_nm: None },
+        TiffFile::Linear([values, ..], _) => {
+            GrayPicture { values, top: None, wavelength_nm: None, is_white_zero: false }
+        }
         TiffFile::Stack(stack) => plane_of(path, stack, told, notes)?,
     };
-    page.undo(&mut gray.values, gray.top.unwrap_or(1.0) as f32);
+    page.ignore(&mut gray.values, gray.top);
+    gray.is_white_zero = page.is_white_zero;
     notes.extend(page.note_of_description(path));
     Ok(gray)
 }
@@ -97,14 +117,14 @@ fn plane_of(
         (0..n).filter(|own| *own != index && !are_alike).map(|own| (own + 1).to_string()).collect();
     notes.extend(note_of(path, "plane", &others));
     let wavelength_nm = stack.wavelengths_nm.as_ref().map(|list| list[index]);
-    Ok(GrayPicture { values: stack.planes.swap_remove(index), top: stack.top, wavelength_nm })
+    Ok(GrayPicture { values: stack.planes.swap_remove(index), top: stack.top, wavelength_nm, is_white_zero: false })
 }
 
 /// Returns the codes of a gray picture and the largest that there can be.
 fn codes_of(path: &Path, notes: &mut Vec<String>) -> Result<GrayPicture, SceneError> {
     let of = |size: (u32, u32), codes: Vec<f32>, top: u16| {
         let values = Array2::from_shape_vec((size.1 as usize, size.0 as usize), codes).expect("a code a pixel");
-        GrayPicture { values, top: Some(top.into()), wavelength_nm: None }
+        GrayPicture { values, top: Some(top.into()), wavelength_nm: None, is_white_zero: false }
     };
     let picture = decode(path, 4)?;
     let size = (picture.width(), picture.height());

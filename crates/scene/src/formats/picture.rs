@@ -1,6 +1,6 @@
 //! Ordinary pictures, lifted to spectra through a display's primaries.
 
-use std::path::Path;
+use std::{io::Read, path::Path};
 
 use dioptric_pictures::{Curve, DynamicImage, ImageError, StatedColors, read_reduced, size_of};
 use dioptric_spectrum::{Display, Quantity, SpectralImage, WavelengthGrid, srgb_decode, srgb_encode};
@@ -364,7 +364,23 @@ pub(super) fn pnm_top(path: &Path) -> Option<u32> {
 fn undecodable(path: &Path, error: &ImageError) -> SceneError {
     let said = said(error);
     let is_cut = |error: &std::io::Error| error.kind() == std::io::ErrorKind::UnexpectedEof;
+    let is_decoding = matches!(error, ImageError::Decoding(_));
     let reason = match error {
+        ImageError::Decoding(_) if said.contains("critical chunk") => {
+            let name = said.split("type: ").nth(1).and_then(|rest| rest.split([',', ' ', '}']).next()).unwrap_or("one");
+            format!(
+                "its chunk {name} is one that a reader must know, and is not read here: expected a PNG without it (save it anew)"
+            )
+        }
+        _ if is_decoding && is_of(path, &["hdr"]) => match first_line(path) {
+            Some(line) if line.starts_with("#?RADIANCE") => {
+                format!("it is broken, or of another format than its name says ({said})")
+            }
+            line => format!(
+                "its first line is '{}', expected '#?RADIANCE' of a Radiance picture, or 'ENVI' of the header of a cube",
+                super::stated::short(&line.unwrap_or_default())
+            ),
+        },
         ImageError::IoError(error) if is_cut(error) => format!("it ends before all of its samples ({said})"),
         ImageError::Decoding(_) if said.contains("failed to fill whole buffer") => {
             format!("it ends before all of its samples ({said})")
@@ -377,6 +393,14 @@ fn undecodable(path: &Path, error: &ImageError) -> SceneError {
         _ => said,
     };
     unreadable(path, reason)
+}
+
+/// Returns the first line of a file, as far as it is text.
+fn first_line(path: &Path) -> Option<String> {
+    let mut start = vec![];
+    std::fs::File::open(path).ok()?.take(40).read_to_end(&mut start).ok()?;
+    let line = start.split(|byte| *byte == b'\n').next().unwrap_or_default();
+    Some(line.iter().filter(|byte| byte.is_ascii_graphic() || **byte == b' ').map(|byte| char::from(*byte)).collect())
 }
 
 #[cfg(test)]
@@ -423,6 +447,43 @@ mod tests {
         std::fs::write(&path, b"\xff\xd8\xff\xe0 no more").unwrap();
         let message = decode(&path, 0).unwrap_err().to_string();
         assert!(message.contains("broken.jpg: cannot be read"), "{message}");
+    }
+
+    #[test]
+    fn what_is_not_read_is_called_by_its_name() {
+        let folder = tempfile::tempdir().unwrap();
+        let refused = |name: &str, bytes: &[u8]| {
+            let path = folder.path().join(name);
+            std::fs::write(&path, bytes).unwrap();
+            crate::read_scene(&path, &crate::ReadOptions::default()).unwrap_err().to_string()
+        };
+        let radiance = b"FORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 1\n\x80\x80\x80\x80";
+        let message = refused("a.hdr", &[&b"#?RGBE\n"[..], radiance].concat());
+        assert!(message.contains("'#?RGBE', expected '#?RADIANCE'"), "{message}");
+        let mut png = vec![];
+        image::GrayImage::from_pixel(1, 1, image::Luma([9]))
+            .write_to(&mut std::io::Cursor::new(&mut png), image::ImageFormat::Png)
+            .unwrap();
+        // Behind the signature and the header, with the checksum of no content.
+        let chunk = [&[0; 4][..], b"ABCD", &crc(b"ABCD").to_be_bytes()].concat();
+        png.splice(33..33, chunk);
+        let message = refused("a.png", &png);
+        assert!(message.contains("chunk ABCD") && !message.contains('{'), "{message}");
+        let mut file = std::io::Cursor::new(vec![]);
+        let mut encoder = tiff::encoder::TiffEncoder::new(&mut file).unwrap();
+        let mut page = encoder.new_image::<tiff::encoder::colortype::Gray16>(2, 1).unwrap();
+        page.encoder().write_tag(tiff::tags::Tag::PhotometricInterpretation, 51_177_u16).unwrap();
+        page.write_data(&[1, 2]).unwrap();
+        let message = refused("a.tif", file.get_ref());
+        assert!(message.contains("depth map of DNG") && !message.contains("develop"), "{message}");
+    }
+
+    /// The checksum of a chunk (PNG, third edition, annex D).
+    fn crc(bytes: &[u8]) -> u32 {
+        let step = |c: u32, byte: &u8| {
+            (0..8).fold(c ^ u32::from(*byte), |c, _| if c & 1 == 1 { 0xedb8_8320 ^ (c >> 1) } else { c >> 1 })
+        };
+        !bytes.iter().fold(u32::MAX, step)
     }
 
     #[test]

@@ -8,7 +8,11 @@ use std::{
 
 use dioptric_pictures::{Exif, StatedColors, size_of};
 use flate2::read::ZlibDecoder;
-use image::{ImageDecoder, metadata::Orientation};
+use image::{
+    ImageDecoder,
+    codecs::pnm::{PnmSubtype, SampleEncoding},
+    metadata::Orientation,
+};
 
 use super::{
     stated::{name_of, note_of, short},
@@ -123,7 +127,7 @@ pub(super) fn unknown_parts(path: &Path) -> Result<Vec<String>, SceneError> {
             file.seek(SeekFrom::Start(12)).and_then(|_| of_webp(&mut file))
         }
         [b'B', b'M', ..] => Ok(of_bmp(&start)),
-        [b'P', b'1'..=b'7', ..] => Ok(of_pnm(&start)),
+        [b'P', b'1'..=b'7', ..] => Ok(of_pnm(&start).into_iter().chain(behind_pnm(path)).collect()),
         _ => Ok(vec![]),
     };
     let mut names = names.unwrap_or_default();
@@ -175,6 +179,12 @@ fn of_xmp(content: &[u8]) -> Vec<String> {
     if has(b"GPano:") {
         names.push("panorama (XMP)".to_owned());
     }
+    // What cameras of bands state of them, of their light and of their lens.
+    const CALIBRATION: [&str; 5] = ["Camera:", "DLS:", "MicaSense:", "Sentera:", "FLIR:"];
+    let text = String::from_utf8_lossy(content);
+    let words = text.split(|c: char| c.is_whitespace() || "<>=/".contains(c));
+    let is_stated = |word: &&str| CALIBRATION.iter().any(|start| word.starts_with(start) && word.len() > start.len());
+    names.extend(words.filter(is_stated).map(|word| format!("{} (XMP)", short(word))));
     names
 }
 
@@ -214,6 +224,35 @@ fn of_pnm(start: &[u8]) -> Vec<String> {
         rest = &rest[end..];
     }
     names
+}
+
+/// Names what follows the samples of a binary PNM picture: other pictures, as that format lets be put behind each other.
+fn behind_pnm(path: &Path) -> Option<String> {
+    let file = BufReader::new(File::open(path).ok()?);
+    let (mut file, header) = image::codecs::pnm::PnmDecoder::new(file).ok()?.into_inner();
+    let (columns, rows) = (u64::from(header.width()), u64::from(header.height()));
+    let n_bytes = match header.subtype() {
+        PnmSubtype::Bitmap(SampleEncoding::Binary) => columns.div_ceil(8).checked_mul(rows)?,
+        subtype => {
+            let n_samples = match subtype {
+                PnmSubtype::Graymap(SampleEncoding::Binary) => 1,
+                PnmSubtype::Pixmap(SampleEncoding::Binary) => 3,
+                PnmSubtype::ArbitraryMap => header.as_arbitrary()?.depth.into(),
+                _ => return None,
+            };
+            let n_bytes: u64 = if header.maximal_sample() > 255 { 2 } else { 1 };
+            columns.checked_mul(rows)?.checked_mul(n_samples)?.checked_mul(n_bytes)?
+        }
+    };
+    file.seek_relative(n_bytes.try_into().ok()?).ok()?;
+    let mut rest = vec![];
+    file.take(MOST_BYTES).read_to_end(&mut rest).ok()?;
+    let rest = rest.trim_ascii_start();
+    match rest {
+        [] => None,
+        [b'P', b'1'..=b'7', ..] => Some("further pictures".to_owned()),
+        rest => rest.iter().any(|byte| *byte != 0).then(|| "bytes behind its samples".to_owned()),
+    }
 }
 
 /// Names the further frames of a WebP file, and what its XMP data state.
@@ -356,6 +395,27 @@ mod tests {
         let path = folder.path().join("a");
         std::fs::write(&path, bytes).unwrap();
         unknown_parts(&path).unwrap()
+    }
+
+    #[test]
+    fn pictures_behind_a_picture_are_named() {
+        for (head, n_bytes) in
+            [("P6 4 2 255\n", 24), ("P5\n# a\n4 2 65535\n", 16), ("P4 9 2\n", 4), ("P6 4 2 255\n", 24)]
+        {
+            let one = [head.as_bytes(), &vec![0; n_bytes]].concat();
+            assert_eq!(named(&one), Vec::<String>::new(), "{head}");
+            assert_eq!(named(&[&one[..], b"\n"].concat()), Vec::<String>::new(), "{head}");
+            assert_eq!(named(&[&one[..], &one].concat()), ["further pictures"], "{head}");
+            assert_eq!(named(&[&one[..], b"\x07\x08"].concat()), ["bytes behind its samples"], "{head}");
+        }
+        assert_eq!(named(b"P2 2 1 9\n1 2\n"), Vec::<String>::new());
+    }
+
+    #[test]
+    fn what_cameras_of_bands_state_is_named() {
+        let xmp = b"<x Camera:CentralWavelength=\"560\" GCamera:Other='1'><Camera:BandName>a</Camera:BandName>";
+        assert_eq!(of_xmp(xmp), ["Camera:CentralWavelength (XMP)", "Camera:BandName (XMP)", "Camera:BandName (XMP)"]);
+        assert!(of_xmp(b"<x Device:Camera: Camera: a>").iter().all(|name| !name.starts_with("Camera:")));
     }
 
     #[test]

@@ -48,7 +48,7 @@ pub(super) fn contents_of(path: &Path, options: &ReadOptions) -> Result<Contents
                 format!("it has some faces of a cube, but of its six faces {} are missing", missing.join(", "));
             return Err(unreadable(path, reason));
         }
-        return band_folder(path, options.reading.wavelengths_nm.as_deref())?.into_contents(path, options);
+        return band_folder(path, options)?.into_contents(path, options);
     }
     if !path.exists() {
         return Err(unreadable(path, "there is no such file"));
@@ -133,11 +133,11 @@ fn of_tiff(path: &Path, options: &ReadOptions) -> Result<Contents, SceneError> {
     match read_tiff(path, wanted)?.told_in(&mut notes) {
         TiffFile::Picture(_) => of_picture(path, options, notes),
         TiffFile::Linear(mut planes, page) => {
-            planes.iter_mut().for_each(|plane| page.ignore(plane));
+            planes.iter_mut().for_each(|plane| page.ignore(plane, None));
             Ok(linear(planes, None, notes))
         }
         TiffFile::Stack(mut stack) => {
-            stack.planes.iter_mut().for_each(|plane| stack.page.ignore(plane));
+            stack.planes.iter_mut().for_each(|plane| stack.page.ignore(plane, stack.top));
             notes.extend(stack.page.note_of_description(path));
             let TiffStack { planes, wavelengths_nm, top, .. } = stack;
             Cube { planes, top, wavelengths_nm, quantity: None, unit: None, notes }.into_contents(path, options)

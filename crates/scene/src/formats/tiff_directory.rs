@@ -19,11 +19,7 @@ pub(super) struct Directory {
 impl Directory {
     /// Reads the directory at a place of a file.
     pub(super) fn read(file: &mut File, at: u64) -> Result<Self> {
-        let mut start = [0; 4];
-        file.rewind()?;
-        file.read_exact(&mut start)?;
-        let mut this = Self { is_big_endian: start[0] == b'M', is_big_file: false, entries: vec![] };
-        this.is_big_file = this.number(&start[2..]) == 43;
+        let mut this = Self::head(file)?;
         let (n_count, n_entry) = if this.is_big_file { (8, 20) } else { (2, 12) };
         let count = this.number_at(file, at, n_count)?;
         for index in 0..count.min(u16::MAX.into()) {
@@ -31,6 +27,27 @@ impl Directory {
             this.entries.push((this.number_at(file, place, 2)? as u16, place));
         }
         Ok(this)
+    }
+
+    /// Reads the first directory of a file.
+    pub(super) fn first(file: &mut File) -> Result<Self> {
+        let head = Self::head(file)?;
+        let at = if head.is_big_file { head.number_at(file, 8, 8)? } else { head.number_at(file, 4, 4)? };
+        Self::read(file, at)
+    }
+
+    /// Reads how numbers stand in the file.
+    fn head(file: &mut File) -> Result<Self> {
+        let mut start = [0; 4];
+        file.rewind()?;
+        file.read_exact(&mut start)?;
+        let this = Self { is_big_endian: start[0] == b'M', is_big_file: false, entries: vec![] };
+        Ok(Self { is_big_file: this.number(&start[2..]) == 43, ..this })
+    }
+
+    /// Returns the number of two bytes of a tag that has one.
+    pub(super) fn number_of(&self, file: &mut File, tag: u16) -> Result<Option<u64>> {
+        self.place_of(tag).map(|place| self.number_at(file, place, 2)).transpose()
     }
 
     /// Returns where the values of a tag stand that fit into its entry.

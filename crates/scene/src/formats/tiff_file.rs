@@ -21,6 +21,8 @@ use crate::SceneError;
 
 /// The tag of a description.
 const DESCRIPTION: u16 = 270;
+/// The tag of what samples are marked as.
+const PHOTOMETRIC: u16 = 262;
 /// Pages of a file.
 const LIMIT_PAGES: usize = 10_000;
 
@@ -30,6 +32,10 @@ pub(super) const RAW: &str = "it is a raw photograph, which is no scene: `dioptr
 /// Returns what is wrong with a file that what decodes it does not take.
 fn broken(path: &Path, error: &TiffError) -> SceneError {
     let said = said(error);
+    let is_unknown = matches!(error, TiffError::UnsupportedError(TiffUnsupportedError::UnknownInterpretation));
+    if let Some(what) = Some(path).filter(|_| is_unknown).and_then(unknown_mark) {
+        return unreadable(path, what);
+    }
     unreadable(
         path,
         match error {
@@ -44,6 +50,24 @@ fn broken(path: &Path, error: &TiffError) -> SceneError {
             _ => said,
         },
     )
+}
+
+/// Returns what the first page of a file is marked as, where that is known but not read, and the way on.
+fn unknown_mark(path: &Path) -> Option<String> {
+    let mut file = File::open(path).ok()?;
+    let mark = Directory::first(&mut file).ok()?.number_of(&mut file, PHOTOMETRIC).ok()??;
+    Some(match mark {
+        32_803 | 34_892 => {
+            "its samples are those of a sensor, which are no scene: `dioptric develop` makes a picture of a DNG".to_owned()
+        }
+        51_177 => "it is marked as a depth map of DNG (tag 262 is 51177), which is no gray picture: expected its depths in a file \
+                   marked as gray (1), as --depth of a picture"
+            .to_owned(),
+        32_844 | 32_845 => "it holds logarithms of light (LogL or LogLuv), expected linear floats: convert it".to_owned(),
+        other => format!(
+            "its samples are marked as {other} (tag 262), which is not read, expected gray (0 or 1) or red, green and blue (2)"
+        ),
+    })
 }
 
 /// Whether a file is a TIFF, by its first bytes, or by its name where they say nothing.
@@ -259,6 +283,14 @@ fn planes_of_pages(path: &Path, pages: &[(Page, u64)]) -> Result<Vec<Array2<f32>
                 "its bands lie apart and in tiles, expected strips, or the bands of a sample together",
             ));
         }
+        if !matches!(page.bits, 8 | 16 | 32 | 64) {
+            let reason = format!(
+                "its samples are of {} {}, expected 8, 16, 32 or 64 where they are bands or depths: convert it",
+                page.bits,
+                if page.bits == 1 { "bit" } else { "bits" }
+            );
+            return Err(unreadable(path, reason));
+        }
         decoder.seek_to_image(page.index).map_err(broken)?;
         planes.extend(planes_of(&mut decoder, page).map_err(broken)?);
     }
@@ -286,5 +318,69 @@ fn colors_of(path: &Path, mut planes: Vec<Array2<f32>>) -> Result<[Array2<f32>; 
         (Some(r), Some(g), Some(b)) => Ok([r, g, b]),
         (Some(gray), None, None) => Ok([gray.clone(), gray.clone(), gray]),
         _ => Err(unreadable(path, "its samples are neither gray nor red, green and blue")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A TIFF of one strip of 4 × 2 samples of so many bits, with further entries of a directory: tag, type, values.
+    fn tiff(n_samples: u16, bits: u16, more: &[(u16, u16, Vec<u32>)]) -> Vec<u8> {
+        let strip = vec![1_u8; usize::from(n_samples) * 8 * usize::from(bits).max(8) / 8];
+        let mut entries: Vec<(u16, u16, Vec<u32>)> = [
+            (256, 4, vec![4]),
+            (257, 4, vec![2]),
+            (258, 3, vec![bits.into(); n_samples.into()]),
+            (259, 3, vec![1]),
+            (262, 3, vec![if n_samples == 3 { 2 } else { 1 }]),
+            (273, 4, vec![8]),
+            (277, 3, vec![n_samples.into()]),
+            (278, 4, vec![2]),
+            (279, 4, vec![strip.len() as u32]),
+        ]
+        .into();
+        entries.extend(more.iter().cloned());
+        let (mut file, mut directory) = (vec![], (entries.len() as u16).to_le_bytes().to_vec());
+        file.extend([&b"II*\0"[..], &[0; 4], &strip].concat());
+        for (tag, kind, values) in entries {
+            let bytes: Vec<u8> = values
+                .iter()
+                .flat_map(|v| if kind == 3 { (*v as u16).to_le_bytes().to_vec() } else { v.to_le_bytes().to_vec() })
+                .collect();
+            let n = if kind == 5 { values.len() / 2 } else { values.len() };
+            directory.extend([&tag.to_le_bytes()[..], &kind.to_le_bytes(), &(n as u32).to_le_bytes()].concat());
+            if bytes.len() > 4 {
+                directory.extend((file.len() as u32).to_le_bytes());
+                file.extend(bytes);
+            } else {
+                directory.extend([&bytes[..], &vec![0; 4 - bytes.len()]].concat());
+            }
+        }
+        let at = file.len() as u32;
+        file[4..8].copy_from_slice(&at.to_le_bytes());
+        [file, directory, vec![0; 4]].concat()
+    }
+
+    #[test]
+    fn codes_of_black_and_white_are_named_where_unusual() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.tif");
+        for (black, white, is_named) in [(0, 255, false), (16, 235, true)] {
+            let range = [black, 1, white, 1].repeat(3);
+            std::fs::write(&path, tiff(3, 8, &[(532, 5, range)])).unwrap();
+            let mut notes = vec![];
+            read_tiff(&path, TiffAs::Marked).unwrap().told_in(&mut notes);
+            assert_eq!(notes.join(" ").contains("'532'"), is_named, "{notes:?}");
+        }
+    }
+
+    #[test]
+    fn bands_of_a_few_bits_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.tif");
+        std::fs::write(&path, tiff(5, 1, &[])).unwrap();
+        let message = read_tiff(&path, TiffAs::Marked).map(|_| ()).unwrap_err().to_string();
+        assert!(message.contains("of 1 bit, expected 8"), "{message}");
     }
 }

@@ -20,11 +20,13 @@ use super::{
 /// The name of a page.
 const PAGE_NAME: Tag = Tag::Unknown(285);
 /// Tags that say how samples lie in the file, or what changes nothing: from sizes and strips to who made it when.
-const HARMLESS: [u16; 46] = [
+const HARMLESS: [u16; 45] = [
     254, 255, 256, 257, 258, 259, 262, 263, 266, 269, 270, 271, 272, 273, 274, 277, 278, 279, 282, 283, 284, 285, 288,
-    289, 292, 293, 296, 297, 305, 306, 315, 316, 317, 320, 322, 323, 324, 325, 338, 339, 347, 530, 531, 532, 33432,
-    42113,
+    289, 292, 293, 296, 297, 305, 306, 315, 316, 317, 320, 322, 323, 324, 325, 338, 339, 347, 530, 531, 33432, 42113,
 ];
+
+/// The codes of black and of white of each sample.
+const REFERENCE_BLACK_WHITE: Tag = Tag::Unknown(532);
 
 /// Keys of a description under which its wavelengths stand, nm.
 const WAVELENGTHS: [&str; 4] = ["wavelengths_nm", "wavelength_nm", "wavelengths", "wavelength"];
@@ -111,6 +113,9 @@ impl Page {
         let no_data = text(Tag::GdalNodata).and_then(|text| text.trim().parse().ok());
         let tags = decoder.tag_iter().filter_map(|entry| entry.ok()).map(|(tag, _)| tag.to_u16());
         let mut unknown: Vec<u16> = tags.filter(|tag| !HARMLESS.contains(tag)).collect();
+        if is_of_usual_range(decoder.find_tag(REFERENCE_BLACK_WHITE).ok().flatten(), bits) {
+            unknown.retain(|tag| *tag != REFERENCE_BLACK_WHITE.to_u16());
+        }
         let mut resolution = |tag| match decoder.find_tag(tag) {
             Ok(Some(Value::Rational(over, under))) if over > 0 && under > 0 => Some(f64::from(over) / f64::from(under)),
             _ => None,
@@ -209,31 +214,36 @@ impl Page {
     }
 }
 
+/// Whether codes of black and white, pairs of one a sample, are 0 and the largest.
+fn is_of_usual_range(value: Option<Value>, bits: u8) -> bool {
+    let Some(Value::List(list)) = value else { return false };
+    let top = 2.0_f64.powi(bits.into()) - 1.0;
+    let ends = list.iter().map(|value| match value {
+        Value::Rational(over, under) => f64::from(*over) / f64::from(*under),
+        Value::Unsigned(number) => f64::from(*number),
+        _ => f64::NAN,
+    });
+    ends.zip([0.0, top].into_iter().cycle()).all(|(own, usual)| own == usual)
+}
+
 /// What the first page says besides its numbers.
 #[derive(Clone, Debug, Default)]
 pub(super) struct PageWords {
     /// The number that stands for none.
     pub(super) no_data: Option<f64>,
-    /// Whether 0 is white, so that decoded samples are counted from there.
-    is_white_zero: bool,
+    /// Whether 0 is white, so that what decodes samples turned them round: they are counted from black, as light is.
+    pub(super) is_white_zero: bool,
     pub(super) descriptions: Vec<String>,
     orientation: u16,
 }
 
 impl PageWords {
-    /// Makes what stands for no number no number.
-    pub(super) fn ignore(&self, plane: &mut Array2<f32>) {
-        if let Some(none) = self.no_data.map(|v| v as f32) {
+    /// Makes what stands for no number no number, in decoded samples whose largest is `top`, 1 of floats.
+    pub(super) fn ignore(&self, plane: &mut Array2<f32>, top: Option<f64>) {
+        let decoded = |none: f64| if self.is_white_zero { top.unwrap_or(1.0) - none } else { none };
+        if let Some(none) = self.no_data.map(|none| decoded(none) as f32) {
             plane.mapv_inplace(|v| if v == none { f32::NAN } else { v });
         }
-    }
-
-    /// Returns decoded samples, whose largest is `top`, to the numbers of the file: what stands for none becomes no number.
-    pub(super) fn undo(&self, plane: &mut Array2<f32>, top: f32) {
-        if self.is_white_zero {
-            plane.mapv_inplace(|v| top - v);
-        }
-        self.ignore(plane);
     }
 
     /// Returns what is said of numbers that lie as stored.

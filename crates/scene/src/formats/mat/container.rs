@@ -9,7 +9,7 @@ use flate2::read::ZlibDecoder;
 
 use super::{
     super::unusable::{check_memory, unreadable},
-    elements::{LIMIT_ARRAYS, LIMIT_DEPTH, Listed},
+    elements::{self, LIMIT_ARRAYS, LIMIT_DEPTH, Listed},
     hdf5::Hdf5,
     packing::Attribute,
 };
@@ -39,6 +39,8 @@ pub(super) struct MatFile {
     pub(super) listed: Vec<Listed>,
     /// What is stated of those of HDF5 besides their numbers.
     attributes: Vec<(String, Vec<Attribute>)>,
+    /// What those of HDF5 are in words, and the names of their axes.
+    words: Vec<(String, String, Vec<String>)>,
 }
 
 /// An array: its sides, and what it holds.
@@ -106,8 +108,9 @@ impl MatFile {
         }
         let own = entries.iter().map(|entry| (entry.listed.name.clone(), entry.attributes.clone()));
         let attributes = std::iter::once((WHOLE.to_owned(), file.attributes())).chain(own).collect();
+        let words = entries.iter().map(|own| (own.listed.name.clone(), own.words.clone(), own.axes.clone())).collect();
         let listed = entries.into_iter().map(|entry| entry.listed).collect();
-        Ok(Self { is_big_endian: false, is_row_major: !file.is_matlab, variables, listed, attributes })
+        Ok(Self { is_big_endian: false, is_row_major: !file.is_matlab, variables, listed, attributes, words })
     }
 
     fn parse(bytes: &[u8], wanted: &dyn Fn(&Listed) -> bool) -> Result<Self, String> {
@@ -132,12 +135,17 @@ impl MatFile {
             variables.extend(content.map(|content| (own.name.clone(), content)));
             listed.push(own);
         }
-        Ok(Self { is_big_endian, is_row_major: false, variables, listed, attributes: vec![] })
+        Ok(Self { is_big_endian, is_row_major: false, variables, listed, attributes: vec![], words: vec![] })
     }
 
     /// What is stated of a variable besides its numbers.
     pub(super) fn attributes_of(&self, name: &str) -> &[Attribute] {
         self.attributes.iter().find(|(own, _)| own == name).map_or(&[], |(_, attributes)| attributes)
+    }
+
+    /// Returns what a variable is called in words, and the names of its axes; both empty where nothing is stated.
+    pub(super) fn words_of(&self, name: &str) -> (&str, &[String]) {
+        self.words.iter().find(|(own, ..)| own == name).map_or(("", &[]), |(_, words, axes)| (words, axes))
     }
 
     /// Returns a variable, or `None` where the file has none of this name.
@@ -345,6 +353,7 @@ fn inflate(bytes: &[u8], is_big_endian: bool, wanted: &dyn Fn(&Listed) -> bool) 
 struct Header<'a> {
     class: u32,
     is_complex: bool,
+    is_logical: bool,
     sides: Vec<usize>,
     name: String,
     /// What follows.
@@ -364,10 +373,10 @@ fn header_of(bytes: &[u8], is_big_endian: bool) -> Result<Header<'_>, String> {
     let mut rest = Elements { bytes, is_big_endian };
     let (_, flags) = rest.required()?;
     let flags = Elements { bytes: flags, is_big_endian }.word(0).ok_or(TRUNCATED)?;
-    let (class, is_complex) = (flags & 0xff, flags & 0x0800 != 0);
+    let (class, is_complex, is_logical) = (flags & 0xff, flags & 0x0800 != 0, flags & elements::LOGICAL != 0);
     let sides = if class == 17 { vec![] } else { sides_of(rest.required()?.1, is_big_endian)? };
     let name = String::from_utf8_lossy(rest.required()?.1).into_owned();
-    Ok(Header { class, is_complex, sides, name, rest })
+    Ok(Header { class, is_complex, is_logical, sides, name, rest })
 }
 
 fn sides_of(bytes: &[u8], is_big_endian: bool) -> Result<Vec<usize>, String> {
@@ -393,12 +402,17 @@ fn array_of<'a>(
         return Err(format!("its structures hold more than {LIMIT_ARRAYS} arrays or {LIMIT_DEPTH} levels"));
     }
     *n_left -= 1;
-    let Header { class, is_complex, sides, rest, .. } = header_of(bytes, is_big_endian)?;
+    let Header { class, is_complex, is_logical, sides, rest, .. } = header_of(bytes, is_big_endian)?;
     let content = match class {
         2 => fields_of(&sides, rest, depth, n_left)?,
         4 => Content::Other("text"),
         6..=15 if is_complex => Content::Other("complex numbers"),
-        6..=15 => Content::Numbers(numbers_of(&sides, rest, class)?),
+        6..=15 => {
+            let numbers = numbers_of(&sides, rest, class)?;
+            // Of true and false, which are stored as 1 and 0.
+            let top = if is_logical { 1.0 } else { numbers.top };
+            Content::Numbers(Numbers { top, ..numbers })
+        }
         1 => Content::Other("cells"),
         5 => Content::Other("a sparse array"),
         _ => Content::Other("an object"),

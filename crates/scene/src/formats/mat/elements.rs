@@ -20,6 +20,8 @@ pub(super) struct Listed {
 pub(super) const CELLS: u32 = 1;
 pub(super) const DOUBLES: u32 = 6;
 pub(super) const SINGLES: u32 = 7;
+/// The flag of an array of true and false, beside its class.
+pub(super) const LOGICAL: u32 = 0x0200;
 /// Types of stored elements.
 const INT8: u32 = 1;
 const UINT16: u32 = 4;

@@ -9,6 +9,7 @@ use hdf5_pure::{AttrValue, DType, Dataset, Datatype, DatatypeByteOrder, File, Fl
 
 use super::{
     super::unusable::said,
+    dimensions::Dimensions,
     elements::{self, LIMIT_ARRAYS, LIMIT_DEPTH, Listed},
     packing::{Attribute, Value},
 };
@@ -29,6 +30,18 @@ pub(super) struct Entry {
     pub(super) n_bytes: u64,
     /// What else is stated of it.
     pub(super) attributes: Vec<Attribute>,
+    /// What it is, in words.
+    pub(super) words: String,
+    /// The names of its axes, in the order of its sides; none where nothing is stated of them.
+    pub(super) axes: Vec<String>,
+    dimensions: Dimensions,
+}
+
+impl Entry {
+    fn without_content(listed: Listed, path: String, is_group: bool) -> Self {
+        let (attributes, words, axes, dimensions) = (vec![], String::new(), vec![], Dimensions::default());
+        Self { listed, path, is_group, n_bytes: 0, attributes, words, axes, dimensions }
+    }
 }
 
 impl Hdf5 {
@@ -47,6 +60,15 @@ impl Hdf5 {
     pub(super) fn entries(&self) -> Result<Vec<Entry>, String> {
         let mut entries = vec![];
         self.list(&self.file.root(), "", LIMIT_DEPTH, &mut entries)?;
+        let one = |entry: &Entry| Some(*entry.listed.sides.first()?).filter(|_| entry.listed.sides.len() == 1);
+        let scales: Vec<(&str, usize, &Dimensions)> = entries
+            .iter()
+            .filter_map(|entry| Some((entry.listed.name.as_str(), one(entry)?, &entry.dimensions)))
+            .collect();
+        let axes: Vec<_> = entries.iter().map(|entry| entry.dimensions.axes(&entry.listed.sides, &scales)).collect();
+        entries.iter_mut().zip(axes).for_each(|(entry, axes)| entry.axes = axes);
+        // What is but the name and the length of an axis.
+        entries.retain(|entry| !entry.dimensions.is_bare);
         Ok(entries)
     }
 
@@ -59,7 +81,7 @@ impl Hdf5 {
             // A link to what is not there, or not here, is known by its name alone.
             let Ok(dataset) = group.dataset(&name) else {
                 let listed = Listed { name: path.clone(), sides: vec![], is_numeric: false, is_complex: false };
-                entries.push(Entry { listed, path, is_group: false, n_bytes: 0, attributes: vec![] });
+                entries.push(Entry::without_content(listed, path, false));
                 continue;
             };
             let sides = self.sides_of(&dataset)?;
@@ -68,7 +90,14 @@ impl Hdf5 {
             let is_complex = dataset.dtype().is_ok_and(|kind| is_complex(&kind));
             let listed = Listed { name: path.clone(), sides, is_numeric, is_complex };
             let attributes = dataset.attrs().map(telling).unwrap_or_default();
-            entries.push(Entry { listed, path, is_group: false, n_bytes, attributes });
+            let (words, dimensions) = (words_of(&dataset), Dimensions::of(&dataset));
+            entries.push(Entry {
+                n_bytes,
+                attributes,
+                words,
+                dimensions,
+                ..Entry::without_content(listed, path, false)
+            });
         }
         for name in group.groups().map_err(broken)? {
             // What references lead to.
@@ -78,7 +107,7 @@ impl Hdf5 {
             let path = format!("{before}{name}");
             if self.is_matlab {
                 let listed = Listed { name: path.clone(), sides: vec![1, 1], is_numeric: false, is_complex: false };
-                entries.push(Entry { listed, path, is_group: true, n_bytes: 0, attributes: vec![] });
+                entries.push(Entry::without_content(listed, path, true));
             } else {
                 let group = group.group(&name).map_err(broken)?;
                 self.list(&group, &format!("{path}/"), depth - 1, entries)?;
@@ -144,9 +173,18 @@ impl Hdf5 {
             let class = if is_text { 4 } else { elements::CELLS };
             return elements::other(name, class, &sides).ok_or_else(too_large);
         };
+        let is_logical = attributes.get("MATLAB_class").and_then(AttrValue::as_str) == Some("logical");
+        let class = if is_logical { (class.0 | elements::LOGICAL, class.1) } else { class };
         let numbers = numbers_of(dataset)?;
         elements::stored(name, &sides, class, &numbers).ok_or_else(too_large)
     }
+}
+
+/// Returns what the attributes of an array call it.
+fn words_of(dataset: &Dataset) -> String {
+    let Ok(attributes) = dataset.attrs() else { return String::new() };
+    let text = |name: &str| attributes.get(name).and_then(AttrValue::as_str);
+    ["long_name", "standard_name"].into_iter().filter_map(text).collect::<Vec<_>>().join("; ")
 }
 
 /// Returns the attributes that may change what numbers mean, in the order of their names.

@@ -197,7 +197,8 @@ fn cube_of(path: &Path, file: &MatFile, name: &str, reading: &FileReading) -> Re
     let n_bands = reading.wavelengths_nm.as_ref().or(own.as_ref()).map(Vec::len);
     let unit = UnitOf::read(packing.unit.as_deref());
     let percent = if matches!(unit, UnitOf::Percent) { 0.01 } else { 1.0 };
-    let planes = axes::planes(&array.sides, reading.axes.as_deref(), n_bands, file.is_row_major, |index| {
+    let (order, named) = axes::order(file.words_of(name).1, reading.axes.as_deref());
+    let planes = axes::planes(&array.sides, order.as_deref(), n_bands, file.is_row_major, |index| {
         (percent * packing.unpacked(numbers.at(index))) as f32
     })?;
     let is_depth = |own: &str| reading.depth.is_none() && reading.depth_variable.as_deref() == Some(own);
@@ -205,8 +206,8 @@ fn cube_of(path: &Path, file: &MatFile, name: &str, reading: &FileReading) -> Re
     let unused: Vec<String> = file.listed.iter().map(|own| own.name.clone()).filter(|own| !used(own)).collect();
     let mut notes: Vec<String> = note_of(path, "variable", &unused).into_iter().collect();
     let file_name = name_of(path);
-    let ambiguous = axes::note(&array.sides, reading.axes.as_deref(), n_bands);
-    notes.extend(ambiguous.map(|note| format!("{file_name}: '{name}': {note}")));
+    let ambiguous = axes::note(&array.sides, order.as_deref(), n_bands);
+    notes.extend(named.into_iter().chain(ambiguous).map(|note| format!("{file_name}: '{name}': {note}")));
     let of_file = file.attributes_of(WHOLE).iter().map(|own| own.name.clone());
     let left = packing.left(!matches!(unit, UnitOf::Unknown), stated.is_some());
     notes.extend(note_of(path, "attribute", &of_file.chain(left).collect::<Vec<_>>()));

@@ -1,6 +1,7 @@
 //! MATLAB and HDF5 files of the scenes that `ISETCam` and its relatives save, and of other cubes.
 
 mod container;
+mod dimensions;
 mod elements;
 #[cfg(test)]
 pub(super) mod fixtures;

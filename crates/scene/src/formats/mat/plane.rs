@@ -6,6 +6,7 @@ use ndarray::Array2;
 
 use super::{
     super::{
+        axes,
         length_unit::{length_in_name, length_m},
         stated::{Noted, note_of},
         unusable::unreadable,
@@ -35,6 +36,8 @@ pub(in super::super) struct Plane {
     pub(in super::super) top: Option<f64>,
     /// The length of 1, m, where the file states it.
     pub(in super::super) unit_m: Option<f64>,
+    /// What the file calls it in words.
+    pub(in super::super) words: String,
 }
 
 /// Reads the one plane of a file, that whose name says that it is a depth, or that of the name told.
@@ -73,9 +76,14 @@ pub(in super::super) fn read_plane(path: &Path, told: Option<&str>) -> Result<No
     let numbers =
         array.numbers().map_err(|what| wrong(format!("its '{}' is {what}, expected numbers", chosen.name)))?;
     let sides = sides_of(chosen);
-    let (rows, columns) = (sides[0], sides[1]);
+    let (words, axes) = file.words_of(&chosen.name);
+    let axes: Vec<String> =
+        axes.iter().zip(&chosen.sides).filter(|(_, side)| **side != 1).map(|(axis, _)| axis.clone()).collect();
+    let is_turned = axes::are_turned(&axes);
+    let [rows, columns] = if is_turned { [sides[1], sides[0]] } else { [sides[0], sides[1]] };
     let at = |(row, column): (usize, usize)| {
-        if file.is_row_major { column + columns * row } else { row + rows * column }
+        // Where the first axis is that of the columns its neighbors are those of a row.
+        if file.is_row_major != is_turned { column + columns * row } else { row + rows * column }
     };
     let others: Vec<String> =
         file.listed.iter().map(|own| own.name.clone()).filter(|own| *own != chosen.name).collect();
@@ -90,6 +98,7 @@ pub(in super::super) fn read_plane(path: &Path, told: Option<&str>) -> Result<No
         values: Array2::from_shape_fn((rows, columns), |place| packing.unpacked(numbers.at(at(place))) as f32),
         top: (numbers.is_integer && !packing.is_packed()).then(|| numbers.top()),
         unit_m,
+        words: words.to_owned(),
     };
     Ok(Noted::new(plane, notes))
 }

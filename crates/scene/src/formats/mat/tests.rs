@@ -271,3 +271,79 @@ fn a_variable_that_fills_the_memory_is_refused() {
     let message = read_iset_mat(&path).unwrap_err().to_string();
     assert!(message.contains("large.mat: it would take 6.0 GiB of memory"), "{message}");
 }
+
+/// Writes an array of three axes as netCDF has it: its dimensions by their numbers, each with its name and length.
+fn netcdf(path: &Path, dimensions: [(&str, usize); 3], values: &[f64]) {
+    use hdf5_pure::AttrValue;
+    let mut file = hdf5_pure::FileBuilder::new();
+    // Their numbers are not in the order of the axes.
+    for (place, (name, length)) in dimensions.iter().enumerate() {
+        let is_bare = *name != "wavelength";
+        let data: Vec<f64> = (0..*length).map(|i| if is_bare { 0.0 } else { 450.0 + 50.0 * i as f64 }).collect();
+        let scale = file.create_dataset(name).with_data(&data).with_shape(&[*length as u64]);
+        let own = if is_bare {
+            format!("This is a netCDF dimension but not a netCDF variable.{length:10}")
+        } else {
+            (*name).to_owned()
+        };
+        scale.set_attr("CLASS", AttrValue::AsciiString("DIMENSION_SCALE".to_owned()));
+        scale.set_attr("NAME", AttrValue::AsciiString(own));
+        scale.set_attr("_Netcdf4Dimid", AttrValue::I32(2 - place as i32));
+    }
+    let shape = dimensions.map(|(_, length)| length as u64);
+    let cube = file.create_dataset("r").with_data(values).with_shape(&shape);
+    cube.set_attr("_Netcdf4Coordinates", AttrValue::I32Array(vec![2, 1, 0]));
+    fs::write(path, file.finish().unwrap()).unwrap();
+}
+
+#[test]
+fn dimensions_of_netcdf_say_which_axis_is_which() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.nc");
+    let reading = FileReading { quantity: Some(crate::FileQuantity::Reflectance), ..FileReading::default() };
+    // Row, column and band in the digits of a number; also where all sides are alike.
+    for (n_rows, n_columns) in [(2, 3), (4, 4)] {
+        let length = |name: &str| match name {
+            "y" => n_rows,
+            "x" => n_columns,
+            _ => 4,
+        };
+        for names in
+            [["x", "y", "wavelength"], ["wavelength", "y", "x"], ["y", "x", "wavelength"], ["y", "wavelength", "x"]]
+        {
+            let [a, b, c] = names.map(length);
+            let value = |index: usize| {
+                let place = [index / (b * c), index / c % b, index % c];
+                let at = |name: &str| place[names.iter().position(|own| *own == name).unwrap()] as f64;
+                at("y") / 10.0 + at("x") / 100.0 + at("wavelength") / 1000.0
+            };
+            let values: Vec<f64> = (0..a * b * c).map(value).collect();
+            netcdf(&path, names.map(|name| (name, length(name))), &values);
+            let Ok(MatScene::Cube(cube)) = read_mat(&path, &reading) else { panic!("a cube") };
+            assert_eq!((cube.planes.len(), cube.planes[0].dim()), (4, (n_rows, n_columns)), "{names:?}");
+            assert_relative_eq!(cube.planes[3][(1, 2)], 0.123, epsilon = 1e-6);
+            assert_eq!(cube.notes, [""; 0]);
+        }
+    }
+    // A depth of columns and rows.
+    let mut file = hdf5_pure::FileBuilder::new();
+    let depth = file.create_dataset("depth").with_data(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]).with_shape(&[3, 2]);
+    depth.set_attr(
+        "DIMENSION_LABELS",
+        hdf5_pure::AttrValue::VarLenStringArray(vec!["lon".to_owned(), "lat".to_owned()]),
+    );
+    fs::write(&path, file.finish().unwrap()).unwrap();
+    let plane = read_plane(&path, None).unwrap().of_own_file().values;
+    assert_eq!(plane, ndarray::arr2(&[[1.0, 3.0, 5.0], [2.0, 4.0, 6.0]]));
+}
+
+#[test]
+fn true_is_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.mat");
+    let waves = fixtures::variable_of("wave", &[2, 1], 6, &[450.0, 550.0]);
+    let cube = fixtures::variable_of("cube", &[2, 3, 2], fixtures::LOGICAL_BYTES, &[1.0; 12]);
+    fs::write(&path, fixtures::mat_file(&[cube, waves])).unwrap();
+    let Ok(MatScene::Cube(cube)) = read_mat(&path, &FileReading::default()) else { panic!("a cube") };
+    assert_eq!((cube.top, cube.planes[1][(1, 2)]), (Some(1.0), 1.0));
+}
