@@ -1,12 +1,11 @@
 //! The numbers of files of depth, whatever they count.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use ndarray::Array2;
 
 use super::{
     contents::{MATLAB_OR_HDF5, is_of},
-    envi::header_of,
     exr_depth_file::{DepthChannel, read_depth_exr},
     gray_picture::read_gray,
     length_unit::length_in_name,
@@ -125,7 +124,16 @@ fn is_no_length(words: &str) -> bool {
 /// Whether a file is the header of an ENVI cube, or has one.
 fn is_envi(path: &Path, ending: &str) -> bool {
     let is_picture = ["png", "jpg", "jpeg", "tif", "tiff", "webp", "bmp", "ppm", "pgm", "pnm"].contains(&ending);
-    if ending == "hdr" { starts_with(path, b"ENVI").unwrap_or(false) } else { !is_picture && header_of(path).is_some() }
+    let is_header = |header: &Path| starts_with(header, b"ENVI").unwrap_or(false);
+    let appended = || {
+        let mut name = path.as_os_str().to_owned();
+        name.push(".hdr");
+        PathBuf::from(name)
+    };
+    match ending {
+        "hdr" => is_header(path),
+        _ => !is_picture && (is_header(&path.with_extension("hdr")) || is_header(&appended())),
+    }
 }
 
 /// Returns an array of rows and columns, whatever its sides of 1.
