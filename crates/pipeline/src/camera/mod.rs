@@ -92,7 +92,7 @@ pub struct Camera {
     #[serde(default)]
     pub diffraction: Diffraction,
     /// A file of point spread functions (`.npz`) in place of those of the lens and of its diffraction; the lens still says where points lie on the
-    /// film, how bright they are and which depth is in focus.
+    /// film and how bright they are. The blur is that of the file at every focus and f-number.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "schema", schemars(extend("default" = null)))]
     pub psfs: Option<PathBuf>,

@@ -96,6 +96,10 @@ impl Capture {
         let Some(psfs) = &self.lens.psfs else { return vec![] };
         let (Self { scene, place, lens, .. }, parts) = (self, psfs.array.parts());
         let mut notes = psfs.notes.clone();
+        notes.push(
+            "psfs: blur is that of the file at every focus and f-number, which place and light the picture alone"
+                .to_owned(),
+        );
         let name = lens.lens.name();
         let finest_um = parts.pitch_um.iter().copied().fold(f64::INFINITY, f64::min);
         let pixel_um = place.pixel_pitch_um();
