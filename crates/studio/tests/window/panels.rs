@@ -39,6 +39,7 @@ const PANELS: &[(&str, &[&str])] = &[
     ("index slope", &["LensReadOptions.slope_per_nm"]),
     ("lens scale", &["LensReadOptions.lens_scale"]),
     ("coating", &["LensReadOptions.coating"]),
+    ("PSF file", &["Camera.psfs"]),
     ("coating file", &["CoatingSpec.File"]),
     ("seq numbers", &["LensReadOptions.seq_numbers"]),
     ("stop", &["Camera.stop"]),
@@ -317,7 +318,7 @@ fn everything(camera: &mut Camera) {
     camera.stop = StopSpec::DiameterMm(8.0);
     camera.frames = FramesSpec::MovingBurst { frames: 2, motion_px: 1.0 };
     let scene = &mut camera.scene;
-    (scene.depth_m, scene.field_of_view_deg) = (Some(2.0), Some(36.0));
+    scene.field_of_view_deg = Some(36.0);
     (scene.illuminance_lux, scene.mean_luminance_cd_m2) = (Some(100.0), Some(10.0));
     let processing = &mut camera.processing;
     (processing.denoise, processing.defect_threshold) = (Some(0.5), Some(0.2));

@@ -1,6 +1,6 @@
 //! The lens: which, how far open, focused where, turned and moved how.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use dioptric_optics::Lens;
 use dioptric_pipeline::{
@@ -22,6 +22,7 @@ pub(super) fn show(ui: &mut Ui, camera: &mut Camera, desk: &Desk<'_>) {
         focus_plane::show(ui, camera, product, desk.stamp);
     }
     surfaces::show(ui, camera, desk);
+    psf_file(ui, camera);
     stop(ui, camera, desk);
     desk.tell(ui, Field::Stop, camera);
     focus(ui, camera, desk);
@@ -64,6 +65,16 @@ fn which(ui: &mut Ui, camera: &mut Camera, desk: &Desk<'_>) {
             millimetres("diameter", "Diameter of the hole", 0.01..=5.0).show(ui, diameter_mm);
         }
         LensSpec::BuiltIn(_) | LensSpec::File(_) | LensSpec::Changed { .. } => {}
+    }
+}
+
+/// A file of point spread functions in place of those of the lens.
+fn psf_file(ui: &mut Ui, camera: &mut Camera) {
+    let now = camera.psfs.as_deref().unwrap_or(Path::new("")).display().to_string();
+    let words = "A file (.npz) of point spread functions that blur in place of those of the lens, at every focus and \
+                 f-number; empty for the lens's own";
+    if let Some(typed) = text(ui, "PSF file", words, &now) {
+        camera.psfs = (!typed.is_empty()).then(|| PathBuf::from(typed));
     }
 }
 

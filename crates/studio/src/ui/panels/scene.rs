@@ -106,7 +106,8 @@ fn more(ui: &mut Ui, scene: &mut SceneSpec) {
     optional(ui, lux, &mut scene.mean_lux, 10.0);
     let mut is_flat = scene.flat.is_some();
     let words = "A flat scene stated by its size, in place of field of view and depth: slides, documents, wafers";
-    if tick(ui, "flat, by its size", words, &mut is_flat) {
+    let has_own_depths = matches!(scene.source, SceneSource::StillLife { .. });
+    if !has_own_depths && tick(ui, "flat, by its size", words, &mut is_flat) {
         scene.flat = is_flat.then_some(FlatSize { width_mm: 300.0, distance_mm: 1000.0 });
         if is_flat {
             (scene.field_of_view_deg, scene.depth_m) = (None, None);
