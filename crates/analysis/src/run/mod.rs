@@ -145,7 +145,7 @@ pub struct IrradianceData {
 pub struct ReflectionData {
     /// What became of it.
     pub lens_reflections: LensReflections,
-    /// The share of all light on the film that it is, of all bands together; null where it is left out, or rays from the film brought it.
+    /// The share of all light on the film that it is, of all bands together; null where it is left out, rays from the film brought it, or an earlier run did some bands.
     pub share: Option<f64>,
     /// About what two surfaces reflect to the film over what the lens images there: for far points of equal brightness in three fields, at three wavelengths. Null where
     /// ghosts of the lens are not followed.

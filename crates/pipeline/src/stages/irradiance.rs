@@ -89,8 +89,8 @@ pub struct IrradianceSummary {
     pub narrow_surfaces: Option<NarrowSurfaces>,
     /// Of points beside the scene those that no pixel sees.
     pub unseen_points: Option<UnseenPoints>,
-    /// The share of the light that two surfaces of the lens reflected, where it was followed through the blur of a scene: of all bands that were
-    /// imaged together.
+    /// The share of the light that two surfaces of the lens reflected, where it was followed through the blur of a scene and all bands were
+    /// imaged by one run.
     pub ghost_share: Option<f64>,
 }
 
@@ -470,7 +470,8 @@ pub(super) fn image(
     });
     watch.cancel.check()?;
     streamed?;
-    summing.summary.ghost_share = (all > 0.0).then(|| reflected / all);
+    // Bands of an earlier run do not tell their part.
+    summing.summary.ghost_share = (first == 0 && all > 0.0).then(|| reflected / all);
     let times = plan.times().since(&earlier);
     if times != ImagingTimes::default() {
         watch.progress.imaged(&times);
