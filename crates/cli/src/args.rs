@@ -15,6 +15,7 @@ use crate::{
     filter::FilterCommand,
     lens_args::{BandArgs, FilmArgs, GlassCommand, LensArgs, LensCommand, LensFilmArgs, LensStateArgs},
     measure_args::MeasureCommand,
+    paintings::CacheCommand,
     picture_args::PictureArgs,
     ranges,
     render_args::{CompareArgs, LightFieldArgs, RenderArgs, WorldCommand},
@@ -132,6 +133,9 @@ pub(crate) enum Command {
     Measure(MeasureCommand),
     /// Opens the window in which anything of a camera is changed and its picture seen at once: the program dioptric-studio
     Studio(StudioArgs),
+    /// Says what is kept from run to run, and removes it
+    #[command(subcommand)]
+    Cache(CacheCommand),
     /// Prints what completes these words in a shell: bash, elvish, fish, powershell or zsh
     Completions {
         /// The shell

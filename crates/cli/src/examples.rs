@@ -50,6 +50,8 @@ const EXAMPLES: &[(&str, &[&str])] = &[
     ("scene info", &["dioptric scene info cube.mat --axes yxb"]),
     ("scene convert", &["dioptric scene convert photo.png scene.exr --depth depth.png --depth-unit mm"]),
     ("world info", &["dioptric world info world.glb"]),
+    ("cache info", &["dioptric cache info"]),
+    ("cache clear", &["dioptric cache clear"]),
     ("compare", &["dioptric compare camera.ron --samples 64 --out both/"]),
     ("lightfield", &["dioptric lightfield camera.ron --refocus-m 0.5,1 --out light/"]),
     ("sense", &["dioptric sense irradiance.exr --sensor imx363 --exposure-s 0.01 --out shot/"]),

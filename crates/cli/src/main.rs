@@ -103,6 +103,7 @@ fn dispatch(Cli { command, common }: Cli) -> anyhow::Result<()> {
         Command::Sweep(arguments) => sweep::run(&arguments, &common),
         Command::Measure(command) => measure::run(&command, &common),
         Command::Studio(arguments) => studio::run(&arguments),
+        Command::Cache(command) => paintings::run(command, &common),
         Command::Completions { shell } => words::completions(shell),
         Command::Man { out } => words::manual(&out, &common),
     }

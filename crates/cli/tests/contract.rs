@@ -2,7 +2,7 @@
 
 mod common;
 
-use std::{fs, path::Path};
+use std::{fs, path::Path, process::Command};
 
 use common::{CAMERA, check_error, dioptric, output, read_picture};
 use serde_json::Value;
@@ -667,4 +667,23 @@ fn lens_ghosts_lists_what_pairs_of_surfaces_send() {
     assert!(text.contains("veil") && text.contains("45 pairs; the brightest"), "{text}");
     let none = json(folder.path(), &[&common[..], &["--coating", "ideal", "--json"]].concat());
     assert_eq!(none["pairs"], serde_json::json!([]));
+}
+
+#[test]
+fn what_is_kept_from_run_to_run_is_told_and_removed() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, bytes) in [("view-9x9-a.exr", 1000), ("view-9x9-b.exr", 24), ("mine.txt", 9)] {
+        fs::write(folder.path().join(name), vec![0; bytes]).unwrap();
+    }
+    let told = |command: &str| {
+        let mut program = Command::new(env!("CARGO_BIN_EXE_dioptric"));
+        let run = program.env("DIOPTRIC_CACHE", folder.path()).args(["cache", command, "--json"]).output().unwrap();
+        let kept: Value = serde_json::from_slice(&run.stdout).unwrap();
+        assert_eq!(kept["folder"], folder.path().to_str().unwrap());
+        (kept["views"].as_u64().unwrap(), kept["bytes"].as_u64().unwrap())
+    };
+    assert_eq!(["info", "clear", "info"].map(told), [(2, 1024), (2, 1024), (0, 0)]);
+    assert!(folder.path().join("mine.txt").exists());
+    // Here no folder is kept at all.
+    check_error(folder.path(), &["cache", "info"], &["DIOPTRIC_CACHE", "nothing is kept"]);
 }

@@ -2,7 +2,7 @@
 
 use std::{
     cmp::Reverse,
-    env, fs,
+    env, fs, io,
     path::{Path, PathBuf},
     time::{SystemTime, UNIX_EPOCH},
 };
@@ -17,7 +17,7 @@ use crate::PipelineError;
 /// Pixels of the smallest view that is worth a file: it takes a second to gather.
 const LEAST_PIXELS: usize = 100_000;
 
-/// Bytes of all views together; the oldest give way.
+/// Bytes of all views together; those that were not used for longest give way.
 const MOST_BYTES: u64 = 1 << 30;
 
 /// Names the user's folder; nothing is kept where it is empty.
@@ -69,6 +69,34 @@ impl PaintingFolder {
         Self { path: path.into(), build: build.into() }
     }
 
+    /// Returns where the folder is.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Returns how many views of any build are kept, and their bytes.
+    pub fn kept(&self) -> (usize, u64) {
+        let views = views(&self.path);
+        (views.len(), views.iter().map(|view| view.bytes).sum())
+    }
+
+    /// Removes the views of all builds, and nothing else; returns how many there were, and their bytes.
+    ///
+    /// # Errors
+    ///
+    /// When a file of a view cannot be removed.
+    pub fn clear(&self) -> io::Result<(usize, u64)> {
+        let kept = self.kept();
+        for view in views(&self.path) {
+            match fs::remove_file(view.file) {
+                // Another program has removed it.
+                Err(error) if error.kind() == io::ErrorKind::NotFound => {}
+                removed => removed?,
+            }
+        }
+        Ok(kept)
+    }
+
     /// Returns a view, made now where there is no file of it.
     pub(crate) fn view(
         &self,
@@ -80,6 +108,7 @@ impl PaintingFolder {
         }
         let file = self.file(key);
         if let Some(seen) = restored(&file, key) {
+            note_use(&file);
             return Ok(seen);
         }
         let seen = make()?;
@@ -104,7 +133,7 @@ impl PaintingFolder {
         self.path.join(format!("{PREFIX}{}x{}-{}.exr", key.columns, key.rows, &hash[..16]))
     }
 
-    /// Writes a view, and removes the oldest of too many.
+    /// Writes a view, and removes what was not used for longest of too many.
     fn keep(&self, file: &Path, seen: &GatheredView) {
         // Quick to read again.
         let samples = ExrSamples::Uncompressed;
@@ -112,7 +141,7 @@ impl PaintingFolder {
         let is_written =
             fs::create_dir_all(&self.path).is_ok() && write_spectral_exr(file, &seen.radiance, &parts).is_ok();
         if is_written {
-            remove_oldest(&self.path, MOST_BYTES);
+            remove_least_used(&self.path, MOST_BYTES);
         }
     }
 }
@@ -139,31 +168,53 @@ fn restored(file: &Path, key: &ViewKey) -> Option<GatheredView> {
         .then_some(GatheredView { radiance, depth })
 }
 
-/// Removes the oldest views of a folder until the rest takes at most so many bytes.
-fn remove_oldest(folder: &Path, most_bytes: u64) {
-    let Ok(entries) = fs::read_dir(folder) else { return };
-    let mut views: Vec<(SystemTime, u64, PathBuf)> = entries
+/// Dates a view's file by its last use.
+fn note_use(file: &Path) {
+    let file = fs::File::options().append(true).open(file);
+    // A folder that may only be read is used all the same.
+    drop(file.and_then(|file| file.set_modified(SystemTime::now())));
+}
+
+/// The file of a view.
+struct ViewFile {
+    used: SystemTime,
+    bytes: u64,
+    file: PathBuf,
+}
+
+/// Returns the views of a folder, the last used first.
+fn views(folder: &Path) -> Vec<ViewFile> {
+    let Ok(entries) = fs::read_dir(folder) else { return vec![] };
+    let mut views: Vec<ViewFile> = entries
         .filter_map(Result::ok)
         .filter(|entry| entry.file_name().to_string_lossy().starts_with(PREFIX))
         .filter_map(|entry| {
             let metadata = entry.metadata().ok()?;
-            Some((metadata.modified().ok()?, metadata.len(), entry.path()))
+            Some(ViewFile { used: metadata.modified().ok()?, bytes: metadata.len(), file: entry.path() })
         })
         .collect();
-    views.sort_by_key(|(at, ..)| Reverse(*at));
+    views.sort_by_key(|view| Reverse(view.used));
+    views
+}
+
+/// Removes the views of a folder that were not used for longest until the rest takes at most so many bytes.
+fn remove_least_used(folder: &Path, most_bytes: u64) {
     let mut bytes = 0;
-    for (_, len, path) in views {
-        bytes += len;
+    for view in views(folder) {
+        bytes += view.bytes;
         if bytes > most_bytes {
             // Another program may have removed it.
-            drop(fs::remove_file(path));
+            drop(fs::remove_file(view.file));
         }
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use std::sync::atomic::{AtomicUsize, Ordering};
+    use std::{
+        collections::BTreeSet,
+        sync::atomic::{AtomicUsize, Ordering},
+    };
 
     use dioptric_spectrum::DepthMap;
     use ndarray::Array2;
@@ -215,17 +266,24 @@ mod tests {
     }
 
     #[test]
-    fn oldest_views_give_way() {
+    fn views_not_used_for_longest_give_way() {
         let folder = tempfile::tempdir().unwrap();
-        for (age_s, name) in [(30, "view-a.exr"), (20, "view-b.exr"), (10, "view-c.exr"), (40, "notes.txt")] {
+        for (age_s, name) in [(40, "view-a.exr"), (30, "view-b.exr"), (20, "view-c.exr"), (50, "notes.txt")] {
             let path = folder.path().join(name);
             fs::write(&path, vec![0; 100]).unwrap();
             let at = SystemTime::UNIX_EPOCH + std::time::Duration::from_secs(1_000_000 - age_s);
             fs::File::options().append(true).open(&path).unwrap().set_modified(at).unwrap();
         }
-        remove_oldest(folder.path(), 250);
-        let mut left: Vec<_> = fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().file_name()).collect();
-        left.sort();
-        assert_eq!(left, ["notes.txt", "view-b.exr", "view-c.exr"]);
+        let left = || {
+            let names = fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().file_name());
+            BTreeSet::from_iter(names.map(|name| name.into_string().unwrap()))
+        };
+        // The first made is used again.
+        note_use(&folder.path().join("view-a.exr"));
+        remove_least_used(folder.path(), 250);
+        assert_eq!(left(), ["notes.txt", "view-a.exr", "view-c.exr"].map(str::to_owned).into());
+        let views = PaintingFolder::new(folder.path(), "any build");
+        assert_eq!((views.kept(), views.clear().unwrap(), views.kept()), ((2, 200), (2, 200), (0, 0)));
+        assert_eq!(left(), ["notes.txt".to_owned()].into());
     }
 }
