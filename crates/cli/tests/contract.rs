@@ -593,7 +593,7 @@ fn plane_mirror_asks_for_the_film() {
     assert!((psf[0]["rms_radius_um"].as_f64().unwrap() / expected_um - 1.0).abs() < 1e-3, "{psf}");
 }
 
-/// What lands far from a point is spread as by a round pupil, which a pupil with an obscuration is not.
+/// What edges beside the stop bend far from a point is spread as by a round pupil; at the stop they throw spikes.
 #[test]
 fn round_halos_of_other_pupils_are_stated() {
     let folder = tempfile::tempdir().unwrap();
@@ -605,8 +605,10 @@ fn round_halos_of_other_pupils_are_stated() {
         )
     };
     fs::write(folder.path().join("open.ron"), lens("")).unwrap();
-    let obscured = lens("(surface: 0, outline: Circle(radius_mm: 2.0), is_obscuration: true)");
-    fs::write(folder.path().join("obscured.ron"), obscured).unwrap();
+    for (name, surface) in [("at_stop.ron", 0), ("obscured.ron", 1)] {
+        let obscured = lens(&format!("(surface: {surface}, outline: Circle(radius_mm: 2.0), is_obscuration: true)"));
+        fs::write(folder.path().join(name), obscured).unwrap();
+    }
     fs::write(folder.path().join("camera.ron"), common::CAMERA).unwrap();
     let is_noted = |file: &str, options: &[&str]| {
         let run = ["run", "camera.ron", "--lens", file, "--quality", "sketch", "--out", "run"];
@@ -616,7 +618,11 @@ fn round_halos_of_other_pupils_are_stated() {
         notes.contains("is spread evenly around it: spikes end there")
     };
     assert!(is_noted("obscured.ron", &[]));
-    assert!(!is_noted("open.ron", &[]) && !is_noted("obscured.ron", &["--diffraction", "none"]));
+    assert!(
+        !is_noted("open.ron", &[])
+            && !is_noted("at_stop.ron", &[])
+            && !is_noted("obscured.ron", &["--diffraction", "none"])
+    );
 }
 
 #[test]

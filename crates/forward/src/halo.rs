@@ -23,19 +23,21 @@ const PASSES_OVER: [f64; 2] = [3.0, 4.5];
 /// Distance at which the halo begins on the first raster, in its pixels, or more; where that is less than on the film's own, that is the first.
 const FIRST: f64 = 1.25;
 /// Points along each side of a pixel at which the halo is looked up.
-const POINTS: usize = 8;
+pub(crate) const POINTS: usize = 8;
 /// Pixels beside the middle that the halo of one raster reaches.
 const REACH: usize = 5;
 
 /// What lies beyond the windows of kernels in a band.
 #[derive(Clone, Copy, Debug, Default)]
-struct Beyond {
+pub(crate) struct Beyond {
     /// Share of the light.
-    share: f64,
+    pub(crate) share: f64,
     /// The radii between which the samples of the window fade out, pixels.
     fade_px: [f64; 2],
     /// The part of the share that falls faster than what edges bend.
     steep: f64,
+    /// λN, pixels.
+    pub(crate) lambda_n_px: f64,
 }
 
 impl Beyond {
@@ -49,13 +51,24 @@ impl Beyond {
         let kernel = lens.kernel(query);
         if kernel.lambda_n_px == 0.0 {
             // It holds all that there is, whatever it is scaled by.
-            return Self { share: 0.0, fade_px: [factor; 2], steep: 0.0 };
+            return Self { fade_px: [factor; 2], ..Self::default() };
         }
         let fade_px = kernel.fade_px().map(|px| px.max(LEAST_RADIUS));
         let share = 1.0 - kernel.kept_share;
         // An edge bends 2 / π² λN over its radius beyond a circle.
         let bent = 2.0 / (PI * PI) * kernel.lambda_n_px * Fade(fade_px).inverse();
-        Self { share, fade_px: fade_px.map(|px| factor * px), steep: (1.0 - bent / share).clamp(0.0, 1.0) }
+        Self {
+            share,
+            fade_px: fade_px.map(|px| factor * px),
+            steep: (1.0 - bent / share).clamp(0.0, 1.0),
+            lambda_n_px: factor * kernel.lambda_n_px,
+        }
+    }
+
+    /// Returns a share of the light that begins at a distance, pixels, all of it bent by edges.
+    #[cfg(test)]
+    pub(crate) fn from_step(share: f64, start_px: f64, lambda_n_px: f64) -> Self {
+        Self { share, fade_px: [start_px; 2], steep: 0.0, lambda_n_px }
     }
 
     /// Returns what lies beyond between two bands: share times distance, which stands for the halo far out, and the window are linear there.
@@ -64,7 +77,18 @@ impl Beyond {
         let fade_px = [0, 1].map(|end| mix(below.fade_px[end], above.fade_px[end]));
         let far = |beyond: &Self| beyond.share / Fade(beyond.fade_px).inverse();
         let share = mix(far(&below), far(&above)) * Fade(fade_px).inverse();
-        Self { share, fade_px, steep: mix(below.steep, above.steep) }
+        let (steep, lambda_n_px) = (mix(below.steep, above.steep), mix(below.lambda_n_px, above.lambda_n_px));
+        Self { share, fade_px, steep, lambda_n_px }
+    }
+
+    /// Returns the light of a point of light 1 that lies at a distance from it, for a pixel of the film, were the pupil round and nothing else seen.
+    pub(crate) fn density(&self) -> impl Fn(f64) -> f64 + use<> {
+        let (fade, steep) = (Fade(self.fade_px), self.steep);
+        let (bent, steep) = ((1.0 - steep) / (2.0 * PI * fade.inverse()), steep / (2.0 * PI * fade.inverse_cube()));
+        move |r: f64| {
+            let part = fade.at(r);
+            if part > 0.0 { part * (bent * r.powi(-3) + steep * r.powi(-5)) } else { 0.0 }
+        }
     }
 }
 
@@ -134,6 +158,11 @@ impl Halos {
         self.of_bands.iter().any(Option::is_some)
     }
 
+    /// Returns what lies beyond the windows of a band, if any does.
+    pub(crate) fn beyond(&self, band: usize) -> Option<&Beyond> {
+        self.of_bands.get(band)?.as_ref().map(|halo| &halo.beyond)
+    }
+
     /// Returns the picture of a band with the halos of its points and of what lies around it, if any light lies beyond its windows.
     pub(crate) fn applied(
         &self,
@@ -153,8 +182,7 @@ impl Halos {
 /// The halo around each point of a band: parts of it on rasters of pixels 2, 4, 8 … times as wide as the film's, of sum 1.
 #[derive(Debug)]
 struct Halo {
-    /// The share of the light of a point that lies in it.
-    share: f32,
+    beyond: Beyond,
     /// How many times pixels are doubled before the first raster.
     n_doublings: usize,
     rasters: Vec<RasterPart>,
@@ -170,7 +198,7 @@ impl Halo {
         let n_rasters = f64::hypot(rows as f64, columns as f64).log2().ceil().max(0.0) as usize + 1;
         let part = |doublings: usize| RasterPart::new(beyond, doublings, doublings == n_doublings);
         let rasters = (n_doublings..n_rasters.max(n_doublings + 1)).map(part).collect();
-        Self { share: beyond.share as f32, n_doublings, rasters }
+        Self { beyond, n_doublings, rasters }
     }
 
     /// Takes from each pixel of a picture what its halo takes to others, and adds that to them.
@@ -180,13 +208,13 @@ impl Halo {
     /// What lies less than `beside` pixels from its edges is not wanted.
     fn applied(&self, mut picture: Array2<f32>, beside: usize) -> Array2<f32> {
         let (brought, landing) = (self.of(&picture), self.of_ones(picture.dim(), beside));
-        let columns = picture.ncols();
+        let (columns, share) = (picture.ncols(), self.beyond.share as f32);
         for (row, mut line) in picture.rows_mut().into_iter().enumerate() {
             let came = self.on_film(&brought, row, columns);
             let went = self.on_film(&landing, row, columns);
             for ((light, came), went) in line.iter_mut().zip(came).zip(went) {
                 // Where rasters are sharpened to make up for their blur, next to a bright point, less than nothing may come.
-                *light = (*light + self.share * (came - *light * went)).max(0.0);
+                *light = (*light + share * (came - *light * went)).max(0.0);
             }
         }
         picture
@@ -256,16 +284,10 @@ fn on_rasters(picture: &Array2<f32>, rasters: &[RasterPart]) -> Array2<f32> {
 
 impl RasterPart {
     /// Returns the part of the halo beyond a window on pixels that are doubled so many times.
-    fn new(Beyond { fade_px, steep, .. }: Beyond, doublings: usize, is_first: bool) -> Self {
+    fn new(beyond: Beyond, doublings: usize, is_first: bool) -> Self {
         let pixel = (doublings as f64).exp2();
         // Of sum 1.
-        let fade = Fade(fade_px);
-        let (bent, steep) = ((1.0 - steep) / (2.0 * PI * fade.inverse()), steep / (2.0 * PI * fade.inverse_cube()));
-        let density = |x: f64, y: f64| {
-            let r = x.hypot(y);
-            let part = fade.at(r);
-            if part > 0.0 { part * (bent * r.powi(-3) + steep * r.powi(-5)) } else { 0.0 }
-        };
+        let density = beyond.density();
         let passed = |r_pixels: f64| {
             let [start, end] = PASSES_OVER;
             ((r_pixels - start) / (end - start)).clamp(0.0, 1.0)
@@ -274,7 +296,7 @@ impl RasterPart {
         let at = |pixel_at: usize, point: usize| pixel_at as f64 + (point as f64 + 0.5) / POINTS as f64 - 0.5;
         let energy = |right: usize, down: usize| {
             let points = (0..POINTS * POINTS).map(|i| (at(right, i % POINTS).abs(), at(down, i / POINTS).abs()));
-            let energies = points.map(|(x, y)| share(x.hypot(y)) * density(pixel * x, pixel * y));
+            let energies = points.map(|(x, y)| share(x.hypot(y)) * density(pixel * x.hypot(y)));
             energies.sum::<f64>() * (pixel / POINTS as f64).powi(2)
         };
         let raw: [[f64; REACH + 2]; REACH + 2] =
@@ -400,7 +422,7 @@ mod tests {
     use super::*;
 
     fn halo(half_px: f64, share: f64, size: (usize, usize)) -> Halo {
-        Halo::new(Beyond { share, fade_px: [half_px; 2], steep: 0.0 }, size)
+        Halo::new(Beyond::from_step(share, half_px, 0.0), size)
     }
 
     #[test]

@@ -45,6 +45,7 @@ mod scene_layers;
 mod sight;
 mod source;
 mod spec;
+mod stars;
 mod stopwatch;
 mod surface;
 mod surroundings;

@@ -77,7 +77,7 @@ pub use rays::{Losses, RayBatch, RayFate, SurfaceLosses};
 pub use rays_f32::RayBatchF32;
 pub use reversed::ReversedLens;
 pub use seidel::{Seidel, SeidelSettings, SeidelSums};
-pub use stop_edges::{EdgeNearby, StopEdges};
+pub use stop_edges::{EdgeNearby, EdgePiece, StopEdges};
 pub use surface::{Interface, Shape, Surface};
 pub use trace::Vignetting;
 pub use transmission::{RayLight, RayLightF32};

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use dioptric_optics::EdgePiece;
 use glam::DVec2;
 
 use crate::{FilmMap, Kernel, PsfError};
@@ -17,6 +18,15 @@ pub struct FilmQuery {
     pub wavelength_nm: f64,
     /// Side of a pixel of the kernel, µm.
     pub pitch_um: f64,
+}
+
+/// The edges of a pupil that is not round.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PupilEdges {
+    /// In the stop.
+    pub pieces: Vec<EdgePiece>,
+    /// Diameter of the circle of as much area, mm.
+    pub diameter_mm: f64,
 }
 
 /// The image that a lens forms, described from the film: where each point looks, how much light reaches it, and what it gathers.
@@ -47,6 +57,11 @@ pub trait LensImage: Sync {
     /// Returns the radius of what a point becomes, mm: of its blur, and of what aberrations and diffraction leave of it in focus.
     fn spread_mm(&self, place_mm: DVec2, dioptres: f64, wavelength_nm: f64) -> f64 {
         self.blur_radius_mm(place_mm, dioptres, wavelength_nm).abs()
+    }
+
+    /// Returns the edges that diffraction bends light about, along the axes of the picture; `None` where they are one circle, or nothing is bent.
+    fn pupil_edges(&self) -> Option<PupilEdges> {
+        None
     }
 
     /// Returns the images through so many parts of the pupil: their irradiances add up to that of the whole, and each has kernels of sum 1 about the

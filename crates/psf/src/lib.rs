@@ -51,7 +51,7 @@ pub use energy::EnclosedEnergy;
 pub use error::PsfError;
 pub use film_map::{FieldsAlong, FilmMap};
 pub use kernel::Kernel;
-pub use lens_image::{FilmQuery, LensImage};
+pub use lens_image::{FilmQuery, LensImage, PupilEdges};
 pub use metrics::{Picture, Profile};
 pub use model::LensImageModel;
 pub use point_image::PointImage;

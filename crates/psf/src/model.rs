@@ -6,7 +6,8 @@ use dioptric_optics::Lens;
 use glam::DVec2;
 
 use crate::{
-    FilmMap, FilmQuery, ImageSettings, Kernel, LensImage, PointImage, PsfArray, PsfError, PupilDivision,
+    Diffraction, FilmMap, FilmQuery, ImageSettings, Kernel, LensImage, PointImage, PsfArray, PsfError, PupilDivision,
+    PupilEdges,
     part_image::PartImage,
     stored::{StoredPoint, StoredPsfs},
     traced::Shared,
@@ -154,6 +155,15 @@ impl LensImage for LensImageModel {
             Some((stored, point)) => stored.spread_mm(&point),
             None => self.shared.spread_mm(place_mm, dioptres, wavelength_nm),
         }
+    }
+
+    fn pupil_edges(&self) -> Option<PupilEdges> {
+        if self.stored.is_some() || self.settings().diffraction == Diffraction::None {
+            return None;
+        }
+        let color = self.shared.color(*self.wavelengths_nm().first()?);
+        let pieces = color.lens.stop_edges()?.pieces();
+        Some(PupilEdges { pieces, diameter_mm: 2.0 * color.lens.stop_semi_aperture_mm() })
     }
 
     fn through_parts(&self, n_parts: usize) -> Result<Vec<Arc<dyn LensImage + Send>>, PsfError> {

@@ -194,13 +194,14 @@ impl RunOptics {
     }
 }
 
-/// States where diffraction is round, though the pupil is not: beyond kernels it is spread as that of a circle (docs/forward.md 2, "Halos").
+/// States where diffraction is round, though the pupil is not: edges beside the stop throw no spikes beyond kernels (docs/forward.md 2).
 fn note_on_round_halos(run: &Run<'_>) -> Option<String> {
     let (camera, lens) = (&run.capture.camera, &run.capture.lens.lens);
-    let has_halos = camera.diffraction != Diffraction::None && !lens.apertures().is_empty();
+    let beside_stop = lens.apertures().iter().any(|aperture| aperture.surface != lens.stop());
+    let has_halos = camera.diffraction != Diffraction::None && beside_stop;
     let name = lens.name();
     has_halos.then(|| {
-        format!("{name}: diffraction by its openings and obscurations that lands beyond some 12 λN of a point is spread evenly around it: spikes end there")
+        format!("{name}: diffraction by openings and obscurations beside its stop that lands beyond some 12 λN of a point is spread evenly around it: spikes end there")
     })
 }
 
