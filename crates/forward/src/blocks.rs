@@ -93,26 +93,25 @@ impl Blocks {
         let pixels = raster.level.pixels() as i64;
         // Samples of several pixels lie in several blocks.
         let margin = if pixels > 1 { (pixels + BLOCK - 1) / BLOCK } else { 0 };
-        let block_of = |px: f64| (px.floor() as i64).div_euclid(BLOCK);
-        let block_row = block_of(raster.down_px(row));
+        let (block_row, _) = raster.block(0, row);
         let (mut start, mut end, mut points) = (columns.end, columns.end, [1; 2]);
         let mut column = columns.start;
         while column < columns.end {
-            let block = block_of(raster.across_px(column));
-            // The first sample in the next block.
-            let next =
-                (raster.column_before((block + 1) as f64 * BLOCK as f64 - 1e-9) + 1).max(column + 1).min(columns.end);
+            let (block, next) = raster.block(1, column);
             let may_have = self.may_have(layer, (block_row, block), margin);
-            let here = self.points((block_row, block), raster.level);
-            match start < columns.end {
-                false if may_have => (start, points) = (column, here),
-                true if !may_have || here != points => {
+            if !may_have || start == columns.end {
+                if start < columns.end {
                     end = column;
                     break;
                 }
-                _ => {}
+                if may_have {
+                    (start, points) = (column, self.points((block_row, block), raster.level));
+                }
+            } else if self.points((block_row, block), raster.level) != points {
+                end = column;
+                break;
             }
-            column = next;
+            column = next.min(columns.end);
         }
         (start..end, points)
     }

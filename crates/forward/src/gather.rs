@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use crate::{
     Film,
-    convolve::{LANES, fast_size, multiply_by_real, with_fft},
+    convolve::{LANES, add_scaled, fast_size, multiply_by_real, with_fft},
     coverage::{Composite, Gathered},
     node_kernels::{LayerKernels, NodeKernel, edge_spread_peak},
     raster::{Level, Raster},
@@ -378,7 +378,7 @@ fn convolve(
 /// Whether sums take less time than transforms of rectangles of this size for so many sources.
 fn is_better_direct(kernels: &TileKernels, n_out: usize, n_sources: usize, (rows, columns): (usize, usize)) -> bool {
     // Products in a sum that take as long, measured on one core, as a value of a transform, beside what is in proportion to its logarithm.
-    const OF_VALUE: [f64; 2] = [28.0, 5.0];
+    const OF_VALUE: [f64; 2] = [64.0, 11.0];
     let n = (rows * columns) as f64;
     let transform = n * (OF_VALUE[0] + OF_VALUE[1] * n.log2());
     let n_terms = kernels.terms.len() as f64;
@@ -404,14 +404,15 @@ fn by_sums(kernels: &TileKernels, member: &Member, source: &Source, stride: usiz
     let mut out = vec![0.0; rows * columns];
     let (mut even, mut sloped) = (vec![0.0; height * width], vec![0.0; height * width]);
     let mut sums = vec![0.0; 2 * columns.next_multiple_of(LANES)];
+    // Turned about: what a kernel's first sample takes lies last.
+    let turned = kernels.terms.iter().map(|term| (term, term.samples.iter().rev().copied().collect()));
+    let turned: Vec<(&Term, Vec<f32>)> = turned.collect();
     for (row, out) in out.chunks_exact_mut(columns).enumerate() {
         even.fill(0.0);
         sloped.fill(0.0);
-        for term in &kernels.terms {
-            // Turned about: what a kernel's first sample takes lies last.
+        for (term, samples) in &turned {
             let into = if term.across { &mut sloped } else { &mut even };
-            let factor = term.factor(member.down[row], 1.0);
-            into.iter_mut().zip(term.samples.iter().rev()).for_each(|(sum, sample)| *sum += factor * sample);
+            add_scaled(into, term.factor(member.down[row], 1.0), samples);
         }
         let (of_even, of_sloped) = sums.split_at_mut(columns.next_multiple_of(LANES));
         gather_row(&lines, stride * row, &even, of_even);
@@ -438,22 +439,31 @@ struct Lines<'a> {
 /// Puts what a row of pixels gathers into `out`, from a row of the source on and by a kernel that is turned about.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2", "aarch64+neon"))]
 fn gather_row(lines: &Lines<'_>, first_row: usize, kernel: &[f32], out: &mut [f32]) {
-    let (_, width) = lines.size;
-    let line_len = lines.stride * lines.phase_len;
-    for (part, out) in out.as_chunks_mut::<LANES>().0.iter_mut().enumerate() {
-        let mut sums = [0.0_f32; LANES];
-        let rows = lines.phases[first_row * line_len..].chunks_exact(line_len).zip(kernel.chunks_exact(width));
-        for (line, kernel) in rows {
-            for (k, &weight) in kernel.iter().enumerate() {
-                let first = k % lines.stride * lines.phase_len + part * LANES + k / lines.stride;
-                let samples: &[f32; LANES] = line[first..first + LANES].try_into().expect("as many");
-                for i in 0..LANES {
+    // As many sums at once as hide how long one takes.
+    let (pairs, last) = out.as_chunks_mut::<{ 2 * LANES }>();
+    let n = pairs.len();
+    pairs.iter_mut().enumerate().for_each(|(i, out)| *out = gathered(lines, first_row, kernel, 2 * LANES * i));
+    last.as_chunks_mut::<LANES>().0.iter_mut().for_each(|out| *out = gathered(lines, first_row, kernel, 2 * LANES * n));
+}
+
+/// Returns what some pixels of a row gather, from one on.
+#[inline(always)]
+fn gathered<const N: usize>(lines: &Lines<'_>, first_row: usize, kernel: &[f32], first: usize) -> [f32; N] {
+    let Lines { phases, phase_len, stride, size: (_, width) } = *lines;
+    let line_len = stride * phase_len;
+    let mut sums = [0.0_f32; N];
+    for (line, kernel) in phases[first_row * line_len..].chunks_exact(line_len).zip(kernel.chunks_exact(width)) {
+        for phase in 0..stride.min(width) {
+            let line = &line[phase * phase_len + first..];
+            for (j, &weight) in kernel[phase..].iter().step_by(stride).enumerate() {
+                let samples: &[f32; N] = line[j..j + N].try_into().expect("as many");
+                for i in 0..N {
                     sums[i] += weight * samples[i];
                 }
             }
         }
-        *out = sums;
     }
+    sums
 }
 
 /// Gathers by transforms: two sources at a time, one as the real and one as the imaginary part of a block, which a real kernel leaves apart.

@@ -3,7 +3,7 @@
 //! A window holds all but a hundredth of the light of a point; the rest falls with the third power of the distance (`docs/forward.md`, 2). It is taken
 //! from the finished picture of a band and spread on pixels 2, 4, 8 … times as wide, the farther the wider.
 
-use std::{collections::BTreeMap, f64::consts::PI};
+use std::{collections::BTreeMap, f64::consts::PI, ops::Range};
 
 use dioptric_psf::{FilmQuery, Kernel, LensImage};
 use glam::DVec2;
@@ -207,9 +207,11 @@ impl Halo {
     ///
     /// What lies less than `beside` pixels from its edges is not wanted.
     fn applied(&self, mut picture: Array2<f32>, beside: usize) -> Array2<f32> {
-        let (brought, landing) = (self.of(&picture), self.of_ones(picture.dim(), beside));
-        let (columns, share) = (picture.ncols(), self.beyond.share as f32);
-        for (row, mut line) in picture.rows_mut().into_iter().enumerate() {
+        let (rows, columns) = picture.dim();
+        let wanted = beside..rows - beside;
+        let (brought, landing) = (self.of(&picture, &wanted), self.of_ones((rows, columns), beside));
+        let share = self.beyond.share as f32;
+        for (row, mut line) in picture.rows_mut().into_iter().enumerate().filter(|(row, _)| wanted.contains(row)) {
             let came = self.on_film(&brought, row, columns);
             let went = self.on_film(&landing, row, columns);
             for ((light, came), went) in line.iter_mut().zip(came).zip(went) {
@@ -233,7 +235,7 @@ impl Halo {
         let outer = (0..self.rasters.len()).find(|raster| reaches_edge(*raster)).unwrap_or(self.rasters.len() - 1);
         let [down, across] = &lines[self.n_doublings + outer];
         let ones = Array2::from_shape_fn((down.len(), across.len()), |(row, column)| down[row] * across[column]);
-        let mut landing = on_rasters(&ones, &self.rasters[outer..]);
+        let mut landing = on_rasters(&ones, &self.rasters[outer..], &(0..ones.nrows()));
         for doublings in (self.n_doublings.min(1)..self.n_doublings + outer).rev() {
             let [down, across] = &lines[doublings];
             landing = doubled(&landing, (down.len(), across.len()));
@@ -244,17 +246,17 @@ impl Halo {
         landing
     }
 
-    /// Returns what halos bring to each pixel of a picture, on its own or on pixels twice as wide: see [`on_film`](Self::on_film).
-    fn of(&self, picture: &Array2<f32>) -> Array2<f32> {
+    /// Returns what halos bring to the pixels of some rows of a picture, on its own or, to all, on pixels twice as wide: see [`on_film`](Self::on_film).
+    fn of(&self, picture: &Array2<f32>, wanted: &Range<usize>) -> Array2<f32> {
         match self.n_doublings {
-            0 => on_rasters(picture, &self.rasters),
+            0 => on_rasters(picture, &self.rasters, wanted),
             n => self.by_doublings(&halved(picture), n - 1),
         }
     }
 
     fn by_doublings(&self, picture: &Array2<f32>, n_doublings: usize) -> Array2<f32> {
         match n_doublings {
-            0 => on_rasters(picture, &self.rasters),
+            0 => on_rasters(picture, &self.rasters, &(0..picture.nrows())),
             n => doubled(&self.by_doublings(&halved(picture), n - 1), picture.dim()),
         }
     }
@@ -268,13 +270,14 @@ impl Halo {
     }
 }
 
-/// Returns what the parts of a halo on a raster and wider ones bring to each pixel of a picture on the first.
-fn on_rasters(picture: &Array2<f32>, rasters: &[RasterPart]) -> Array2<f32> {
+/// Returns what the parts of a halo on a raster and wider ones bring to each pixel of some rows of a picture on the first.
+fn on_rasters(picture: &Array2<f32>, rasters: &[RasterPart], wanted: &Range<usize>) -> Array2<f32> {
     let [part, wider @ ..] = rasters else { return Array2::zeros(picture.dim()) };
-    let mut brought = part.of(picture);
+    let mut brought = part.of(picture, wanted);
     if !wider.is_empty() {
-        let from_farther = on_rasters(&halved(picture), wider);
-        for (row, mut line) in brought.rows_mut().into_iter().enumerate() {
+        let means = halved(picture);
+        let from_farther = on_rasters(&means, wider, &(0..means.nrows()));
+        for (row, mut line) in brought.rows_mut().into_iter().enumerate().filter(|(row, _)| wanted.contains(row)) {
             let more = doubled_row(&from_farther, row, line.len());
             line.iter_mut().zip(more).for_each(|(sum, more)| *sum += more);
         }
@@ -322,8 +325,8 @@ impl RasterPart {
         self.0.iter().enumerate().map(|(down, energies)| times(down) * line(energies)).sum()
     }
 
-    /// Returns what it brings to each pixel of a picture.
-    fn of(&self, picture: &Array2<f32>) -> Array2<f32> {
+    /// Returns what it brings to each pixel of some rows of a picture.
+    fn of(&self, picture: &Array2<f32>, wanted: &Range<usize>) -> Array2<f32> {
         let (rows, columns) = picture.dim();
         let mut spread = vec![0.0; rows * columns];
         let line_at = |row: isize| {
@@ -331,7 +334,9 @@ impl RasterPart {
             row.and_then(|row| picture.as_slice().map(|values| &values[row * columns..][..columns]))
         };
         let mut padded = vec![0.0; columns + 2 * REACH];
-        for (row, sums) in (0..).zip(spread.chunks_exact_mut(columns)) {
+        for (row, sums) in
+            (0..).zip(spread.chunks_exact_mut(columns)).filter(|(row, _)| wanted.contains(&(*row as usize)))
+        {
             for (down, energies) in (0..).zip(&self.0) {
                 // Rows above and below have the same energies.
                 padded[REACH..][..columns].fill(0.0);

@@ -5,7 +5,7 @@ use std::{
     sync::{Arc, Mutex, MutexGuard, PoisonError},
 };
 
-use dioptric_psf::{FieldsAlong, FilmMap, LensImage};
+use dioptric_psf::{FieldsAlong, FilmMap, FilmQuery, Kernel, LensImage};
 use dioptric_spectrum::Cancelled;
 use glam::DVec2;
 use ndarray::Array2;
@@ -19,8 +19,9 @@ use crate::{
     halo::Halos,
     kept::Kept,
     lamps::{Lamp, without_lamps},
+    node_kernels::NodeKernel,
     places::SceneRaster,
-    points::{Beside, Drawing, Drawn, Point},
+    points::{Beside, Drawing, Drawn, Maps, Point},
     raster::{Level, Raster},
     rectangle::Rectangle,
     sampler::Sampler,
@@ -51,6 +52,9 @@ pub(crate) struct Imaging {
     blocks: Blocks,
     /// How far from the middle of the film light is taken from, mm.
     reach_mm: f64,
+    /// Of the middle of the bands at which kernels are computed.
+    middle_map: Arc<FilmMap>,
+    middle_nm: f64,
     visible: Option<Visible>,
     /// The points beside the scene; `None` where no film point looks.
     points: Vec<Option<Beside>>,
@@ -87,6 +91,7 @@ impl Imaging {
         let middle_nm = wavelengths_nm[middle];
         let wavelengths_nm = [wavelengths_nm[0], middle_nm, wavelengths_nm[grid.len() - 1]];
         let maps: Vec<Arc<FilmMap>> = wavelengths_nm.par_iter().map(|&nm| lens.film_map(nm, reach_mm)).collect();
+        let middle_map = maps[1].clone();
         let maps: Vec<&FilmMap> = maps.iter().map(Arc::as_ref).collect();
         let surfaces: Vec<&LayerCoordinates> =
             std::iter::once(&scene.coordinates).chain(scene.occluded.layer_coordinates()).collect();
@@ -116,6 +121,8 @@ impl Imaging {
             tiling,
             blocks,
             reach_mm,
+            middle_map,
+            middle_nm,
             visible,
             points,
             kept: Mutex::new(kept),
@@ -175,15 +182,33 @@ impl Imaging {
 
     /// Returns the kernels of a band, between the two bands around it at which they are computed.
     pub(crate) fn kernels(&self, lens: &dyn LensImage, band: usize, work: &Work<'_>) -> Result<BandKernels, Cancelled> {
-        let above = self.scene.kernel_bands.partition_point(|&knot| knot < band);
-        let upper = self.scene.kernel_bands[above];
-        if upper == band {
-            return self.computed_kernels(lens, band, work);
+        let (lower, upper, fraction) = about(&self.scene.kernel_bands, band);
+        let kernels = self.computed_kernels(lens, lower, work)?;
+        if upper == lower {
+            return Ok(kernels);
         }
-        let lower = self.scene.kernel_bands[above - 1];
-        let fraction = (band - lower) as f32 / (upper - lower) as f32;
-        let lower = self.computed_kernels(lens, lower, work)?;
-        Ok(lower.mixed(&self.computed_kernels(lens, upper, work)?, fraction))
+        Ok(kernels.mixed(&self.computed_kernels(lens, upper, work)?, fraction))
+    }
+
+    /// Returns the kernel of a point that shines in a band, likewise.
+    fn point_kernel(&self, lens: &dyn LensImage, band: usize, query: FilmQuery) -> NodeKernel {
+        let (lower, upper, fraction) = about(&self.scene.point_bands, band);
+        let computed = |band: usize| {
+            let FilmQuery { place_mm, dioptres, pitch_um, .. } = query;
+            let key = (band, [place_mm.x, place_mm.y, dioptres, pitch_um].map(f64::to_bits));
+            if let Some(kernel) = self.kept().of_points.get(&key) {
+                return kernel.clone();
+            }
+            let query = FilmQuery { wavelength_nm: self.spec.grid.centers_nm()[band], ..query };
+            // On cells so narrow samples are taken as they are.
+            let kernel = Arc::new(NodeKernel::new(&Kernel { excess_px2: [0.0; 2], ..lens.kernel(query) }));
+            self.kept().keep_of_point(key, &kernel);
+            kernel
+        };
+        if upper == lower {
+            return Arc::unwrap_or_clone(computed(lower));
+        }
+        NodeKernel::sum_of(&[(&computed(lower), 1.0 - fraction), (&computed(upper), fraction)])
     }
 
     /// Returns the kernels of a band at which they are computed, kept or new.
@@ -273,16 +298,13 @@ impl Imaging {
             let (occluded, lamps) = without_lamps(occluded, &is_behind);
             (Some(occluded), lamps)
         });
-        let film_map = (map.as_ref(), 1e-3 * self.spec.film.pitch_um);
-        let lamps = self.lamps_of(&lamps, (&self.scene.coordinates, true), film_map);
-        let lamps_behind = self
-            .scene
-            .occluded
-            .layer_coordinates()
-            .map(|behind| self.lamps_of(&lamps_behind, (behind, false), film_map));
+        let maps = Maps { of_band: &map, of_middle: &self.middle_map, pitch_mm: 1e-3 * self.spec.film.pitch_um };
+        let lamps = self.lamps_of(&lamps, (&self.scene.coordinates, true), &maps);
+        let lamps_behind =
+            self.scene.occluded.layer_coordinates().map(|behind| self.lamps_of(&lamps_behind, (behind, false), &maps));
         let lamps: Vec<Point> = lamps.into_iter().chain(lamps_behind.unwrap_or_default()).collect();
         let points = self.points.iter().zip(light.points);
-        let points: Vec<Point> = points.filter_map(|(point, light)| point.as_ref()?.lit(*light, film_map)).collect();
+        let points: Vec<Point> = points.filter_map(|(point, light)| point.as_ref()?.lit(*light, &maps)).collect();
         let ([star_lamps, lamps], [star_points, points]) =
             (self.with_stars(band, lamps), self.with_stars(band, points));
         let front = front.as_standard_layout();
@@ -308,10 +330,12 @@ impl Imaging {
             self.lay(&task, &tiles.groups, &mut picture)?;
             work.advance(tiles.groups.len() as u64 * GROUP_UNITS);
         }
+        let kernel = |query: FilmQuery| self.stopwatch.time(Part::Kernels, || self.point_kernel(lens, band, query));
         let drawing = Drawing {
             lens,
             film: &self.spec.film,
-            wavelength_nm: self.spec.grid.centers_nm()[band],
+            middle_nm: self.middle_nm,
+            kernel: &kernel,
             sight: self.visible.as_ref().map(Visible::sight),
         };
         let mut picture = picture.finish();
@@ -335,7 +359,7 @@ impl Imaging {
     /// Parts the brightest points of a band, which get stars where the pupil is not round, from the others.
     fn with_stars(&self, band: usize, points: Vec<Point>) -> [Vec<Point>; 2] {
         match self.directions.is_some() && self.halos.beyond(band).is_some() {
-            true => stars::brightest(points, &self.spec.film),
+            true => stars::brightest(&points, &self.spec.film),
             false => [vec![], points],
         }
     }
@@ -410,7 +434,7 @@ impl Imaging {
         &self,
         lamps: &[Lamp],
         (coordinates, is_first): (&LayerCoordinates, bool),
-        map: (&FilmMap, f64),
+        maps: &Maps<'_>,
     ) -> Vec<Point> {
         let columns = self.raster.columns;
         let of = |lamp: &Lamp| {
@@ -420,7 +444,7 @@ impl Imaging {
                 let coordinate = at(&self.scene.coordinates);
                 Before { coordinate, dioptres: self.scene.layers.layer_and_dioptres_at(coordinate).1 }
             });
-            Point::of_lamp(lamp, &self.raster, map, (depth, before))
+            Point::of_lamp(lamp, &self.raster, maps, (depth, before))
         };
         lamps.iter().filter_map(of).collect()
     }
@@ -460,6 +484,14 @@ fn sum_of(one: Option<Array2<f32>>, other: Option<Array2<f32>>) -> Option<Array2
         (Some(one), Some(other)) => Some(one + other),
         (one, other) => one.or(other),
     }
+}
+
+/// Returns those of some bands, the first and the last of all among them, about a band, and how far it lies from the first towards the second.
+fn about(bands: &[usize], band: usize) -> (usize, usize, f32) {
+    let above = bands.partition_point(|&knot| knot < band);
+    let upper = bands[above];
+    let lower = if upper == band { upper } else { bands[above - 1] };
+    (lower, upper, (band - lower) as f32 / (upper - lower).max(1) as f32)
 }
 
 /// Returns the first, the middle and the last of some bands.

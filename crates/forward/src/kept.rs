@@ -2,7 +2,7 @@
 
 use std::{collections::BTreeMap, sync::Arc};
 
-use crate::node_kernels::LayerKernels;
+use crate::node_kernels::{LayerKernels, NodeKernel};
 
 /// The kernels of a lens in one band, at the nodes of every depth layer.
 #[derive(Clone, Debug)]
@@ -28,12 +28,16 @@ impl BandKernels {
     }
 }
 
+/// A band, and what a kernel of a point that shines was asked for there: place, depth and pitch, to the bit.
+pub(crate) type PointKey = (usize, [u64; 4]);
+
 /// Kernels of the bands at which they are computed, as many as the budget allows.
 #[derive(Default)]
 pub(crate) struct Kept {
     pub(crate) budget_bytes: usize,
     pub(crate) size_bytes: usize,
     pub(crate) kernels: BTreeMap<usize, BandKernels>,
+    pub(crate) of_points: BTreeMap<PointKey, Arc<NodeKernel>>,
 }
 
 impl Kept {
@@ -49,6 +53,14 @@ impl Kept {
         if !self.kernels.contains_key(&band) && size_bytes <= self.budget_bytes {
             self.size_bytes = size_bytes;
             self.kernels.insert(band, kernels.clone());
+        }
+    }
+
+    /// Keeps the kernel of a point, if there is room for it.
+    pub(crate) fn keep_of_point(&mut self, key: PointKey, kernel: &Arc<NodeKernel>) {
+        let size_bytes = self.size_bytes + size_of_val(kernel.samples.as_slice());
+        if size_bytes <= self.budget_bytes && self.of_points.insert(key, kernel.clone()).is_none() {
+            self.size_bytes = size_bytes;
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use std::{borrow::Cow, collections::BTreeMap};
 
-use ndarray::Array2;
+use ndarray::{Array2, s};
 use rayon::prelude::*;
 
 /// A sample that shines: what it has above its surroundings is imaged as a point of its own.
@@ -51,16 +51,18 @@ pub(crate) fn without_lamps<'a>(
 ) -> (Cow<'a, Array2<f32>>, Vec<Lamp>) {
     let (rows, columns) = plane.dim();
     let (down, across) = (rows.div_ceil(SQUARE), columns.div_ceil(SQUARE));
+    let lines_of = |row: usize| row * SQUARE..((row + 1) * SQUARE).min(rows);
+    let places_of = |column: usize| column * SQUARE..((column + 1) * SQUARE).min(columns);
     let samples_of = |row: usize, column: usize| {
-        let rows = row * SQUARE..((row + 1) * SQUARE).min(rows);
-        let columns = column * SQUARE..((column + 1) * SQUARE).min(columns);
-        rows.flat_map(move |row| columns.clone().map(move |column| (row, column)))
+        lines_of(row).flat_map(move |row| places_of(column).map(move |column| (row, column)))
     };
     let sums_of = |square: usize| {
-        samples_of(square / across, square % across).fold(Sums::default(), |sums, at| {
-            let value = plane[at];
-            sums.with(&Sums { n: 1.0, sum: f64::from(value), most: value })
-        })
+        let samples = plane.slice(s![lines_of(square / across), places_of(square % across)]);
+        samples
+            .rows()
+            .into_iter()
+            .flatten()
+            .fold(Sums::default(), |sums, &value| sums.with(&Sums { n: 1.0, sum: f64::from(value), most: value }))
     };
     let squares: Vec<Sums> = (0..down * across).into_par_iter().map(sums_of).collect();
     let around = |row: usize, column: usize, sums: &dyn Fn(usize) -> Sums| {

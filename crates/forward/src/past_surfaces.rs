@@ -1,7 +1,7 @@
 //! What of its kernel a point that shines keeps past the edges of nearer surfaces.
 
 use crate::{
-    ray::Ray,
+    ray::{Lanes, RAYS, Rays},
     sight::{Before, Met, Sight, widest_px},
 };
 
@@ -47,24 +47,31 @@ impl OpenPupil {
         let before_px = point.before.as_ref().map_or(0.0, |before| sight.radius_px_of(before.dioptres, pixel));
         let place = |number: usize, within: f32| (number as f32 + 0.5 + within) * (2.0 / side as f32) - 1.0;
         let (mut seen, mut all) = (Vec::with_capacity(side * side), Vec::with_capacity(side * side));
-        for square in 0..side * side {
-            // All over its square and over a wide point: rays in rows and columns would meet an edge along them all at once (Roberts's sequences in four dimensions).
-            let within = [0.856_674_9, 0.733_891_8, 0.628_706_7, 0.538_597_2];
-            let within = within.map(|step: f64| (square as f64 * step).fract() as f32 - 0.5);
-            let (down, across) = (place(square / side, within[0]), place(square % side, within[1]));
-            // Beyond the rim, what it sees goes on: where nothing else lies near, that is all there is.
-            let beyond = down.hypot(across).max(1.0);
-            let weight = if beyond > 1.0 { 1e-3 } else { 1.0 };
-            let through = (down / beyond, across / beyond);
-            let from = (
-                point.place_px.0 + within[2] * point.width_px - radius_px * through.0,
-                point.place_px.1 + within[3] * point.width_px - radius_px * through.1,
+        for first in (0..side * side).step_by(RAYS) {
+            let (mut positions, mut ways, mut weights) = ([[0.0; RAYS]; 2], [[0.0; RAYS]; 2], [0.0; RAYS]);
+            for (ray, square) in (first..side * side).take(RAYS).enumerate() {
+                // All over its square and over a wide point: rays in rows and columns would meet an edge along them all at once (Roberts's sequences in four dimensions).
+                let within = [0.856_674_9, 0.733_891_8, 0.628_706_7, 0.538_597_2];
+                let within = within.map(|step: f64| (square as f64 * step).fract() as f32 - 0.5);
+                let (down, across) = (place(square / side, within[0]), place(square % side, within[1]));
+                // Beyond the rim, what it sees goes on: where nothing else lies near, that is all there is.
+                let beyond = down.hypot(across).max(1.0);
+                weights[ray] = if beyond > 1.0 { 1e-3 } else { 1.0 };
+                let through = (down / beyond, across / beyond);
+                let from = (
+                    point.place_px.0 + within[2] * point.width_px - radius_px * through.0,
+                    point.place_px.1 + within[3] * point.width_px - radius_px * through.1,
+                );
+                let position = sight.position_at(from);
+                let per_px = sight.per_px(from, position, through, farthest_px);
+                (0..2).for_each(|axis| (positions[axis][ray], ways[axis][ray]) = (position[axis], per_px[axis]));
+            }
+            let are_hidden = Self::are_hidden(Rays::new(surfaces, positions, ways), (point, met), before_px);
+            let n = RAYS.min(side * side - first);
+            all.extend_from_slice(&weights[..n]);
+            seen.extend(
+                weights.iter().zip(are_hidden).take(n).map(|(weight, hidden)| if hidden { 0.0 } else { *weight }),
             );
-            let position = sight.position_at(from);
-            let ray = Ray::new(surfaces, position, sight.per_px(from, position, through, farthest_px));
-            let is_open = !Self::is_hidden(ray, (point, met), before_px);
-            seen.push(if is_open { weight } else { 0.0 });
-            all.push(weight);
         }
         // Aberrations and diffraction bring light of other parts of the pupil: in focus that of all.
         let mixed = (0.5 * side as f32 * point.unclear_px / radius_px.abs().max(1e-6)).min(100.0 * side as f32);
@@ -72,13 +79,13 @@ impl OpenPupil {
         Self { side, parts: seen.iter().zip(&all).map(|(seen, all)| seen / all).collect(), radius_px }
     }
 
-    /// Whether a ray through the pupil ends before it comes to a point past the layers that it may meet; `before_px` is the blur radius of the surface before that.
-    fn is_hidden(ray: Ray<'_>, (point, met): (&HiddenPoint, &[Met]), before_px: f32) -> bool {
-        // The surface that it lies behind may also be where the ray passes its depth.
-        let is_own = |before: &Before| {
-            ray.surfaces_at(before_px).iter().any(|surface| (surface - before.coordinate).abs() <= 0.5)
-        };
-        point.before.as_ref().is_some_and(is_own) || !ray.arrives(point.layer, met)
+    /// Which rays through the pupil end before they come to a point past the layers that they may meet; `before_px` is the blur radius of the surface before that.
+    fn are_hidden(rays: Rays<'_>, (point, met): (&HiddenPoint, &[Met]), before_px: f32) -> [bool; RAYS] {
+        // The surface that it lies behind may also be where a ray passes its depth.
+        let is_own = |surface: f32| point.before.is_some_and(|before| (surface - before.coordinate).abs() <= 0.5);
+        let own: [Lanes; 2] = rays.surfaces_at(before_px);
+        let arrive = rays.arrive(point.layer, met);
+        std::array::from_fn(|ray| is_own(own[0][ray]) || is_own(own[1][ray]) || !arrive[ray])
     }
 
     /// Returns the part of the light so many pixels below and to the right of the point that is seen.

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use dioptric_psf::{FilmMap, FilmQuery, Kernel, LensImage};
+use dioptric_psf::{FilmMap, FilmQuery, LensImage};
 use dioptric_scene::{PointBrightness, PointLight, PointPlace};
 use dioptric_spectrum::{Cancel, Cancelled};
 use glam::DVec2;
@@ -11,6 +11,7 @@ use rayon::prelude::*;
 use crate::{
     Film, SceneGeometry,
     lamps::Lamp,
+    node_kernels::NodeKernel,
     past_surfaces::{HiddenPoint, OpenPupil},
     places::SceneRaster,
     raster::{Level, Raster},
@@ -25,10 +26,12 @@ use crate::{
 pub(crate) struct Point {
     /// Where its chief ray meets the film, mm from the middle.
     place_mm: DVec2,
+    /// The same in the middle band, by which points share kernels.
+    middle_mm: DVec2,
     dioptres: f64,
     /// The layer that it lies in, or behind.
     pub(crate) layer: usize,
-    /// Side of the square that it is, mm on the film; 0 for a point.
+    /// Side of the square that it is, mm on the film in the middle band; 0 for a point.
     width_mm: f64,
     /// Radiance times the area of film that sees it, in pixels.
     light: f64,
@@ -46,6 +49,24 @@ pub(crate) struct Beside {
     layer: usize,
     /// The first surface where it lies, if it lies behind that.
     before: Option<Before>,
+}
+
+/// Where a film looks in a band and in the middle one.
+#[derive(Clone, Copy)]
+pub(crate) struct Maps<'a> {
+    pub(crate) of_band: &'a FilmMap,
+    pub(crate) of_middle: &'a FilmMap,
+    /// Side of a pixel.
+    pub(crate) pitch_mm: f64,
+}
+
+impl Maps<'_> {
+    /// Returns the places of a direction on the film, and the area of film that sees an area in tangents of 1, mm²: both in the band, then in the middle one.
+    fn find(&self, field_tan: DVec2) -> Option<([DVec2; 2], [f64; 2])> {
+        let maps = [self.of_band, self.of_middle];
+        let places_mm = [maps[0].place_mm(field_tan)?, maps[1].place_mm(field_tan)?];
+        Some((places_mm, [0, 1].map(|i| maps[i].jacobian_mm(places_mm[i]).determinant().abs())))
+    }
 }
 
 /// How much farther than the first surface a point may lie that is not behind it: depth maps are that exact.
@@ -96,15 +117,14 @@ impl Beside {
     }
 
     /// Returns it with its brightness in a band; `None` where it cannot be seen.
-    pub(crate) fn lit(&self, brightness: f32, (map, pitch_mm): (&FilmMap, f64)) -> Option<Point> {
+    pub(crate) fn lit(&self, brightness: f32, maps: &Maps<'_>) -> Option<Point> {
         if brightness <= 0.0 {
             return None;
         }
-        let place_mm = map.place_mm(self.field_tan)?;
-        let light =
-            f64::from(brightness) * self.tan2 * map.jacobian_mm(place_mm).determinant().abs() / (pitch_mm * pitch_mm);
+        let ([place_mm, middle_mm], [area_mm2, _]) = maps.find(self.field_tan)?;
+        let light = f64::from(brightness) * self.tan2 * area_mm2 / maps.pitch_mm.powi(2);
         let Self { dioptres, layer, before, .. } = *self;
-        Some(Point { place_mm, dioptres, layer, width_mm: 0.0, light, before })
+        Some(Point { place_mm, middle_mm, dioptres, layer, width_mm: 0.0, light, before })
     }
 }
 
@@ -123,14 +143,14 @@ impl Point {
     pub(crate) fn of_lamp(
         lamp: &Lamp,
         raster: &SceneRaster,
-        (map, pitch_mm): (&FilmMap, f64),
+        maps: &Maps<'_>,
         ((layer, dioptres), before): ((usize, f64), Option<Before>),
     ) -> Option<Self> {
         let (tan_x, tan_y) = raster.view.tan_at(lamp.row as f64, lamp.column as f64);
-        let place_mm = map.place_mm(DVec2::new(tan_x, tan_y))?;
-        let area_mm2 = map.jacobian_mm(place_mm).determinant().abs() / raster.view.focal_px.powi(2);
-        let light = f64::from(lamp.radiance) * area_mm2 / (pitch_mm * pitch_mm);
-        Some(Self { place_mm, dioptres, layer, width_mm: area_mm2.sqrt(), light, before })
+        let ([place_mm, middle_mm], areas_mm2) = maps.find(DVec2::new(tan_x, tan_y))?;
+        let [area_mm2, middle_mm2] = areas_mm2.map(|area| area / raster.view.focal_px.powi(2));
+        let light = f64::from(lamp.radiance) * area_mm2 / maps.pitch_mm.powi(2);
+        Some(Self { place_mm, middle_mm, dioptres, layer, width_mm: middle_mm2.sqrt(), light, before })
     }
 }
 
@@ -138,7 +158,10 @@ impl Point {
 pub(crate) struct Drawing<'a> {
     pub(crate) lens: &'a dyn LensImage,
     pub(crate) film: &'a Film,
-    pub(crate) wavelength_nm: f64,
+    /// Of the middle band.
+    pub(crate) middle_nm: f64,
+    /// Returns kernels of the band, whatever the wavelength asked for.
+    pub(crate) kernel: &'a (dyn Fn(FilmQuery) -> NodeKernel + Sync),
     /// What hides points; `None` where nothing does.
     pub(crate) sight: Option<&'a Sight>,
 }
@@ -197,13 +220,13 @@ impl Drawing<'_> {
     /// Returns points that share a kernel, with their numbers.
     fn groups<'p>(&self, points: &'p [Point]) -> Vec<Vec<(usize, &'p Point)>> {
         let radius_px =
-            |dioptres: f64| self.lens.blur_radius_mm(DVec2::ZERO, dioptres, self.wavelength_nm) / self.pitch_mm();
+            |dioptres: f64| self.lens.blur_radius_mm(DVec2::ZERO, dioptres, self.middle_nm) / self.pitch_mm();
         let per_dioptre = radius_px(1.0) - radius_px(0.0);
         let mut apart_px = APART_PX;
         loop {
             let mut groups: BTreeMap<[i64; 4], Vec<(usize, &Point)>> = BTreeMap::new();
             for (number, point) in points.iter().enumerate() {
-                let cell = (point.place_mm / self.pitch_mm() / apart_px).floor();
+                let cell = (point.middle_mm / self.pitch_mm() / apart_px).floor();
                 let blur = (point.dioptres * per_dioptre / BLUR_STEP_PX).round() as i64;
                 let width = (point.width_mm / self.pitch_mm() * 8.0).round() as i64;
                 groups.entry([cell.x as i64, cell.y as i64, blur, width]).or_default().push((number, point));
@@ -217,22 +240,22 @@ impl Drawing<'_> {
 
     /// Returns what points that share a kernel bring to the film, and where.
     fn patch(&self, group: &[(usize, &Point)], film: &Rectangle) -> Option<Patch> {
+        // The same in all bands in which the same points shine.
         let n = group.len() as f64;
-        let place_mm = group.iter().map(|(_, point)| point.place_mm).sum::<DVec2>() / n;
+        let place_mm = group.iter().map(|(_, point)| point.middle_mm).sum::<DVec2>() / n;
         let dioptres = group.iter().map(|(_, point)| point.dioptres).sum::<f64>() / n;
         let pitch_mm = self.pitch_mm();
-        let spread_px = self.lens.spread_mm(place_mm, dioptres, self.wavelength_nm) / pitch_mm;
-        let blur_px = self.lens.blur_radius_mm(place_mm, dioptres, self.wavelength_nm) / pitch_mm;
         let width_px = group[0].1.width_mm / pitch_mm;
+        let spread_px = self.lens.spread_mm(place_mm, dioptres, self.middle_nm) / pitch_mm;
+        let blur_px = self.lens.blur_radius_mm(place_mm, dioptres, self.middle_nm) / pitch_mm;
         let most_px = LEAST_CELL_PX * (spread_px / (CELLS * LEAST_CELL_PX)).log2().ceil().max(0.0).exp2();
         // Lamps are an odd number of cells wide: their rims and those of cells are the same.
         let wide = 2 * (0.5 * (width_px / most_px - 1.0)).ceil().max(0.0) as usize + 1;
         let cell_px = if width_px > 0.0 { width_px / wide as f64 } else { most_px };
         // In focus all of the pupil meets in a cell.
         let unclear_px = (spread_px * spread_px - blur_px * blur_px).max(cell_px * cell_px).sqrt();
-        let query =
-            FilmQuery { place_mm, dioptres, wavelength_nm: self.wavelength_nm, pitch_um: cell_px * self.film.pitch_um };
-        let kernel = self.lens.kernel(query);
+        let pitch_um = cell_px * self.film.pitch_um;
+        let kernel = (self.kernel)(FilmQuery { place_mm, dioptres, wavelength_nm: self.middle_nm, pitch_um });
         let whole = Sums::of(&kernel, (cell_px, wide), &|_, _| 1.0);
 
         let pixels = Raster::new(self.film, Level::PIXEL);
@@ -287,22 +310,21 @@ struct Sums {
 
 impl Sums {
     /// Takes a kernel on cells that are so many pixels wide, each of whose points is a square of so many cells, an odd number, and `part` of its light so many pixels below and to the right.
-    fn of(kernel: &Kernel, (cell_px, wide): (f64, usize), part: &dyn Fn(f64, f64) -> f64) -> Self {
-        let (rows, columns) = kernel.samples.dim();
+    fn of(kernel: &NodeKernel, (cell_px, wide): (f64, usize), part: &dyn Fn(f64, f64) -> f64) -> Self {
+        let NodeKernel { at, samples } = kernel;
         let taps = vec![1.0 / wide as f64; wide];
         let margin = taps.len() / 2;
-        let (wide_rows, wide_columns) = (rows + 2 * margin, columns + 2 * margin);
-        let total: f64 = kernel.samples.iter().map(|sample| f64::from(*sample)).sum();
-        let below_px =
-            |middle: i32, n: usize, cell: usize| (f64::from(middle) + cell as f64 + 0.5 - 0.5 * n as f64) * cell_px;
-        let mut across = vec![0.0; rows * wide_columns];
-        let mut seen = vec![0.0; columns];
-        for (row, line) in across.chunks_exact_mut(wide_columns).enumerate() {
-            let below = below_px(kernel.middle_px.y, rows, row);
-            for (column, (seen, sample)) in seen.iter_mut().zip(kernel.samples.row(row)).enumerate() {
+        let (wide_rows, wide_columns) = (at.rows + 2 * margin, at.columns + 2 * margin);
+        let total: f64 = samples.iter().map(|sample| f64::from(*sample)).sum();
+        let px = |first: i64, cell: usize| (first + cell as i64) as f64 * cell_px;
+        let mut across = vec![0.0; at.rows * wide_columns];
+        let mut seen = vec![0.0; at.columns];
+        let lines = across.chunks_exact_mut(wide_columns).zip(samples.chunks_exact(at.columns));
+        for (row, (line, samples)) in lines.enumerate() {
+            let below = px(at.first_row, row);
+            for (column, (seen, sample)) in seen.iter_mut().zip(samples).enumerate() {
                 let light = f64::from(*sample) / total;
-                *seen =
-                    if light == 0.0 { 0.0 } else { light * part(below, below_px(kernel.middle_px.x, columns, column)) };
+                *seen = if light == 0.0 { 0.0 } else { light * part(below, px(at.first_column, column)) };
             }
             for (k, tap) in taps.iter().enumerate() {
                 line[k..].iter_mut().zip(&seen).for_each(|(sum, seen)| *sum += tap * seen);
@@ -319,9 +341,7 @@ impl Sums {
             let (above, own) = sums[(row - 1) * wide_columns..].split_at_mut(wide_columns);
             own.iter_mut().zip(above.iter()).for_each(|(sum, above)| *sum += above);
         }
-        let first = |middle: i32, n: usize| f64::from(middle) - 0.5 * n as f64;
-        let first_px = [first(kernel.middle_px.y, wide_rows), first(kernel.middle_px.x, wide_columns)];
-        let first_px = first_px.map(|cells| cells * cell_px);
+        let first_px = [at.first_row, at.first_column].map(|first| (first as f64 - margin as f64 - 0.5) * cell_px);
         Self { rows: wide_rows + 1, columns: wide_columns, sums, first_px, cell_px }
     }
 
@@ -394,6 +414,7 @@ fn between([before, from, to, after]: [f64; 4], part: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use dioptric_psf::Kernel;
     use ndarray::Array2;
 
     /// Whatever its cells and wherever it lies, a kernel keeps its sum and its middle.
@@ -408,7 +429,8 @@ mod tests {
         };
         let middle = [mean(&|row, _| row as f64 - 2.0), mean(&|_, column| column as f64 - 3.0)];
         for (cell_px, wide) in [(0.25, 1), (0.25, 3), (1.0, 1), (4.0, 3)] {
-            let sums = Sums::of(&Kernel::centered(samples.clone(), 1.0), (cell_px, wide), &|_, _| 1.0);
+            let sums =
+                Sums::of(&NodeKernel::new(&Kernel::centered(samples.clone(), 1.0)), (cell_px, wide), &|_, _| 1.0);
             for place in [[0.0, 0.0], [0.13, -3.42], [2.77, 1.5]] {
                 let at = sums.reached(place, &pixels);
                 let parts = sums.on_pixels(place, &pixels, &at);
@@ -441,7 +463,7 @@ mod tests {
             up_to(px + cell_px) - up_to(px)
         };
         let samples = Array2::from_shape_fn((61, 61), |(row, column)| (in_cell(row) * in_cell(column)) as f32);
-        let sums = Sums::of(&Kernel::centered(samples, 1.0), (cell_px, 1), &|_, _| 1.0);
+        let sums = Sums::of(&NodeKernel::new(&Kernel::centered(samples, 1.0)), (cell_px, 1), &|_, _| 1.0);
         for place in [[0.5, 0.5], [0.56, 0.5], [0.43, 0.37], [1.0, 0.21]] {
             let at = sums.reached(place, &pixels);
             for (i, part) in sums.on_pixels(place, &pixels, &at).into_iter().enumerate() {

@@ -83,6 +83,19 @@ impl Raster {
         (column as f64 + self.offset[1]) * self.level.step_px()
     }
 
+    /// Returns the number of the block of [`BLOCK`] pixels, along rows (0) or columns (1), in which a sample lies, and that of the first sample behind it.
+    pub(crate) fn block(&self, axis: usize, at: i64) -> (i64, i64) {
+        let pixels = self.level.pixels() as i64;
+        if pixels > BLOCK {
+            let middle = 2 * at + i64::from(self.offset[axis] > 0.0);
+            return (middle * (pixels / BLOCK / 2), at + 1);
+        }
+        // As many in each, a power of two, and no block ends in the midst of a sample's half.
+        let doublings = (BLOCK * self.level.per_pixel() as i64 / pixels).ilog2();
+        let block = at >> doublings;
+        (block, (block + 1) << doublings)
+    }
+
     /// Returns the number of the last row that lies no farther down than so many pixels.
     pub(crate) fn row_before(&self, down_px: f64) -> i64 {
         (down_px / self.level.step_px() - self.offset[0]).floor() as i64
@@ -109,6 +122,19 @@ mod tests {
                 assert_eq!(raster.across_px(mirrored), -raster.across_px(2));
                 assert_eq!(raster.row_before(raster.down_px(-3)), -3);
                 assert!((raster.x_mm(1.0) - 2e-3 * raster.across_px(1)).abs() < 1e-15);
+            }
+            for level in [Level::EIGHTH, Level::HALF, Level::PIXEL, Level(2), Level(3), Level(4), Level(6)] {
+                let raster = Raster::new(&film, level);
+                for at in -100..100 {
+                    let block_of = |px: f64| (px / BLOCK as f64).floor() as i64;
+                    let (block, next) = raster.block(1, at);
+                    assert_eq!(
+                        (block, raster.block(0, at).0),
+                        (block_of(raster.across_px(at)), block_of(raster.down_px(at)))
+                    );
+                    assert!(next == at + 1 || block_of(raster.across_px(next - 1)) == block);
+                    assert!(block_of(raster.across_px(next)) > block);
+                }
             }
             // The first pixel of the film.
             let pixels = Raster::new(&film, Level::PIXEL);

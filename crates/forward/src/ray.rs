@@ -2,122 +2,143 @@
 
 use crate::sight::{Met, Surfaces};
 
-/// A ray from a film point on its way from the nearest layer to the farthest.
-pub(crate) struct Ray<'a> {
+/// Rays that are followed at once.
+pub(crate) const RAYS: usize = 16;
+
+/// A number of each of some rays.
+pub(crate) type Lanes = [f32; RAYS];
+
+/// Rays from film points on their way from the nearest layer to the farthest.
+pub(crate) struct Rays<'a> {
     surfaces: Surfaces<'a>,
-    /// The position among the samples of the scene where the blur radius is 0, and how far it goes from there in a pixel of blur radius.
-    position: [f32; 2],
-    per_px: [f32; 2],
+    /// The positions among the samples of the scene, rows and columns, where the blur radius is 0, and how far they go from there in a pixel of blur radius.
+    position: [Lanes; 2],
+    per_px: [Lanes; 2],
     /// The layer passed last.
     last: Met,
     /// Among the first surface and what lies behind it.
-    paths: [Path; 2],
+    paths: [Paths; 2],
 }
 
-impl<'a> Ray<'a> {
-    /// Returns that from a position among the samples of the scene in focus, which goes so far from there in a pixel of blur radius.
-    #[inline]
-    pub(crate) fn new(surfaces: Surfaces<'a>, position: [f32; 2], per_px: [f32; 2]) -> Self {
+impl<'a> Rays<'a> {
+    /// Returns those from positions among the samples of the scene in focus, which go so far from there in a pixel of blur radius.
+    #[inline(always)]
+    pub(crate) fn new(surfaces: Surfaces<'a>, position: [Lanes; 2], per_px: [Lanes; 2]) -> Self {
         let last = Met { layer: 0, radius_px: 0.0, is_of_first: false };
-        Self { surfaces, position, per_px, last, paths: <[Path; 2]>::default() }
+        Self { surfaces, position, per_px, last, paths: <[Paths; 2]>::default() }
     }
 
     /// Passes the next of the layers that are met; returns the coordinates of the surfaces there.
-    #[inline]
-    pub(crate) fn pass(&mut self, met: Met) -> [f32; 2] {
+    #[inline(always)]
+    pub(crate) fn pass(&mut self, met: Met) -> [Lanes; 2] {
         let surfaces = self.surfaces_at(met.radius_px);
-        let mut paths = std::mem::take(&mut self.paths);
-        for (of, (path, surface)) in paths.iter_mut().zip(surfaces).enumerate() {
+        let (all, position, per_px, last) = (self.surfaces, self.position, self.per_px, self.last);
+        for (of, (paths, surfaces)) in self.paths.iter_mut().zip(&surfaces).enumerate() {
             // Between two layers the blur radius goes as the coordinate does.
-            path.pass(met.layer, surface, |at| {
-                let part = at - self.last.layer as f32;
-                self.surfaces_at(self.last.radius_px + part * (met.radius_px - self.last.radius_px))[of]
+            paths.pass(met.layer, surfaces, |ray, at| {
+                let part = at - last.layer as f32;
+                let radius_px = last.radius_px + part * (met.radius_px - last.radius_px);
+                all.at([0, 1].map(|axis| position[axis][ray] + radius_px * per_px[axis][ray]))[of]
             });
         }
-        self.paths = paths;
         self.last = met;
         surfaces
     }
 
-    /// Whether it reaches a layer past those that are met.
-    pub(crate) fn arrives(mut self, layer: usize, met: &[Met]) -> bool {
+    /// Which of them reach a layer past those that are met.
+    #[inline(always)]
+    pub(crate) fn arrive(mut self, layer: usize, met: &[Met]) -> [bool; RAYS] {
         for met in met.iter().take_while(|met| met.layer <= layer) {
             self.pass(*met);
-            if !self.reaches(layer) {
-                return false;
-            }
         }
         if self.last.layer < layer {
             // A surface in it may be too small to have been met: what lies before it is passed.
             self.pass_to(layer);
         }
-        self.reaches(layer)
+        std::array::from_fn(|ray| self.reaches(ray, layer))
     }
 
-    /// Whether it ends in any of the surfaces that it has passed.
-    pub(crate) fn ends(mut self) -> bool {
+    /// Which of them end in any of the surfaces that they have passed.
+    #[inline(always)]
+    pub(crate) fn ended(mut self) -> [bool; RAYS] {
         self.pass_to(self.last.layer + 2);
-        self.paths.iter().any(|path| path.ends != usize::MAX)
+        std::array::from_fn(|ray| self.paths.iter().any(|paths| paths.ends[ray] != u32::MAX))
     }
 
     /// Passes what lies before a layer in which there is nothing.
+    #[inline(always)]
     fn pass_to(&mut self, layer: usize) {
-        self.paths.iter_mut().for_each(|path| path.pass(layer, f32::NAN, |_| f32::NAN));
+        self.paths.iter_mut().for_each(|paths| paths.pass(layer, &[f32::NAN; RAYS], |_, _| f32::NAN));
     }
 
-    /// Whether it reaches a layer.
-    #[inline]
-    pub(crate) fn reaches(&self, layer: usize) -> bool {
-        self.paths.iter().all(|path| layer < path.ends)
+    /// Whether one reaches a layer.
+    #[inline(always)]
+    pub(crate) fn reaches(&self, ray: usize, layer: usize) -> bool {
+        (layer as u32) < self.paths[0].ends[ray].min(self.paths[1].ends[ray])
     }
 
-    /// Returns the coordinates of the surfaces where it passes a blur radius.
-    #[inline]
-    pub(crate) fn surfaces_at(&self, radius_px: f32) -> [f32; 2] {
-        self.surfaces.at([0, 1].map(|axis| self.position[axis] + radius_px * self.per_px[axis]))
+    /// Returns the coordinates of the surfaces where they pass a blur radius.
+    #[inline(always)]
+    pub(crate) fn surfaces_at(&self, radius_px: f32) -> [Lanes; 2] {
+        let [rows, columns] = [0, 1].map(|axis| {
+            let (position, per_px) = (&self.position[axis], &self.per_px[axis]);
+            std::array::from_fn(|ray| position[ray] + radius_px * per_px[ray])
+        });
+        self.surfaces.at_all(&rows, &columns)
     }
 }
 
-/// How far a ray comes among layers.
-struct Path {
-    /// The layer passed last, and the coordinate of the surface there.
-    last: (usize, f32),
-    /// The first of the layers that it does not reach.
-    ends: usize,
+/// How far rays come among layers.
+struct Paths {
+    /// The layer passed last, and the coordinates of the surface there.
+    last: usize,
+    surfaces: Lanes,
+    /// Of each the first of the layers that it does not reach.
+    ends: [u32; RAYS],
 }
 
 /// The most layers that a surface goes nearer or farther from one layer to the next, as a ray passes them: of more, it is not one surface.
 const MOST_OF_SURFACE: f32 = 2.0;
 
-impl Default for Path {
+impl Default for Paths {
     fn default() -> Self {
-        Self { last: (0, f32::NAN), ends: usize::MAX }
+        Self { last: 0, surfaces: [f32::NAN; RAYS], ends: [u32::MAX; RAYS] }
     }
 }
 
-impl Path {
-    /// Passes a layer, in which a surface lies at a coordinate where the ray is; `between` tells where it lies at a coordinate before that.
+impl Paths {
+    /// Passes a layer, in which a surface lies at a coordinate where each ray is; `between` tells where it lies for one of them at a coordinate before that.
     ///
-    /// The ray ends in a surface that lies behind it in one layer and before it in the next. One that only jumps to before it has an edge there, and the ray passes behind that,
+    /// A ray ends in a surface that lies behind it in one layer and before it in the next. One that only jumps to before it has an edge there, and the ray passes behind that,
     /// unless it still meets it at the depth at which it lies.
-    #[inline]
-    fn pass(&mut self, layer: usize, surface: f32, between: impl Fn(f32) -> f32) {
-        let (last, last_surface) = self.last;
-        let (first, next) = (last as f32, (last + 1) as f32);
-        let lies_between = |surface: f32| surface >= first && surface < next;
-        // Where no surface lies in the next layer, one can only lie in the last.
-        let crosses = if last + 1 == layer {
-            let is_one = last_surface >= first && surface < next && (surface - last_surface).abs() <= MOST_OF_SURFACE;
-            let meets = |at: f32| lies_between(at) && (first..=at).contains(&between(at));
-            is_one || meets(last_surface) || meets(surface)
+    #[inline(always)]
+    fn pass(&mut self, layer: usize, surfaces: &Lanes, between: impl Fn(usize, f32) -> f32) {
+        let (first, next) = (self.last as f32, (self.last + 1) as f32);
+        let lies_between = |surface: f32| (surface >= first) & (surface < next);
+        // Both layers have a part of the surface in which a ray ends.
+        let end = self.last as u32 + 2;
+        let mut crosses = [false; RAYS];
+        if self.last + 1 == layer {
+            let mut may_meet = [false; RAYS];
+            for ray in 0..RAYS {
+                let (last, here) = (self.surfaces[ray], surfaces[ray]);
+                crosses[ray] = (last >= first) & (here < next) & ((here - last).abs() <= MOST_OF_SURFACE);
+                may_meet[ray] = !crosses[ray] & (lies_between(last) | lies_between(here));
+            }
+            let meets = |ray: usize, at: f32| lies_between(at) && (first..=at).contains(&between(ray, at));
+            for ray in (0..RAYS).filter(|ray| may_meet[*ray]) {
+                crosses[ray] = meets(ray, self.surfaces[ray]) || meets(ray, surfaces[ray]);
+            }
         } else {
-            lies_between(last_surface)
-        };
-        if crosses {
-            // Both layers have a part of that surface.
-            self.ends = self.ends.min(last + 2);
+            // Where no surface lies in the next layer, one can only lie in the last.
+            for ray in 0..RAYS {
+                crosses[ray] = lies_between(self.surfaces[ray]);
+            }
         }
-        self.last = (layer, surface);
+        for ray in 0..RAYS {
+            self.ends[ray] = if crosses[ray] { self.ends[ray].min(end) } else { self.ends[ray] };
+        }
+        (self.last, self.surfaces) = (layer, *surfaces);
     }
 }
 
@@ -125,12 +146,18 @@ impl Path {
 mod tests {
     use super::*;
 
+    /// Returns where rays end that are all alike.
+    fn end_of(paths: &Paths) -> usize {
+        assert!(paths.ends.iter().all(|end| *end == paths.ends[0]));
+        if paths.ends[0] == u32::MAX { usize::MAX } else { paths.ends[0] as usize }
+    }
+
     /// Returns the first layer that a ray does not reach past the coordinates of a surface in layers one after the other, which goes on from one to the next or jumps halfway.
     fn ends(first: usize, surface: &[f32]) -> usize {
-        let mut path = Path::default();
+        let mut paths = Paths::default();
         for (i, &here) in surface.iter().enumerate() {
             let before = surface[i.saturating_sub(1)];
-            let between = |at: f32| {
+            let between = |_, at: f32| {
                 let part = (at - (first + i) as f32 + 1.0).clamp(0.0, 1.0);
                 match (here - before).abs() > MOST_OF_SURFACE {
                     true if part < 0.5 => before,
@@ -138,9 +165,9 @@ mod tests {
                     false => before + part * (here - before),
                 }
             };
-            path.pass(first + i, here, between);
+            paths.pass(first + i, &[here; RAYS], between);
         }
-        path.ends
+        end_of(&paths)
     }
 
     #[test]
@@ -168,14 +195,14 @@ mod tests {
 
     #[test]
     fn surfaces_lie_in_the_last_layer_before_a_gap() {
-        let mut path = Path::default();
-        path.pass(1, 1.0, |_| 1.0);
-        path.pass(7, 9.0, |_| 9.0);
-        assert_eq!(path.ends, 3);
-        let mut path = Path::default();
-        path.pass(1, 7.0, |_| 7.0);
-        path.pass(7, 7.0, |_| 7.0);
-        path.pass(9, f32::NAN, |_| f32::NAN);
-        assert_eq!(path.ends, 9);
+        let mut path = Paths::default();
+        path.pass(1, &[1.0; RAYS], |_, _| 1.0);
+        path.pass(7, &[9.0; RAYS], |_, _| 9.0);
+        assert_eq!(end_of(&path), 3);
+        let mut path = Paths::default();
+        path.pass(1, &[7.0; RAYS], |_, _| 7.0);
+        path.pass(7, &[7.0; RAYS], |_, _| 7.0);
+        path.pass(9, &[f32::NAN; RAYS], |_, _| f32::NAN);
+        assert_eq!(end_of(&path), 9);
     }
 }

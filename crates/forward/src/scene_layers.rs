@@ -16,11 +16,16 @@ use crate::{
     work::plane_of,
 };
 
+/// The step of blur radius between bands in which kernels of points are computed, over that of others: a quarter of it leaves a sixteenth of the error in a peak.
+const OF_POINTS: f64 = 0.25;
+
 /// A scene laid in layers of depth by the blur of a lens.
 pub(crate) struct SceneLayers {
     pub(crate) layers: Layers,
     /// The bands at which kernels are computed; between them they are interpolated.
     pub(crate) kernel_bands: Vec<usize>,
+    /// Likewise of points that shine, which no texture hides: closer together.
+    pub(crate) point_bands: Vec<usize>,
     /// Of the first surface.
     pub(crate) coordinates: LayerCoordinates,
     pub(crate) occluded: OccludedSamples,
@@ -50,14 +55,16 @@ impl SceneLayers {
         let (pitch_mm, places_mm) = (1e-3 * film.pitch_um, places_over(lens, film));
         let blurs = Blurs { lens, pitch_mm, places_mm: &places_mm, wavelengths_nm: grid.centers_nm() };
         let layers = Layers::over((1.0 / far_m, 1.0 / near_m), settings.layer_step_px, &blurs);
-        let kernel_bands = layers.chromatic_knots(settings.chromatic_step_px, &blurs);
+        let [kernel_bands, point_bands] =
+            [1.0, OF_POINTS].map(|part| layers.chromatic_knots(part * settings.chromatic_step_px, &blurs));
         let z_m = scene.depth.z_m();
         let coordinate = |row: usize, column: usize| layers.coordinate_of(z_m[(row, column)]);
         let coordinates = LayerCoordinates::new(plane_of(z_m.dim(), cancel, coordinate)?, cancel)?;
         let hides = settings.mode != BlurMode::Pointwise && layers.len() > 1;
         if !hides {
             let (occluded, mixed) = (OccludedSamples::Nothing, MixedSamples::default());
-            let this = Self { layers, kernel_bands, coordinates, occluded, mixed, narrow_fraction: 0.0, hides };
+            let this =
+                Self { layers, kernel_bands, point_bands, coordinates, occluded, mixed, narrow_fraction: 0.0, hides };
             return Ok(Arc::new(this));
         }
         // How fine the scene is in the film's middle.
@@ -68,7 +75,7 @@ impl SceneLayers {
         let occluded = OccludedSamples::find(&distances, &layers, samples_per_pixel, cancel)?;
         let mixed = MixedSamples::find(&distances, &layers, cancel)?;
         let narrow_fraction = narrow.fraction(&distances.front, cancel)?;
-        Ok(Arc::new(Self { layers, kernel_bands, coordinates, occluded, mixed, narrow_fraction, hides }))
+        Ok(Arc::new(Self { layers, kernel_bands, point_bands, coordinates, occluded, mixed, narrow_fraction, hides }))
     }
 
     /// Rows and columns of the scene.

@@ -12,6 +12,7 @@ use crate::{
     layers::DEPTH_EDGE_PX,
     places::{SceneRaster, folded},
     raster::{BLOCK, Level, Raster},
+    ray::{Lanes, RAYS},
     rectangle::Rectangle,
     scene_layers::SceneLayers,
     surface::LayerCoordinates,
@@ -261,6 +262,25 @@ pub(crate) struct Surfaces<'a> {
 }
 
 impl Surfaces<'_> {
+    /// Returns the layer coordinates of both surfaces at rows and columns of the scene; NaN for nothing.
+    #[inline(always)]
+    pub(crate) fn at_all(&self, rows: &Lanes, columns: &Lanes) -> [Lanes; 2] {
+        if self.border == Border::Mirror {
+            let seen: [[f32; 2]; RAYS] = std::array::from_fn(|ray| self.at([rows[ray], columns[ray]]));
+            return [0, 1].map(|of| seen.map(|surfaces| surfaces[of]));
+        }
+        let nearest = |position: f32, n: usize| (position + 0.5).clamp(0.0, (n - 1) as f32) as u32;
+        let mut samples = [0; RAYS];
+        for ray in 0..RAYS {
+            samples[ray] = nearest(rows[ray], self.rows) * self.columns as u32 + nearest(columns[ray], self.columns);
+        }
+        let is_seen = |ray: usize| (rows[ray] + columns[ray]).is_finite();
+        let of = |surface: &[f32]| -> Lanes {
+            std::array::from_fn(|ray| if is_seen(ray) { surface[samples[ray] as usize] } else { f32::NAN })
+        };
+        [of(self.first), self.second.map_or([f32::NAN; RAYS], of)]
+    }
+
     /// Returns the layer coordinates of the first surface at a row and column of the scene, and of what lies behind it; NaN for nothing.
     #[inline]
     pub(crate) fn at(&self, [row, column]: [f32; 2]) -> [f32; 2] {

@@ -166,18 +166,22 @@ impl Star {
     }
 }
 
-/// Parts the brightest points, which get stars, from the others.
-pub(crate) fn brightest(mut points: Vec<Point>, film: &Film) -> [Vec<Point>; 2] {
-    points.sort_by(|a, b| b.light().total_cmp(&a.light()));
+/// Parts the brightest points, which get stars, from the others; both in their order, by which they share kernels.
+pub(crate) fn brightest(points: &[Point], film: &Film) -> [Vec<Point>; 2] {
+    let mut by_light: Vec<usize> = (0..points.len()).collect();
+    by_light.sort_by(|&a, &b| points[b].light().total_cmp(&points[a].light()));
     let most = (STAR_PIXELS / (film.rows * film.columns)).max(LEAST_STARS);
     let mut pixels = BTreeSet::new();
-    let is_one = |point: &&Point| {
-        pixels.insert(point.place_px(1e-3 * film.pitch_um).map(|px| px.round() as i64));
+    let is_one = |number: &&usize| {
+        pixels.insert(points[**number].place_px(1e-3 * film.pitch_um).map(|px| px.round() as i64));
         pixels.len() <= most
     };
-    let n = points.iter().take_while(is_one).count();
-    let others = points.split_off(n);
-    [points, others]
+    let bright: BTreeSet<usize> = by_light.iter().take_while(is_one).copied().collect();
+    let of = |is_bright: bool| {
+        let numbers = (0..points.len()).filter(|number| bright.contains(number) == is_bright);
+        numbers.map(|number| points[number]).collect()
+    };
+    [of(true), of(false)]
 }
 
 #[cfg(test)]

@@ -1,8 +1,7 @@
 //! What of each layer is seen past the edges of nearer surfaces, by rays through the pupil.
 
-use std::collections::BTreeMap;
-
 use dioptric_spectrum::{Cancel, Cancelled};
+use multiversion::multiversion;
 use rayon::prelude::*;
 
 use crate::{
@@ -11,7 +10,7 @@ use crate::{
     layers::{DEPTH_EDGE_PX, IN_FOCUS_PX, tent},
     node_kernels::{LayerKernels, NodeKernel},
     raster::BLOCK,
-    ray::Ray,
+    ray::{Lanes, RAYS, Rays},
     rectangle::Rectangle,
     sight::{Met, NearEdges, Sight, widest_px},
     tile::film_pixels,
@@ -24,8 +23,11 @@ use crate::{
 /// found once, where bundles pass edges, on points as far apart as the blur of the near sides allows.
 pub(crate) struct Visible {
     sight: Sight,
-    /// By row and column of each block of pixels, as counted from the film's middle.
-    blocks: BTreeMap<(i64, i64), BlockParts>,
+    /// Of the blocks of pixels, as counted from the film's middle, the first row and column, and how many there are in a row.
+    first: (i64, i64),
+    n_columns: usize,
+    /// Row by row; none where no bundle passes an edge.
+    blocks: Vec<Option<BlockParts>>,
     /// The part of the film from which rays pass behind all surfaces that are known.
     pub(crate) unknown_fraction: f64,
 }
@@ -60,6 +62,7 @@ impl Visible {
         let last = |first: i64, n: usize| first + n as i64 - 1;
         let rows = block_of(pixels.first_row)..=block_of(last(pixels.first_row, pixels.rows));
         let columns = block_of(pixels.first_column)..=block_of(last(pixels.first_column, pixels.columns));
+        let (first, n_columns) = ((*rows.start(), *columns.start()), columns.clone().count());
         let blocks: Vec<(i64, i64)> = rows.flat_map(|row| columns.clone().map(move |column| (row, column))).collect();
         let side = BLOCK as usize;
         let parts = blocks.into_par_iter().map(|block| {
@@ -67,18 +70,17 @@ impl Visible {
             let at = Rectangle { first_row: block.0 * BLOCK, first_column: block.1 * BLOCK, rows: side, columns: side };
             let Some(at) = at.intersection(&pixels) else { return Ok(None) };
             let bundle = |met: &[Met]| Bundle::of(met, &at, (tiles, kernels));
-            Ok(BlockParts::of(&sight, &at, &bundle).map(|parts| (block, parts)))
+            Ok(BlockParts::of(&sight, &at, &bundle))
         });
-        let parts: Vec<Option<((i64, i64), BlockParts)>> = parts.collect::<Result<_, Cancelled>>()?;
-        let blocks: BTreeMap<(i64, i64), BlockParts> = parts.into_iter().flatten().collect();
-        let unknown: f64 = blocks.values().map(|block| block.unknown_fraction).sum();
+        let blocks: Vec<Option<BlockParts>> = parts.collect::<Result<_, Cancelled>>()?;
+        let unknown: f64 = blocks.iter().flatten().map(|block| block.unknown_fraction).sum();
         let unknown_fraction = unknown * (BLOCK * BLOCK) as f64 / pixels.len() as f64;
-        Ok(Self { sight, blocks, unknown_fraction: unknown_fraction.min(1.0) })
+        Ok(Self { sight, first, n_columns, blocks, unknown_fraction: unknown_fraction.min(1.0) })
     }
 
     pub(crate) fn size_bytes(&self) -> usize {
-        let ratios = self.blocks.values().flat_map(|block| &block.by_layer).map(|(_, ratios)| ratios.len());
-        self.sight.size_bytes() + size_of::<f32>() * ratios.sum::<usize>()
+        let ratios = self.blocks.iter().flatten().flat_map(|block| &block.by_layer).map(|(_, ratios)| ratios.len());
+        self.sight.size_bytes() + size_of_val(self.blocks.as_slice()) + size_of::<f32>() * ratios.sum::<usize>()
     }
 
     /// Takes from what pixels gather of a layer what they do not see of it, `open` being the part of their pupils that layers well before it leave.
@@ -90,7 +92,9 @@ impl Visible {
                 let pixel = (first_row + row as i64, first_column + column as i64);
                 let to_next = (BLOCK - pixel.1.rem_euclid(BLOCK)) as usize;
                 let end = (column + to_next).min(columns);
-                let Some(block) = self.blocks.get(&(pixel.0.div_euclid(BLOCK), pixel.1.div_euclid(BLOCK))) else {
+                let (down, right) =
+                    (pixel.0.div_euclid(BLOCK) - self.first.0, pixel.1.div_euclid(BLOCK) - self.first.1);
+                let Some(block) = &self.blocks[down as usize * self.n_columns + right as usize] else {
                     column = end;
                     continue;
                 };
@@ -130,9 +134,9 @@ fn told(radius_px: f32) -> f32 {
     (radius_px.abs() - IN_FOCUS_PX) / (DEPTH_EDGE_PX - IN_FOCUS_PX)
 }
 
-/// Rays through a pupil: where each goes in a layer of a blur radius of 1 pixel, and its weight.
+/// Rays through a pupil: where each goes in a layer of a blur radius of 1 pixel, down and across, and its weight; of sum 1.
 struct Bundle {
-    rays: Vec<([f32; 2], f32)>,
+    rays: Vec<([(f32, f32); RAYS], Lanes)>,
 }
 
 impl Bundle {
@@ -168,9 +172,16 @@ impl Bundle {
                 [0.754_877_7, 0.569_840_3].map(|step: f32| side as f32 * ((square as f32 * step).fract() - 0.5));
             let to = [down / light + beside[0], across / light + beside[1]].map(|to| scale * to);
             let beyond = to[0].hypot(to[1]).max(1.0);
-            (to.map(|to| to / beyond), light)
+            ((to[0] / beyond, to[1] / beyond), light)
         });
-        Some(Self { rays: rays.collect() })
+        let rays: Vec<((f32, f32), f32)> = rays.collect();
+        let total: f32 = rays.iter().map(|(_, light)| light).sum();
+        let some = |rays: &[((f32, f32), f32)]| {
+            // The last few without weight.
+            let of = |ray: usize| rays.get(ray).copied().unwrap_or_default();
+            (std::array::from_fn(|ray| of(ray).0), std::array::from_fn(|ray| of(ray).1 / total))
+        };
+        Some(Self { rays: rays.chunks(RAYS).map(some).collect() })
     }
 }
 
@@ -247,24 +258,35 @@ impl Bundle {
     /// the part that comes to no surface.
     fn seen_from(&self, sight: &Sight, place: (f32, f32), met: &[Met], sums: &mut [[f32; 3]]) -> f32 {
         sums.fill([0.0; 3]);
-        let total: f32 = self.rays.iter().map(|(_, weight)| weight).sum();
-        let widest_px = widest_px(met);
-        let (surfaces, position) = (sight.surfaces(), sight.position_at(place));
-        let mut unknown = 0.0;
-        for ([down, across], weight) in &self.rays {
-            let weight = weight / total;
-            let mut ray = Ray::new(surfaces, position, sight.per_px(place, position, (*down, *across), widest_px));
-            for (met, sums) in met.iter().zip(sums.iter_mut()) {
-                let [first, second] = ray.pass(*met);
-                let share = weight * (tent(first, met.layer as f32) + tent(second, met.layer as f32));
-                sums[1] += share;
-                if ray.reaches(met.layer) {
-                    sums[0] += share;
-                    sums[2] += weight;
-                }
-            }
-            unknown += if ray.ends() { 0.0 } else { weight };
-        }
-        unknown
+        let (widest_px, position) = (widest_px(met), sight.position_at(place));
+        let per_px = |beside: (f32, f32)| sight.per_px(place, position, beside, widest_px);
+        let unknown = |(beside, weights): &([(f32, f32); RAYS], Lanes)| {
+            follow(sight, (position, beside.map(per_px)), weights, (met, &mut *sums))
+        };
+        self.rays.iter().map(unknown).sum()
     }
+}
+
+/// Adds up what some rays see.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2", "aarch64+neon"))]
+fn follow(
+    sight: &Sight,
+    (position, per_px): ([f32; 2], [[f32; 2]; RAYS]),
+    weights: &Lanes,
+    (met, sums): (&[Met], &mut [[f32; 3]]),
+) -> f32 {
+    let per_px = [0, 1].map(|axis| per_px.map(|per_px| per_px[axis]));
+    let mut rays = Rays::new(sight.surfaces(), position.map(|position| [position; RAYS]), per_px);
+    for (met, sums) in met.iter().zip(sums) {
+        let [first, second] = rays.pass(*met);
+        let mut found = [[0.0; RAYS]; 3];
+        for ray in 0..RAYS {
+            let share = weights[ray] * (tent(first[ray], met.layer as f32) + tent(second[ray], met.layer as f32));
+            let open = if rays.reaches(ray, met.layer) { 1.0 } else { 0.0 };
+            (found[0][ray], found[1][ray], found[2][ray]) = (open * share, share, open * weights[ray]);
+        }
+        sums.iter_mut().zip(&found).for_each(|(sum, found)| *sum += found.iter().sum::<f32>());
+    }
+    let ended = rays.ended();
+    (0..RAYS).filter(|ray| !ended[*ray]).map(|ray| weights[ray]).sum()
 }

@@ -39,6 +39,12 @@ impl SceneRay {
         (self.across + dioptres * self.moment_m).extend(self.ahead)
     }
 
+    /// Returns it mirrored in the plane of x and z, times a factor.
+    fn mirrored(&self, factor: f64) -> Self {
+        let mirror = DVec2::new(factor, -factor);
+        Self { across: mirror * self.across, ahead: factor * self.ahead, moment_m: mirror * self.moment_m }
+    }
+
     fn minus(&self, other: &Self) -> Self {
         Self {
             across: self.across - other.across,
@@ -56,6 +62,13 @@ struct StopDerivatives {
     /// Derivatives by the direction cosines along the stop's own x and y.
     by_l: SceneRay,
     by_m: SceneRay,
+}
+
+impl StopDerivatives {
+    fn mirrored(&self) -> Self {
+        let in_stop = DVec2::new(self.in_stop.x, -self.in_stop.y);
+        Self { in_stop, by_l: self.by_l.mirrored(1.0), by_m: self.by_m.mirrored(-1.0) }
+    }
 }
 
 /// The rays that a point of the film sees, of all depths.
@@ -96,22 +109,34 @@ impl FilmPointJob<'_> {
         let cone = FilmCone::new(self.lens, -self.place_mm, self.film_distance_mm)?;
         let outline = self.outline(&cone, seed)?;
 
-        // Trace the nodes of the mesh; a ray that fails at the very edge of the pupil takes the place of its neighbor inside.
+        // Trace the nodes of the mesh, half of them where the others mirror them.
         let mesh = self.mesh;
         let cosines = outline.nodes(mesh);
-        let mut rays = cone.rays(&cosines);
-        let mut at_stop = if has_stop { self.at_stop(rays.clone()) } else { vec![] };
+        let own = |node: usize| if outline.is_mirrored { node.min(mesh.mirrored(node)) } else { node };
+        let traced: Vec<usize> = (0..cosines.len()).filter(|&node| own(node) == node).collect();
+        let mut rays = cone.rays(&traced.iter().map(|&node| cosines[node]).collect::<Vec<_>>());
+        let stopped = if has_stop { self.at_stop(rays.clone()) } else { vec![] };
         let mut light = RayLight::unpolarized(rays.len());
         self.lens.trace_light(&mut rays, &mut light, Vignetting::Off);
-        let mut seen: Vec<SceneRay> = self.scene_rays(&rays);
-        let mut shares: Vec<f64> = (0..rays.len()).map(|i| light.share(i)).collect();
-        for i in 0..seen.len() {
-            let inside = i.checked_sub(mesh.n_azimuths).filter(|inside| *inside > 0).unwrap_or(0);
-            if !rays.fate[i].is_in_flight() {
-                (seen[i], shares[i]) = (seen[inside], shares[inside]);
+        let traced_rays = self.scene_rays(&rays);
+        let (mut seen, mut shares, mut at_stop) = (vec![], vec![], vec![]);
+        for node in 0..cosines.len() {
+            let (ray, is_mirrored) = (traced.partition_point(|&node_of| node_of < own(node)), own(node) != node);
+            // A ray that fails at the very edge of the pupil takes the place of its neighbor inside.
+            let inside = node.checked_sub(mesh.n_azimuths).filter(|inside| *inside > 0).unwrap_or(0);
+            if rays.fate[ray].is_in_flight() || node == 0 {
+                seen.push(if is_mirrored { traced_rays[ray].mirrored(1.0) } else { traced_rays[ray] });
+                shares.push(light.share(ray));
+            } else {
+                (seen.push(seen[inside]), shares.push(shares[inside]));
             }
-            if has_stop && !at_stop[i].by_l.across.is_finite() {
-                at_stop[i] = at_stop[inside];
+            if let Some(stop) = stopped.get(ray) {
+                let is_known = stop.by_l.across.is_finite() || node == 0;
+                at_stop.push(match (is_known, is_mirrored) {
+                    (false, _) => at_stop[inside],
+                    (true, false) => *stop,
+                    (true, true) => stop.mirrored(),
+                });
             }
         }
 
@@ -141,9 +166,12 @@ impl FilmPointJob<'_> {
 
     fn outline(&self, cone: &FilmCone<'_>, seed: Option<&Outline>) -> Option<Outline> {
         let clearances = |cosines: &[DVec2]| cone.clearances(cosines);
-        let found = seed.and_then(|seed| seed.settled(&clearances)).or_else(|| {
+        // About a point on the x axis of a lens with an axis all mirrors itself.
+        let is_mirrored = self.place_mm.y == 0.0 && self.lens.forward().is_rotational();
+        let folded = |outline: &Outline| outline.mirrored(is_mirrored);
+        let found = seed.and_then(|seed| folded(seed).settled(&clearances)).or_else(|| {
             let (center, rho) = cone.edge(2 * self.mesh.n_azimuths)?;
-            let found = Outline::even(center, rho);
+            let found = folded(&Outline::even(center, rho));
             Some(found.settled(&clearances).unwrap_or(found))
         })?;
         Some(if self.lens.forward().has_openings() { found.with_corners(&clearances) } else { found })

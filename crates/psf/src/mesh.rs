@@ -37,6 +37,13 @@ impl Mesh {
         }
     }
 
+    /// Returns the node that mirrors a node about azimuth 0.
+    pub(crate) fn mirrored(self, node: usize) -> usize {
+        let Some(beyond) = node.checked_sub(1) else { return 0 };
+        let j = beyond % self.n_azimuths;
+        node - j + (self.n_azimuths - j) % self.n_azimuths
+    }
+
     /// Returns the polar places (share of the radius, azimuth) of all nodes in order.
     pub(crate) fn nodes(self) -> impl Iterator<Item = (f64, f64)> {
         let ring = move |ring: usize| {
@@ -100,5 +107,6 @@ mod tests {
         assert_eq!(mesh.corners(0, 4), [0, 5, 1, 0]);
         assert_eq!(mesh.corners(2, 4), [10, 15, 11, 6]);
         assert_eq!((mesh.share(0.0), mesh.share(3.0)), (0.0, 1.0));
+        assert_eq!([0, 1, 6, 7, 10].map(|node| mesh.mirrored(node)), [0, 1, 6, 10, 7]);
     }
 }

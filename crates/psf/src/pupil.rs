@@ -23,12 +23,36 @@ pub(crate) struct Outline {
     pub(crate) rho: Vec<f64>,
     /// Where they are not equally spaced; ascending, the first may be below 0.
     azimuths: Option<Vec<f64>>,
+    /// Whether it is known to mirror itself about the x axis, on which its center lies: half of it is looked for then.
+    pub(crate) is_mirrored: bool,
 }
 
 impl Outline {
     /// Returns the edge at equally spaced azimuths.
     pub(crate) fn even(center: DVec2, rho: Vec<f64>) -> Self {
-        Self { center, rho, azimuths: None }
+        Self { center, rho, azimuths: None, is_mirrored: false }
+    }
+
+    /// Returns it as one that mirrors itself, its upper half mirrored, or of which that is not known.
+    pub(crate) fn mirrored(&self, is_mirrored: bool) -> Self {
+        if self.is_mirrored || !is_mirrored {
+            return Self { is_mirrored, ..self.clone() };
+        }
+        let here = self.seen_from(DVec2::new(0.0, -self.center.y));
+        Self { center: DVec2::new(here.center.x, 0.0), is_mirrored, ..here }.unfolded()
+    }
+
+    /// Returns it with the lower half as the upper one is, where it mirrors itself.
+    fn unfolded(mut self) -> Self {
+        let n = self.rho.len();
+        (n / 2 + 1..n).filter(|_| self.is_mirrored).for_each(|i| self.rho[i] = self.rho[n - i]);
+        self
+    }
+
+    /// The azimuths of which the edge is looked for.
+    fn looked_for(&self) -> std::ops::Range<usize> {
+        let n = self.rho.len();
+        if self.is_mirrored { 0..n / 2 + 1 } else { 0..n }
     }
 
     /// Returns the places of a mesh's nodes over the region.
@@ -85,7 +109,7 @@ impl Outline {
             let next = azimuths.get(i + 1).copied().unwrap_or(azimuths[0] + TAU);
             azimuths[i] = 0.5 * (azimuths[i - 1] + next);
         }
-        let moved = Self { center: self.center, rho, azimuths: Some(azimuths) };
+        let moved = Self { center: self.center, rho, azimuths: Some(azimuths), is_mirrored: false };
         moved.refined(clearances, TOLERANCE).unwrap_or(self)
     }
 
@@ -155,7 +179,7 @@ impl Outline {
         let edge: Vec<DVec2> = (0..n).map(|i| polar(DVec2::ZERO, self.rho[i], self.azimuth(i))).collect();
         let area: f64 = self.rho.iter().map(|r| r * r).sum::<f64>() / 2.0;
         let shift = edge.iter().map(|p| *p * (p.length_squared() / 3.0)).sum::<DVec2>() / area;
-        self.seen_from(shift)
+        self.seen_from(if self.is_mirrored { DVec2::new(shift.x, 0.0) } else { shift })
     }
 
     /// Returns the same region seen from a place beside the center, at equally spaced azimuths; its edge by straight lines between what
@@ -164,8 +188,9 @@ impl Outline {
         let n = self.rho.len();
         let edge: Vec<DVec2> = (0..n).map(|i| polar(DVec2::ZERO, self.rho[i], self.azimuth(i))).collect();
         let direction = |i: usize| DVec2::from_angle(TAU * i as f64 / n as f64);
-        let rho = (0..n).map(|i| ray_to_polygon(aside, direction(i), &edge)).collect();
-        Self::even(self.center + aside, rho)
+        let mut rho = vec![0.0; n];
+        self.looked_for().for_each(|i| rho[i] = ray_to_polygon(aside, direction(i), &edge));
+        Self { is_mirrored: self.is_mirrored, ..Self::even(self.center + aside, rho) }.unfolded()
     }
 
     /// Returns the region with its edge moved to where clearances are 0, or `None` if that does not converge.
@@ -181,7 +206,7 @@ impl Outline {
         let mut outside = vec![(f64::INFINITY, f64::NAN); n];
         let mut previous = inside.clone();
         let mut here = self.rho.clone();
-        let mut open: Vec<usize> = (0..n).collect();
+        let mut open: Vec<usize> = self.looked_for().collect();
         for _ in 0..60 {
             let places: Vec<DVec2> = open.iter().map(|&i| center + directions[i] * here[i]).collect();
             let mut values = clearances(&places).into_iter();
@@ -201,7 +226,8 @@ impl Outline {
                 true
             });
             if open.is_empty() {
-                return self.rho.iter().all(|r| *r > 0.0).then_some(self);
+                let found = self.unfolded();
+                return found.rho.iter().all(|r| *r > 0.0).then_some(found);
             }
         }
         None
@@ -278,6 +304,13 @@ mod tests {
             let dark = Outline { center: DVec2::splat(100.0), ..found.clone() };
             assert_eq!(dark.settled(&clearances), None);
             assert_eq!(found.clone().with_corners(&clearances), found);
+            // One that mirrors itself is found by half.
+            let aside =
+                |places: &[DVec2]| places.iter().map(|p| radius - (*p - 0.3 * DVec2::X).length()).collect::<Vec<_>>();
+            let half = Outline::even(DVec2::new(0.3, 0.1 * radius), vec![0.5 * radius; 48]).mirrored(true);
+            let half = half.settled(&aside).unwrap();
+            assert!((half.center - 0.3 * DVec2::X).length() < 2e-3 * radius && half.center.y == 0.0, "{half:?}");
+            assert!(half.rho.iter().all(|rho| (rho / radius - 1.0).abs() < 3e-3), "{half:?}");
         }
     }
 

@@ -11,13 +11,16 @@ use dioptric_pipeline::{
     PipelineError, REFERENCE_WAVELENGTH_NM,
     display::{LinearRgb, code, level_at, wavelength_color},
 };
-use dioptric_spectrum::Bands;
+use dioptric_spectrum::{Bands, WavelengthGrid};
 
 /// Widest small picture, pixels.
 const THUMBNAIL: usize = 480;
 
 /// Pixels of the largest picture that is in the page whole; noise does not compress, and a page is to stay below 3 MB.
 const WHOLE_PIXELS: usize = 700_000;
+
+/// The most bands in which point spread functions are drawn.
+const MOST_BANDS: usize = 16;
 
 /// Returns the page as HTML.
 pub(super) fn render(page: &Page<'_>) -> Result<String, PipelineError> {
@@ -69,10 +72,13 @@ fn embedded(picture: &RgbImage) -> String {
 }
 
 fn mosaic(page: &Page<'_>) -> Result<(PsfMosaic, String), PipelineError> {
+    // Some of the bands are as white as all.
+    let all_nm = page.run.capture.grid().centers_nm();
+    let some_nm = all_nm.iter().copied().step_by(all_nm.len().div_ceil(MOST_BANDS)).collect();
     let plan = MosaicPlan {
         field_tans: [0.0, 0.35, 0.7, 0.95].iter().map(|share| page.places.field(*share)).collect(),
         dioptres: page.places.dioptres.clone(),
-        grid: page.run.capture.grid().clone(),
+        grid: WavelengthGrid::new(some_nm)?,
         tile_px: 95,
         tile_um: None,
     };
