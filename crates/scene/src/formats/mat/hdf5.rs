@@ -4,6 +4,8 @@
 //! round, the first being the fastest; arrays of other programs have the last as the fastest. How MATLAB marks its variables was
 //! taken from files that it wrote: attributes `MATLAB_class` and `MATLAB_empty`, structures as groups, cells as references.
 
+use std::collections::BTreeMap;
+
 use exr::prelude::f16;
 use hdf5_pure::{AttrValue, DType, Dataset, Datatype, DatatypeByteOrder, File, FloatingPointLayout, Group};
 
@@ -11,6 +13,7 @@ use super::{
     super::unusable::said,
     dimensions::Dimensions,
     elements::{self, LIMIT_ARRAYS, LIMIT_DEPTH, Listed},
+    links::take_links,
     packing::{Attribute, Value},
 };
 
@@ -19,6 +22,8 @@ pub(super) struct Hdf5 {
     file: File,
     /// Whether MATLAB wrote it, or one of its kind.
     pub(super) is_matlab: bool,
+    /// Links by name, each with where it leads.
+    links: BTreeMap<String, String>,
 }
 
 /// An array or a group, and what is known of it without its content.
@@ -46,9 +51,10 @@ impl Entry {
 
 impl Hdf5 {
     /// Opens a file that is in memory.
-    pub(super) fn open(bytes: Vec<u8>) -> Result<Self, String> {
+    pub(super) fn open(mut bytes: Vec<u8>) -> Result<Self, String> {
         let is_matlab = bytes.starts_with(b"MATLAB 7.3");
-        Ok(Self { file: File::from_bytes(bytes).map_err(broken)?, is_matlab })
+        let links = take_links(&mut bytes);
+        Ok(Self { file: File::from_bytes(bytes).map_err(broken)?, is_matlab, links })
     }
 
     /// Returns what the file states of itself.
@@ -69,6 +75,11 @@ impl Hdf5 {
         entries.iter_mut().zip(axes).for_each(|(entry, axes)| entry.axes = axes);
         // What is but the name and the length of an axis.
         entries.retain(|entry| !entry.dimensions.is_bare);
+        for (name, target) in &self.links {
+            let name = format!("{name} (a link to {target})");
+            let listed = Listed { name, sides: vec![], is_numeric: false, is_complex: false };
+            entries.push(Entry::without_content(listed, String::new(), false));
+        }
         Ok(entries)
     }
 
@@ -302,14 +313,14 @@ fn numbers_of(dataset: &Dataset) -> Result<Vec<u8>, String> {
 
 fn broken(error: hdf5_pure::Error) -> String {
     let said = said(error);
-    // Links by name have no place.
-    let has_link = said.contains(&u64::MAX.to_string());
-    let way = if said.contains("unexpected EOF") && !has_link {
+    let way = if said.contains("unexpected EOF") {
         "expected all of it, for it ends too early"
+    } else if said.contains("virtual") || said.contains("external files") {
+        "expected its numbers in the file itself (h5repack --layout=CONTI)"
     } else if said.contains("unsupported filter") {
         "expected none or gzip (h5repack -f GZIP=4)"
     } else {
-        "expected one without links, which older programs read as well (h5repack --high=V18)"
+        "expected one that older programs read as well (h5repack --high=V18)"
     };
     format!("it is HDF5 that cannot be read ({said}): {way}")
 }

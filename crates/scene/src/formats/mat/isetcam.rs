@@ -147,7 +147,7 @@ pub(in super::super) fn read_mat(path: &Path, reading: &FileReading) -> Result<M
                 return Err(wrong(complex(&names.collect::<Vec<_>>().join(", "))));
             }
             [] => {
-                let others = file.listed.iter().filter(|own| own.sides.len() == 3 && !own.is_numeric);
+                let others = file.listed.iter().filter(|own| matches!(own.sides.len(), 0 | 3) && !own.is_numeric);
                 let names = others.map(|own| format!(", and its '{}' has no numbers that are read", own.name));
                 let expected =
                     "expected a variable 'scene', 'mcCOEF' or 'photons', or an array of three axes outside structures";

@@ -11,6 +11,7 @@ mod iset_film;
 mod iset_kinds;
 mod iset_write;
 mod isetcam;
+mod links;
 mod packing;
 mod plane;
 #[cfg(test)]
