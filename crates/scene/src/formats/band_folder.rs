@@ -13,6 +13,7 @@ use super::{
     read_options::ReadOptions,
     reading::FileQuantity,
     stated::{merged, name_of, note_of},
+    tiff_file::TiffAs,
     unusable::unreadable,
     wavelength_unit::{PLAUSIBLE_NM, without_unit},
 };
@@ -114,12 +115,14 @@ fn check_bands(folder: &Path, pictures: &[Numbered]) -> Result<(), SceneError> {
 
 /// Returns all pictures, and the largest code that there can be in any of them.
 fn grays_of(pictures: &[Numbered], notes: &mut Vec<String>) -> Result<(Vec<GrayPicture>, Option<f64>), SceneError> {
-    let read: Result<Vec<_>, _> = pictures.par_iter().map(|(_, path)| read_gray(path, None)).collect();
+    let read: Result<Vec<_>, _> =
+        pictures.par_iter().map(|(_, path)| read_gray(path, TiffAs::Planes(None), None)).collect();
     let mut told = vec![];
     let mut grays = vec![];
     for (noted, (own_nm, path)) in read?.into_iter().zip(pictures) {
         let mut own = vec![];
-        let gray = noted.told_in(&mut own);
+        let mut gray = noted.told_in(&mut own);
+        gray.page.count_from_black(&mut gray.values, gray.top);
         let stated_nm = gray.wavelength_nm.filter(|nm| (nm - own_nm).abs() > 0.5);
         own.extend(stated_nm.map(|nm| format!("{}: its wavelength, {nm} nm, is not used", name_of(path))));
         told.push((path.clone(), own));

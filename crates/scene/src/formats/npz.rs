@@ -161,6 +161,8 @@ pub(super) fn read_npz_plane(path: &Path, told: Option<&str>) -> Result<Noted<(S
         Some(told) => archive.named(told)?,
         None => {
             let planes = archive.of_sides(|sides| sides.iter().filter(|side| **side != 1).count() == 2)?;
+            // One of a single row or column, where there is no other.
+            let planes = if planes.is_empty() { archive.of_sides(|sides| sides.len() == 2)? } else { planes };
             let called = DEPTHS.iter().find_map(|own| planes.iter().find(|name| is_called(bare(name), own)));
             match (called, &planes[..]) {
                 (Some(called), _) => called.clone(),

@@ -475,7 +475,7 @@ mod tests {
         page.encoder().write_tag(tiff::tags::Tag::PhotometricInterpretation, 51_177_u16).unwrap();
         page.write_data(&[1, 2]).unwrap();
         let message = refused("a.tif", file.get_ref());
-        assert!(message.contains("depth map of DNG") && !message.contains("develop"), "{message}");
+        assert!(message.contains("depth map (DNG)") && !message.contains("develop"), "{message}");
     }
 
     /// The checksum of a chunk (PNG, third edition, annex D).

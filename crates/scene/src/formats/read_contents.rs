@@ -11,6 +11,7 @@ use super::{
     chart_table::read_chart,
     contents::{Contents, Cube, Heeds, Hidden, Image, MATLAB_OR_HDF5, is_of},
     cube_folder::CubeFolder,
+    depth::read_depth,
     envi::{contents_of_envi, header_of},
     light_unit::LightUnit,
     mat::{MatScene, read_mat},
@@ -28,7 +29,7 @@ use super::{
     reduced::reduced_size,
     spectral_exr::{AskedChannels, RawFile, RawHidden, RawImage, read_raw_exr},
     stated::{name_of, note_of},
-    tiff_file::{RAW, TiffAs, TiffFile, TiffStack, is_tiff, read_tiff},
+    tiff_file::{RAW, TiffAs, TiffFile, TiffStack, has_depth_map, is_tiff, read_tiff},
     unusable::{starts_with, unreadable},
 };
 use crate::{SceneError, View};
@@ -126,6 +127,26 @@ fn of_pfm(path: &Path) -> Result<Contents, SceneError> {
 }
 
 fn of_tiff(path: &Path, options: &ReadOptions) -> Result<Contents, SceneError> {
+    let mut contents = pages_of_tiff(path, options)?;
+    let reading = &options.reading;
+    match &reading.depth {
+        _ if !has_depth_map(path) => {}
+        Some(file) => {
+            let note = (file != path).then(|| format!("{}: its depth map is not used", name_of(path)));
+            contents.notes.extend(note);
+        }
+        None => {
+            let (kind, unit, variable) =
+                (reading.depth_kind, reading.depth_unit.as_deref(), reading.depth_variable.as_deref());
+            let depth = read_depth(path, DepthWords { kind, unit, variable, unit_m: None })?;
+            contents.depth = Some(RawDepth { from: "its depth map".to_owned(), ..depth });
+        }
+    }
+    Ok(contents)
+}
+
+/// The picture, or the bands, of a TIFF file.
+fn pages_of_tiff(path: &Path, options: &ReadOptions) -> Result<Contents, SceneError> {
     // Bands that are told make a cube of what would be a picture.
     let n_told = options.reading.wavelengths_nm.as_ref().map(Vec::len);
     let wanted = n_told.map_or(TiffAs::Marked, |n| TiffAs::Planes(Some(n)));
@@ -133,11 +154,17 @@ fn of_tiff(path: &Path, options: &ReadOptions) -> Result<Contents, SceneError> {
     match read_tiff(path, wanted)?.told_in(&mut notes) {
         TiffFile::Picture(_) => of_picture(path, options, notes),
         TiffFile::Linear(mut planes, page) => {
-            planes.iter_mut().for_each(|plane| page.ignore(plane, None));
+            for plane in &mut planes {
+                page.ignore(plane);
+                page.count_from_black(plane, None);
+            }
             Ok(linear(planes, None, notes))
         }
         TiffFile::Stack(mut stack) => {
-            stack.planes.iter_mut().for_each(|plane| stack.page.ignore(plane, stack.top));
+            for plane in &mut stack.planes {
+                stack.page.ignore(plane);
+                stack.page.count_from_black(plane, stack.top);
+            }
             notes.extend(stack.page.note_of_description(path));
             let TiffStack { planes, wavelengths_nm, top, .. } = stack;
             Cube { planes, top, wavelengths_nm, quantity: None, unit: None, notes }.into_contents(path, options)
