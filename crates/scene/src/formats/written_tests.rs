@@ -299,12 +299,17 @@ fn unknown_words_of_stacks_and_attributes_are_named() {
             let mut file = hdf5_pure::FileBuilder::new();
             let cube = file.create_dataset("cube");
             cube.with_data(&super::kinds_tests::in_order("yxb")).with_shape(&[3, 4, 5]);
-            if case % 2 == 0 {
+            if case % 3 == 0 {
                 cube.set_attr(&word, hdf5_pure::AttrValue::F64(2.0));
             }
             file.create_dataset("wave").with_data(&super::kinds_tests::WAVE_NM).with_shape(&[5]);
-            if case % 2 == 1 {
+            if case % 3 == 1 {
                 file.set_attr(&word, hdf5_pure::AttrValue::F64(2.0));
+            }
+            if case % 3 == 2 {
+                let mut group = file.create_group("of");
+                group.set_attr(&word, hdf5_pure::AttrValue::F64(2.0));
+                file.add_group(group.finish());
             }
             fs::write(&h5, file.finish().unwrap()).unwrap();
             check_named(&read_scene(&h5, &options).unwrap(), &word, 1);
