@@ -77,7 +77,7 @@ fn of_tiff(
     };
     page.ignore(&mut gray.values);
     gray.page = page.clone();
-    notes.extend(page.note_of_description(path));
+    notes.extend(page.notes_of_description(path));
     Ok(gray)
 }
 

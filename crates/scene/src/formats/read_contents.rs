@@ -165,7 +165,7 @@ fn pages_of_tiff(path: &Path, options: &ReadOptions) -> Result<Contents, SceneEr
                 stack.page.ignore(plane);
                 stack.page.count_from_black(plane, stack.top);
             }
-            notes.extend(stack.page.note_of_description(path));
+            notes.extend(stack.page.notes_of_description(path));
             let TiffStack { planes, wavelengths_nm, top, .. } = stack;
             Cube { planes, top, wavelengths_nm, quantity: None, unit: None, notes }.into_contents(path, options)
         }

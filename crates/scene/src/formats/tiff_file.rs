@@ -175,7 +175,7 @@ pub(super) fn read_tiff(path: &Path, wanted: TiffAs) -> Result<Noted<TiffFile>, 
     if let Some(n_stated) = n_stated.filter(|n| *n != planes.len()) {
         return Err(unreadable(path, format!("it states {n_stated} wavelengths, but has {} planes", planes.len())));
     }
-    notes.extend(note_of(path, "key of its description", &bands.keys));
+    notes.extend(note_of(path, "description key", &bands.keys));
     notes.extend(note_of(path, "page name", &bands.names));
     let mut page = words;
     page.descriptions = described(&own, bands.are_described);

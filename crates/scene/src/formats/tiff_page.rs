@@ -294,13 +294,65 @@ impl PageWords {
             .then(|| format!("{}: its orientation, {} (tag 274), is not used", name_of(path), self.orientation))
     }
 
-    /// Returns what is said of a description that nothing took.
-    pub(super) fn note_of_description(&self, path: &Path) -> Option<String> {
-        // Writers put the shape of the array there.
-        let says = |text: &&String| !(text.starts_with("{\"shape\":") || text.starts_with("ImageJ="));
-        let described: Vec<String> = self.descriptions.iter().filter(says).cloned().collect();
-        note_of(path, "description", &described)
+    /// Returns what is said of descriptions that nothing took; of those that programs write by themselves it is the keys that say more
+    /// than they usually do.
+    pub(super) fn notes_of_description(&self, path: &Path) -> Vec<String> {
+        let (mut keys, mut described) = (vec![], vec![]);
+        for text in &self.descriptions {
+            match written_keys(text) {
+                Some(own) => {
+                    keys.extend(own.into_iter().filter(|(key, value)| !is_usual(key, value)).map(|(key, _)| key))
+                }
+                None => described.push(text.clone()),
+            }
+        }
+        let notes = [note_of(path, "description key", &keys), note_of(path, "description", &described)];
+        notes.into_iter().flatten().collect()
     }
+}
+
+/// Returns the keys of a description that tifffile or `ImageJ` wrote, with their values; none of another.
+fn written_keys(text: &str) -> Option<Vec<(String, String)>> {
+    if text.starts_with("ImageJ=") {
+        let pairs = text.lines().filter_map(|line| line.split_once('='));
+        return Some(pairs.map(|(key, value)| (key.trim().to_owned(), value.trim().to_owned())).collect());
+    }
+    match serde_json::from_str(text) {
+        Ok(Json::Object(map)) if map.contains_key("shape") => {
+            Some(map.into_iter().map(|(key, value)| (key, words(&value))).collect())
+        }
+        _ => None,
+    }
+}
+
+fn words(value: &Json) -> String {
+    value.as_str().map_or_else(|| value.to_string(), str::to_owned)
+}
+
+/// Whether a key of a description is one of the shape of the array, in rows before columns, or of how `ImageJ` shows it.
+fn is_usual(key: &str, value: &str) -> bool {
+    const KEYS: [&str; 19] = [
+        "ImageJ",
+        "shape",
+        "truncated",
+        "images",
+        "channels",
+        "slices",
+        "frames",
+        "hyperstack",
+        "mode",
+        "loop",
+        "unit",
+        "yunit",
+        "zunit",
+        "tunit",
+        "spacing",
+        "finterval",
+        "fps",
+        "min",
+        "max",
+    ];
+    KEYS.contains(&key) || (key == "axes" && value.to_uppercase().contains("YX"))
 }
 
 /// What pages say of their bands.
@@ -351,7 +403,7 @@ fn listed_in(page: &Page) -> Option<(Vec<f64>, Vec<String>)> {
     let list = WAVELENGTHS.iter().find_map(|key| map.remove(*key))?;
     let list = list.as_array()?.iter().map(Json::as_f64).collect::<Option<Vec<f64>>>()?;
     // The shape of the array is written by tifffile.
-    let left = map.into_iter().map(|(key, _)| key).filter(|key| !["shape", "axes"].contains(&key.as_str())).collect();
+    let left = map.into_iter().filter(|(key, value)| !is_usual(key, &words(value))).map(|(key, _)| key).collect();
     Some((list, left))
 }
 
