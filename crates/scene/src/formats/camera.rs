@@ -62,7 +62,7 @@ impl CameraFile {
         }
         match self.depth_unit_m {
             Some(unit_m) if !(unit_m.is_finite() && unit_m > 0.0) => {
-                Err(format!("depth_unit_m is {}, expected a length above 0", shown(unit_m)))
+                Err(format!("1 of its depth would be {} m (depth_unit_m), expected a length above 0", shown(unit_m)))
             }
             _ => Ok(self),
         }

@@ -138,7 +138,11 @@ type Keys = Stated<Value>;
 /// Puts what the frame of a picture states in the place of what is stated for all (`frames` of nerfstudio); of frames none of which is
 /// the picture's it is said where they state more than poses.
 fn with_frame(path: &Path, picture: &Path, mut all: Keys) -> Result<(Keys, Option<String>), String> {
-    let Some(Value::Array(frames)) = all.take("frames") else { return Ok((all, None)) };
+    let frames = match all.take("frames") {
+        None | Some(Value::Null) => return Ok((all, None)),
+        Some(Value::Array(frames)) => frames,
+        Some(_) => return Err("its frames are no list, expected an object for each".to_owned()),
+    };
     let Some(Value::Object(frame)) = frame_of(path, picture, &frames) else {
         if frames.iter().any(|frame| frame.get("fl_x").is_some()) {
             return Err(format!(
@@ -176,9 +180,10 @@ fn frame_of<'a>(path: &Path, picture: &Path, frames: &'a [Value]) -> Option<&'a 
 
 /// Takes the number of the first of these keys that is there; `null` is none.
 fn number(keys: &mut Keys, names: &[&str]) -> Result<Option<f64>, String> {
-    match keys.take_any(names) {
-        None | Some(Value::Null) => Ok(None),
-        Some(value) => value.as_f64().map(Some).ok_or_else(|| format!("{} is {value}, expected a number", names[0])),
+    let own = names.iter().find_map(|name| Some((name, keys.take(name)?)));
+    match own {
+        None | Some((_, Value::Null)) => Ok(None),
+        Some((name, value)) => value.as_f64().map(Some).ok_or_else(|| format!("{name} is {value}, expected a number")),
     }
 }
 

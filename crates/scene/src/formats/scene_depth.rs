@@ -40,7 +40,7 @@ pub(super) fn words<'a>(
 fn depth_of_frame(file: &Path, camera: &Path, words: DepthWords<'_>) -> Result<RawDepth, SceneError> {
     if !file.is_file() {
         let reason =
-            format!("its depth_file_path names {}, which is not there: --depth FILE names another", file.display());
+            format!("its depth_file_path names '{}', which is no file: --depth FILE names another", file.display());
         return Err(unreadable(camera, reason));
     }
     let usual = words.unit_m.unwrap_or(NERFSTUDIO_UNIT_M);
@@ -82,7 +82,11 @@ pub(super) fn raw_depth(
         (None, own) if words.variable.is_some() && (is_of(path, MATLAB_OR_HDF5) || is_of(path, &["npz"])) => {
             unused = beside();
             unused.extend(own.map(|own| own.from));
-            Some(read_depth(path, words)?)
+            let mut depth = read_depth(path, words)?;
+            // The other arrays are the scene's, which names those that are not used.
+            let others = format!("{}: its array", name_of(path));
+            depth.notes.retain(|note| !note.starts_with(&others));
+            Some(depth)
         }
         (None, Some(own)) => {
             unused = beside();

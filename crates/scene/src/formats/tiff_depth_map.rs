@@ -68,8 +68,14 @@ impl DepthMapTags {
         if is_known && is_inverse {
             values.mapv_inplace(f32::recip);
         }
-        let lacks = match (is_known, is_inverse, ends) {
-            (true, ..) | (_, false, None) => None,
+        // Without a word of what they are its numbers are those of any depth.
+        let says_nothing = self.format == 0 && self.ends.is_none() && self.unit == 0;
+        let lacks = match (is_known || says_nothing, is_inverse, ends) {
+            (true, ..) => None,
+            (_, false, None) => Some(
+                "its DepthFormat, DepthNear and DepthFar do not say what its numbers are: expected --depth-unit, as mm, or \
+                 --depth-kind",
+            ),
             (_, true, _) => {
                 Some("its numbers are inverse depths of no stated unit: expected --depth-kind, as inverse:NEAR_M,FAR_M")
             }
@@ -164,6 +170,11 @@ mod tests {
         write(&own, true, (51_177, 8), Some([2, 0, 0]), [(1, 2), (4, 1)]);
         let message = read(&own, FileReading::default()).unwrap_err().to_string();
         assert!(message.contains("inverse depths") && message.contains("--depth-kind"), "{message}");
+        for (format, ends) in [(1, [(0, 0), (5, 1)]), (1, [(1, 2), (1, 0)]), (0, [(1, 2), (5, 1)])] {
+            write(&own, true, (51_177, 8), Some([format, METRES, 1]), ends);
+            let message = read(&own, FileReading::default()).unwrap_err().to_string();
+            assert!(message.contains("do not say what its numbers are"), "{message}");
+        }
         let message = read(&map, FileReading::default()).unwrap_err().to_string();
         assert!(message.contains("no picture: expected it as --depth"), "{message}");
     }
