@@ -212,7 +212,7 @@ fn listing(folder: &Path) -> Result<Listing, SceneError> {
 
 /// Returns the number that a stem ends in, before an optional `nm`.
 fn number_at_end(stem: &str) -> Option<f64> {
-    let stem = stem.strip_suffix("nm").unwrap_or(stem);
+    let stem = stem.strip_suffix("nm").map_or(stem, |own| own.trim_end_matches(['_', '-', ' ']));
     let digits = stem.len() - stem.trim_end_matches(|c: char| c.is_ascii_digit() || c == '.').len();
     stem[stem.len() - digits..].trim_start_matches('.').parse().ok()
 }
@@ -274,7 +274,7 @@ mod tests {
 
     #[test]
     fn wavelengths_come_from_the_names() {
-        let folder = folder_of(&["toys_1000.png", "toys_400.5nm.png", "toys-550.png", "preview.png"]);
+        let folder = folder_of(&["toys_1000_nm.png", "toys_400.5nm.png", "toys-550.png", "preview.png"]);
         let image = read_band_folder(folder.path(), None).unwrap();
         assert_eq!(image.grid().centers_nm(), [400.5, 550.0, 1000.0]);
         assert_eq!(image.quantity(), Quantity::Reflectance);

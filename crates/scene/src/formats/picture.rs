@@ -386,6 +386,11 @@ fn undecodable(path: &Path, error: &ImageError) -> SceneError {
             format!("it ends before all of its samples ({said})")
         }
         ImageError::Decoding(_) => format!("it is broken, or of another format than its name says ({said})"),
+        ImageError::Unsupported(_) if said.contains("color type `Unknown") => {
+            "its samples are of other bits or channels than those of pictures: expected gray, or red, green and blue with or without \
+             opacity, of 8 or 16 bits, or bands of a TIFF, which --scene-wavelengths-nm tells"
+                .to_owned()
+        }
         ImageError::Unsupported(_) => format!(
             "it is of a kind that is not read ({said}): expected gray or red, green and blue as .png, .jpg, .tif, .webp, .bmp, .ppm or .hdr, or \
              numbers as .exr, .pfm, .npy, .npz, .mat, .h5 or .txt"
