@@ -13,11 +13,13 @@ use super::{
     exr_attributes::{self, Attributes, words_of},
     exr_colors::are_srgb,
     reading::Frame,
-    spectral_exr::HIDDEN_LAYER,
     stated::{Noted, Stated},
     unusable::{check_memory, said, unreadable},
 };
 use crate::SceneError;
+
+/// The name of the layer that holds what lies behind the first surface.
+pub(crate) const HIDDEN_LAYER: &str = "hidden";
 
 /// The most columns, and rows, of a picture.
 const MOST_SAMPLES: usize = 1 << 20;

@@ -251,6 +251,24 @@ fn one_of_several_planes_of_depth_is_asked_for() {
     assert!(with(Some("3")).is_err() && with(Some("z")).is_err());
 }
 
+/// Two gray samples whose wavelengths a description lists are bands, as they stand whatever the mark says of white.
+#[test]
+fn two_gray_samples_are_bands() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("a.tif");
+    let mut encoder = TiffEncoder::new(fs::File::create(&file).unwrap()).unwrap();
+    let mut image = encoder.new_image::<colortype::Gray8>(COLUMNS as u32, ROWS as u32).unwrap();
+    image.extra_samples(&[ExtraSamples::Unspecified]).unwrap();
+    image.encoder().write_tag(Tag::PhotometricInterpretation, 0_u16).unwrap();
+    image.encoder().write_tag(Tag::ImageDescription, r#"{"wavelengths_nm": [550, 450]}"#).unwrap();
+    image.write_data(&[200_u8, 99].repeat(ROWS * COLUMNS)).unwrap();
+    drop(encoder);
+    let scene = read_scene(&file, &told(Some(FileQuantity::Radiance), None, false)).unwrap();
+    assert_eq!(scene.radiance.grid().centers_nm(), [450.0, 550.0]);
+    assert_eq!([0, 1].map(|band: usize| scene.radiance.planes()[band][(1, 1)]), [99.0, 200.0]);
+    check_named(&scene, "0 is white (tag 262) is not used");
+}
+
 /// Bands in which a display sends no light at all are no black scene.
 #[test]
 fn pictures_in_the_infrared_are_refused() {

@@ -11,7 +11,7 @@ use super::{
     exr_attributes::{Attributes, is_harmless},
     exr_colors::{ColorsOf, EXPECTED, colors_of, is_called_picture, srgb_from, srgb_from_xyz},
     exr_depth,
-    exr_layers::{Head, RawLayer, leave_other_views, read_headers, read_layers, split_layers},
+    exr_layers::{HIDDEN_LAYER, Head, RawLayer, leave_other_views, read_headers, read_layers, split_layers},
     light_unit::LightUnit,
     primaries::into_srgb,
     raw_depth::RawDepth,
@@ -21,9 +21,6 @@ use super::{
     wavelength_unit::PLAUSIBLE_NM,
 };
 use crate::{HiddenLayer, SceneError, SceneLight, View};
-
-/// The name of the layer that holds what lies behind the first surface.
-pub(crate) const HIDDEN_LAYER: &str = "hidden";
 
 /// What a spectral EXR file holds.
 #[derive(Clone, Debug, PartialEq)]
