@@ -541,6 +541,8 @@ mod tests {
         let refused = |spec: SceneSpec| spec.check(&checker).unwrap_err().to_string();
         let message = refused(SceneSpec { depth_m: Some(5.0), ..of(&life) });
         assert!(message.contains("depth_m") && message.contains("depths of its own"), "{message}");
+        let message = refused(of(&SceneSource::StillLife { columns: 0, rows: 32 }));
+        assert!(message.contains("columns is 0, expected 1 to 65536"), "{message}");
         let seen = SceneSpec { field_of_view_deg: Some(14.0), depth_m: Some(2.0), ..of(&target) };
         assert!(seen.check(&checker).is_ok());
         for spec in [of(&life), seen] {

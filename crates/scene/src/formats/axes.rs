@@ -20,6 +20,7 @@ pub(super) fn planes(
     let sides: [usize; 3] = match *sides {
         [rows, columns] => [rows, columns, 1],
         [a, b, c] => [a, b, c],
+        [] => return Err("it holds a single number, expected rows, columns and bands".to_owned()),
         _ => return Err(format!("it has the sides {}, expected rows, columns and bands", shown())),
     };
     let [y, x, b] = match told {

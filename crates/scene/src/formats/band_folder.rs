@@ -13,6 +13,7 @@ use super::{
     read_options::ReadOptions,
     reading::FileQuantity,
     stated::{merged, name_of, note_of},
+    tiff_file::TiffAs,
     unusable::unreadable,
     wavelength_unit::{PLAUSIBLE_NM, without_unit},
 };
@@ -114,12 +115,14 @@ fn check_bands(folder: &Path, pictures: &[Numbered]) -> Result<(), SceneError> {
 
 /// Returns all pictures, and the largest code that there can be in any of them.
 fn grays_of(pictures: &[Numbered], notes: &mut Vec<String>) -> Result<(Vec<GrayPicture>, Option<f64>), SceneError> {
-    let read: Result<Vec<_>, _> = pictures.par_iter().map(|(_, path)| read_gray(path, None)).collect();
+    let read: Result<Vec<_>, _> =
+        pictures.par_iter().map(|(_, path)| read_gray(path, TiffAs::Planes(None), None)).collect();
     let mut told = vec![];
     let mut grays = vec![];
     for (noted, (own_nm, path)) in read?.into_iter().zip(pictures) {
         let mut own = vec![];
-        let gray = noted.told_in(&mut own);
+        let mut gray = noted.told_in(&mut own);
+        gray.page.count_from_black(&mut gray.values, gray.top);
         let stated_nm = gray.wavelength_nm.filter(|nm| (nm - own_nm).abs() > 0.5);
         own.extend(stated_nm.map(|nm| format!("{}: its wavelength, {nm} nm, is not used", name_of(path))));
         told.push((path.clone(), own));
@@ -209,7 +212,7 @@ fn listing(folder: &Path) -> Result<Listing, SceneError> {
 
 /// Returns the number that a stem ends in, before an optional `nm`.
 fn number_at_end(stem: &str) -> Option<f64> {
-    let stem = stem.strip_suffix("nm").unwrap_or(stem);
+    let stem = stem.strip_suffix("nm").map_or(stem, |own| own.trim_end_matches(['_', '-', ' ']));
     let digits = stem.len() - stem.trim_end_matches(|c: char| c.is_ascii_digit() || c == '.').len();
     stem[stem.len() - digits..].trim_start_matches('.').parse().ok()
 }
@@ -271,7 +274,7 @@ mod tests {
 
     #[test]
     fn wavelengths_come_from_the_names() {
-        let folder = folder_of(&["toys_1000.png", "toys_400.5nm.png", "toys-550.png", "preview.png"]);
+        let folder = folder_of(&["toys_1000_nm.png", "toys_400.5nm.png", "toys-550.png", "preview.png"]);
         let image = read_band_folder(folder.path(), None).unwrap();
         assert_eq!(image.grid().centers_nm(), [400.5, 550.0, 1000.0]);
         assert_eq!(image.quantity(), Quantity::Reflectance);

@@ -37,7 +37,9 @@ pub(super) struct CameraFile {
     pub(super) distortion: Distortion,
     /// What one code of the depth beside the picture stands for, m.
     pub(super) depth_unit_m: Option<f64>,
-    pub(super) note: Option<String>,
+    /// The depth of the picture, where the file names it (`depth_file_path` of nerfstudio).
+    pub(super) depth_file: Option<PathBuf>,
+    pub(super) notes: Vec<String>,
 }
 
 impl CameraFile {
@@ -60,7 +62,7 @@ impl CameraFile {
         }
         match self.depth_unit_m {
             Some(unit_m) if !(unit_m.is_finite() && unit_m > 0.0) => {
-                Err(format!("depth_unit_m is {}, expected a length above 0", shown(unit_m)))
+                Err(format!("1 of its depth would be {} m (depth_unit_m), expected a length above 0", shown(unit_m)))
             }
             _ => Ok(self),
         }
@@ -103,7 +105,7 @@ impl CameraFile {
             cx_px: center(self.center_px[0], width),
             cy_px: center(self.center_px[1], height),
             distortion: self.distortion,
-            notes: self.note.iter().cloned().chain(self.note_of_defaults(fy_px.is_none())).collect(),
+            notes: self.notes.iter().cloned().chain(self.note_of_defaults(fy_px.is_none())).collect(),
         })
     }
 

@@ -16,7 +16,7 @@ use super::{
     camera_models::{HARMLESS, check_matrix, is_fisheye, unknown_model},
     camera_yaml::of_yaml,
     distortion::Distortion,
-    stated::{Stated, short},
+    stated::{Stated, name_of, short},
     unusable::{check_memory, unreadable},
 };
 use crate::SceneError;
@@ -30,20 +30,20 @@ impl CameraFile {
     pub(super) fn beside(picture: &Path) -> Result<Option<Self>, SceneError> {
         let candidates = beside(picture, &[".camera.json", "_camera.json"]);
         let Some(path) = candidates.into_iter().find(|path| path.is_file()) else { return Ok(None) };
-        Self::read(&path).map(Some)
+        Self::read(&path, picture).map(Some)
     }
 
-    /// Reads camera data: JSON of ours (`width`, `height`, `fx_px`, `fy_px`, `cx_px`, `cy_px`), of `Open3D` (`intrinsic_matrix`) or of
+    /// Reads the camera data of a picture: JSON of ours (`width`, `height`, `fx_px`, `fy_px`, `cx_px`, `cy_px`), of `Open3D` (`intrinsic_matrix`) or of
     /// nerfstudio (`fl_x`, …), COLMAP's `cameras.txt`, or YAML of `OpenCV` and ROS (`camera_matrix`) or of Kalibr (`intrinsics`).
     ///
     /// # Errors
     /// When it is none of these, lacks what is needed, says a thing twice, or has a model of a lens that is not known.
-    pub(super) fn read(path: &Path) -> Result<Self, SceneError> {
+    pub(super) fn read(path: &Path, picture: &Path) -> Result<Self, SceneError> {
         let length = fs::metadata(path).map_err(|error| unreadable(path, error))?.len();
         check_memory(path, length.saturating_mul(4), length)?;
         let text = fs::read_to_string(path).map_err(|error| unreadable(path, error))?;
         let data = match text.trim_start_matches('\u{feff}').trim_start() {
-            text if text.starts_with('{') => of_json(path, text),
+            text if text.starts_with('{') => of_json(path, text, picture),
             text if text.contains("camera_matrix") || text.contains("intrinsics:") || text.starts_with("%YAML") => {
                 of_yaml(path, text)
             }
@@ -93,17 +93,16 @@ impl<'de> Deserialize<'de> for Object {
 }
 
 /// Reads JSON of ours, `Open3D`, nerfstudio or ROS.
-fn of_json(path: &Path, text: &str) -> Result<CameraFile, String> {
+fn of_json(path: &Path, text: &str, picture: &Path) -> Result<CameraFile, String> {
     let Object(entries) = serde_json::from_str(text).map_err(|error| error.to_string())?;
-    let mut keys = Stated::new("key", entries);
+    let (mut keys, frames_note) = with_frame(path, picture, Stated::new("key", entries))?;
+    let depth_file = match keys.take("depth_file_path") {
+        None | Some(Value::Null) => None,
+        Some(Value::String(own)) => Some(path.with_file_name(own)),
+        Some(other) => return Err(format!("depth_file_path is {other}, expected the name of a file")),
+    };
     // Centers of pixels are at whole numbers for OpenCV and Open3D, at halves for nerfstudio.
     let is_nerf = keys.get("fl_x").is_some() || keys.get("camera_angle_x").is_some();
-    if let Some(frames) = keys.take("frames") {
-        let same = frames.as_array().is_none_or(|frames| frames.iter().all(|frame| frame.get("fl_x").is_none()));
-        if !same {
-            return Err("its frames have focal lengths of their own: expected one for all".to_owned());
-        }
-    }
     let is_fisheye = is_of_fisheye(&mut keys)?;
     if keys.get("units").and_then(Value::as_str).is_some_and(|unit| ["px", "pixel", "pixels"].contains(&unit)) {
         keys.take("units");
@@ -128,18 +127,63 @@ fn of_json(path: &Path, text: &str) -> Result<CameraFile, String> {
         center_px: [cx, cy].map(|center| center.map(|center| center - half)),
         distortion,
         depth_unit_m,
-        note: keys.note(path, |name| HARMLESS.contains(&name)),
+        depth_file,
+        notes: keys.note(path, |name| HARMLESS.contains(&name)).into_iter().chain(frames_note).collect(),
     })
 }
 
 /// The keys of a camera file.
 type Keys = Stated<Value>;
 
+/// Puts what the frame of a picture states in the place of what is stated for all (`frames` of nerfstudio); of frames none of which is
+/// the picture's it is said where they state more than poses.
+fn with_frame(path: &Path, picture: &Path, mut all: Keys) -> Result<(Keys, Option<String>), String> {
+    let frames = match all.take("frames") {
+        None | Some(Value::Null) => return Ok((all, None)),
+        Some(Value::Array(frames)) => frames,
+        Some(_) => return Err("its frames are no list, expected an object for each".to_owned()),
+    };
+    let Some(Value::Object(frame)) = frame_of(path, picture, &frames) else {
+        if frames.iter().any(|frame| frame.get("fl_x").is_some()) {
+            return Err(format!(
+                "its frames have focal lengths of their own, and none of their file_path is {}: expected one for all, or that of the picture",
+                name_of(picture)
+            ));
+        }
+        let have_depth = frames.iter().any(|frame| frame.get("depth_file_path").is_some());
+        let note = format!(
+            "{}: none of the file_path of its frames is {}, so that no depth_file_path of theirs is used",
+            name_of(path),
+            name_of(picture)
+        );
+        return Ok((all, have_depth.then_some(note)));
+    };
+    let mut own = Stated::new("key", frame.clone().into_iter().collect());
+    // Where it was taken from, and how sharp it is.
+    own.take_all(|name| ["file_path", "transform_matrix", "sharpness", "colmap_im_id"].contains(&name));
+    own.merge(all);
+    Ok((own, None))
+}
+
+/// Returns the frame whose file is a picture, or else the only one that is called like it elsewhere; the ending may be left out.
+fn frame_of<'a>(path: &Path, picture: &Path, frames: &'a [Value]) -> Option<&'a Value> {
+    let (name, here) = (picture.file_name()?, picture.canonicalize().ok());
+    let file = |frame: &Value| frame.get("file_path").and_then(Value::as_str).map(|own| path.with_file_name(own));
+    let is_called = |own: &PathBuf| own.file_name() == Some(name) || own.file_name() == picture.file_stem();
+    let is_here = |own: PathBuf| here.is_some() && own.with_file_name(name).canonicalize().ok() == here;
+    let mut alike = frames.iter().filter(|frame| file(frame).is_some_and(|own| is_called(&own)));
+    alike
+        .clone()
+        .find(|frame| file(frame).is_some_and(is_here))
+        .or_else(|| alike.next().filter(|_| alike.next().is_none()))
+}
+
 /// Takes the number of the first of these keys that is there; `null` is none.
 fn number(keys: &mut Keys, names: &[&str]) -> Result<Option<f64>, String> {
-    match keys.take_any(names) {
-        None | Some(Value::Null) => Ok(None),
-        Some(value) => value.as_f64().map(Some).ok_or_else(|| format!("{} is {value}, expected a number", names[0])),
+    let own = names.iter().find_map(|name| Some((name, keys.take(name)?)));
+    match own {
+        None | Some((_, Value::Null)) => Ok(None),
+        Some((name, value)) => value.as_f64().map(Some).ok_or_else(|| format!("{name} is {value}, expected a number")),
     }
 }
 
@@ -226,7 +270,7 @@ fn distortion_of(keys: &mut Keys, is_fisheye: bool, is_nerf: bool) -> Result<Dis
 
 /// Takes what one code of the depth beside the picture stands for, m.
 fn depth_unit_of(keys: &mut Keys) -> Result<Option<f64>, String> {
-    let unit_m = number(keys, &["depth_unit_m", "depth_unit_scale_factor"])?;
+    let unit_m = number(keys, &["depth_unit_m", "depth_unit_scale_factor", "integer_depth_scale"])?;
     let of_scale = match number(keys, &["depth_scale"])? {
         None => None,
         // So many codes a metre, as TUM and Open3D have it; small factors are metres to some and millimetres to others.
@@ -296,7 +340,8 @@ fn of_colmap(path: &Path, text: &str) -> Result<CameraFile, String> {
         center_px: [Some(c.0 - 0.5), Some(c.1 - 0.5)],
         distortion: Distortion::of_list(k, model.ends_with("_FISHEYE"))?,
         depth_unit_m: None,
-        note: super::stated::note_of(path, "line", &more),
+        depth_file: None,
+        notes: super::stated::note_of(path, "line", &more).into_iter().collect(),
     })
 }
 

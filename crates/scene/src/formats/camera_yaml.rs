@@ -71,20 +71,24 @@ pub(super) fn of_yaml(path: &Path, text: &str) -> Result<CameraFile, String> {
         center_px: [Some(c.0), Some(c.1)],
         distortion: Distortion::of_list(&k, is_bent_as_fisheye)?,
         depth_unit_m: None,
-        note: keys.note(path, |name| {
-            const OURS: [&str; 9] = [
-                "calibration_time",
-                "calibration_Time",
-                "nframes",
-                "board_width",
-                "board_height",
-                "square_size",
-                "flags",
-                "camera_name",
-                "sensor_type",
-            ];
-            HARMLESS.contains(&name) || OURS.contains(&name) || name.contains("error")
-        }),
+        depth_file: None,
+        notes: keys
+            .note(path, |name| {
+                const OURS: [&str; 9] = [
+                    "calibration_time",
+                    "calibration_Time",
+                    "nframes",
+                    "board_width",
+                    "board_height",
+                    "square_size",
+                    "flags",
+                    "camera_name",
+                    "sensor_type",
+                ];
+                HARMLESS.contains(&name) || OURS.contains(&name) || name.contains("error")
+            })
+            .into_iter()
+            .collect(),
     })
 }
 

@@ -275,7 +275,14 @@ impl Cube {
             },
         };
         if wavelengths_nm.len() != n {
-            return Err(unreadable(path, format!("{n} bands, but {} wavelengths", wavelengths_nm.len())));
+            return Err(unreadable(
+                path,
+                format!(
+                    "it has {n} bands, but {} wavelengths: expected as many (--scene-wavelengths-nm), or, where bands lie \
+                     along another axis of an array, --axes",
+                    wavelengths_nm.len()
+                ),
+            ));
         }
         Ok(wavelengths_nm)
     }

@@ -118,7 +118,7 @@ pub(super) fn read_depth(path: &Path, words: DepthWords<'_>) -> Result<RawDepth,
         unit: DepthUnit::Metres(unit_m),
         is_picture: numbers.top.is_some(),
         top: numbers.top,
-        columns: numbers.values.ncols(),
+        columns_per_column: 1.0,
         frame: numbers.frame,
         values: numbers.values,
         file: path.to_owned(),
@@ -142,10 +142,8 @@ fn unit_m_of(path: &Path, numbers: &DepthNumbers, words: DepthWords<'_>) -> Resu
     if words.unit.is_some() || of_other_kind {
         return Ok(1.0);
     }
-    if numbers.is_no_length && words.kind.is_none() {
-        return wrong(
-            "its words say that it holds disparities or inverse distances: expected --depth-kind, as disparity:BASELINE_M or inverse",
-        );
+    if let (Some(lacks), None) = (numbers.lacks, words.kind) {
+        return wrong(lacks);
     }
     if let Some(unit_m) = words.unit_m {
         return Ok(unit_m);
@@ -180,7 +178,7 @@ fn unit_m_of(path: &Path, numbers: &DepthNumbers, words: DepthWords<'_>) -> Resu
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::{super::reading::Frame, *};
     use dioptric_pictures::save;
     use image::{ImageBuffer, Luma};
     use ndarray::Array2;
@@ -196,7 +194,7 @@ mod tests {
         let picture = ImageBuffer::from_fn(4, codes.len() as u32, |x, y| Luma([codes[y as usize][x as usize]]));
         save(&picture.into(), &path).unwrap();
         let view = crate::View { focal_px: 100.0, center_x_px: 1.5, center_y_px: 0.5 };
-        Ok(read_depth(&path, words)?.axial_m(Some(view))?.unwrap())
+        Ok(read_depth(&path, words)?.axial_m(Some(view)).unwrap())
     }
 
     #[test]
@@ -252,7 +250,7 @@ mod tests {
         for name in ["a.npy", "a.pfm", "a.exr", "a.tif"] {
             let told = if name == "a.pfm" { words(Some("m"), None) } else { DepthWords::default() };
             let depth = read_depth(&at(name), told).unwrap();
-            let z_m = depth.axial_m(None).unwrap().unwrap();
+            let z_m = depth.axial_m(None).unwrap();
             assert_eq!(z_m.row(0).to_vec(), [0.5, 1.0, 1.5, 2.0], "{name}");
             // Blender's sky, and places that were not measured.
             assert!(z_m[(1, 0)] == f32::INFINITY && z_m[(1, 1)].is_nan() && z_m[(1, 2)] == 0.0, "{name}: {z_m}");
@@ -262,7 +260,7 @@ mod tests {
         save(&gray.into(), &at("b.png")).unwrap();
         assert!(read_depth(&at("b.png"), DepthWords::default()).is_err_and(|e| e.to_string().contains("8 bits")));
         let told = read_depth(&at("b.png"), words(Some("25.5/m"), None)).unwrap();
-        assert_eq!(told.axial_m(None).unwrap().unwrap()[(0, 0)], 2.0);
+        assert_eq!(told.axial_m(None).unwrap()[(0, 0)], 2.0);
     }
 
     #[test]
@@ -304,8 +302,7 @@ mod tests {
     fn codes_are_the_numbers_whatever_they_are_counted_from() {
         let folder = tempfile::tempdir().unwrap();
         let at = |name: &str| folder.path().join(name);
-        let z_m =
-            |name: &str, told: DepthWords<'_>| read_depth(&at(name), told).unwrap().axial_m(None).unwrap().unwrap();
+        let z_m = |name: &str, told: DepthWords<'_>| read_depth(&at(name), told).unwrap().axial_m(None).unwrap();
         // A largest code below that of the bits is no reason to stretch.
         let codes: Vec<u8> = [2000_u16, 5000, 1, 0].iter().flat_map(|code| code.to_be_bytes()).collect();
         fs::write(at("a.pgm"), [&b"P5\n# a word\n2 2\n5000\n"[..], &codes].concat()).unwrap();
@@ -326,6 +323,12 @@ mod tests {
             image.encoder().write_tag(tiff::tags::Tag::ImageDescription, "depth_scale=5000").unwrap();
             image.write_data(&[2000, 9999, 500, 700]).unwrap();
         };
+        let mut file = fs::File::create(at("c.tif")).unwrap();
+        let mut encoder = tiff::encoder::TiffEncoder::new(&mut file).unwrap();
+        let mut image = encoder.new_image::<tiff::encoder::colortype::Gray32Float>(2, 1).unwrap();
+        image.encoder().write_tag(tiff::tags::Tag::PhotometricInterpretation, 0_u16).unwrap();
+        image.write_data(&[0.001_234_567, 1234.567]).unwrap();
+        assert_eq!(z_m("c.tif", DepthWords::default()), ndarray::arr2(&[[0.001_234_567, 1234.567]]));
         for (name, white_zero) in [("a.tif", false), ("b.tif", true)] {
             tiff(name, white_zero, Some("9999"));
             let depth = z_m(name, DepthWords::default());
@@ -347,6 +350,25 @@ mod tests {
         assert_eq!(finer.resized(2, 2).unwrap().values[(0, 1)], 4.0);
         let depth = RawDepth::in_file(Path::new("a.exr"), "Z".to_owned(), Array2::ones((20, 20)), DepthKind::Axial);
         assert!(depth.resized(20, 40).is_err_and(|error| error.to_string().contains("20 × 20")));
+        // Anchors are those of all the map, whatever of it is taken.
+        let map = Array2::from_shape_fn((3, 3), |(row, column)| (3 * row + column) as f32);
+        let kind = Some(DepthKind::InverseBetween { near_m: 0.5, far_m: f64::INFINITY });
+        let depth = RawDepth::in_file(Path::new("a.exr"), "Z".to_owned(), map, DepthKind::Axial);
+        let depth = depth.told(DepthWords { kind, ..DepthWords::default() }).unwrap().resized(1, 1).unwrap();
+        assert_eq!(depth.axial_m(None).unwrap()[(0, 0)], 1.0);
+        // A disparity counts the samples of its own map: those of half of the picture are as large, those of half its resolution half as large.
+        let view = crate::View { focal_px: 100.0, center_x_px: 3.5, center_y_px: 1.5 };
+        for (own, frame, disparity) in [((4, 8), (4, 8), 10.0), ((2, 4), (2, 4), 5.0), ((4, 4), (4, 8), 10.0)] {
+            let kind = DepthKind::Disparity { baseline_m: 0.2, offset_px: 0.0 };
+            let map = Array2::from_elem(own, disparity);
+            let depth = RawDepth {
+                frame: Some(Frame::whole(frame.0, frame.1)),
+                unit: DepthUnit::Samples(1.0),
+                ..RawDepth::in_file(Path::new("a.exr"), "Z".to_owned(), map, kind)
+            };
+            let depth = depth.laid_on(Frame::whole(4, 8), (4, 8)).resized(4, 8).unwrap();
+            assert_eq!(depth.axial_m(Some(view)).unwrap()[(3, 2)], 2.0, "{own:?}");
+        }
     }
 
     #[test]
@@ -357,7 +379,7 @@ mod tests {
             save(&ImageBuffer::from_pixel(4, 2, Luma([code])).into(), &at(name)).unwrap();
         }
         let depth = depth_beside(&at("room.png"), DepthWords::default()).unwrap().unwrap();
-        assert_eq!(depth.axial_m(None).unwrap().unwrap()[(0, 0)], 0.5);
+        assert_eq!(depth.axial_m(None).unwrap()[(0, 0)], 0.5);
         assert_eq!(depth.notes, ["room.png: its depth file 'room_depth.png' is not used"]);
         assert_eq!(likely_beside(&at("room.png")), ["room_disp.png"]);
         assert!(depth_beside(&at("other.png"), DepthWords::default()).unwrap().is_none());

@@ -7,7 +7,7 @@ use ndarray::Array2;
 use super::{
     contents::{MATLAB_OR_HDF5, is_of},
     exr_depth_file::{DepthChannel, read_depth_exr},
-    gray_picture::read_gray,
+    gray_picture::{GrayPicture, read_gray},
     length_unit::length_in_name,
     mat::{Plane, read_plane},
     npy::{NpyArray, read_npy},
@@ -16,6 +16,8 @@ use super::{
     reading::{DepthKind, Frame},
     stated::{Noted, name_of},
     text_depth::read_text_depth,
+    tiff_depth_map::MappedDepths,
+    tiff_file::TiffAs,
     unusable::{starts_with, unreadable},
 };
 use crate::SceneError;
@@ -27,8 +29,8 @@ pub(super) struct DepthNumbers {
     pub(super) top: Option<f64>,
     /// What the names in the file say that they count.
     pub(super) kind: DepthKind,
-    /// Whether the names in the file say that they are no lengths, but disparities or inverse distances.
-    pub(super) is_no_length: bool,
+    /// What is asked for where the file says that they are no lengths of a known unit.
+    pub(super) lacks: Option<&'static str>,
     /// The length of 1, m, where the file states it.
     pub(super) unit_m: Option<f64>,
     /// The picture of which they are a part, where the file tells.
@@ -43,7 +45,7 @@ pub(super) fn depth_numbers(path: &Path, told: Option<&str>) -> Result<Noted<Dep
         values,
         top,
         kind: DepthKind::Axial,
-        is_no_length: false,
+        lacks: None,
         unit_m: None,
         frame: None,
         from: name_of(path),
@@ -69,8 +71,8 @@ pub(super) fn depth_numbers(path: &Path, told: Option<&str>) -> Result<Noted<Dep
         "npz" => {
             let (name, array) = read_npz_plane(path, told)?.told_in(&mut notes);
             let (values, top) = plane_of(path, array)?;
-            let (kind, unit_m, is_no_length) = (kind_of_array(&name, ""), length_in_name(&name), is_no_length(&name));
-            DepthNumbers { from: named(&name), kind, unit_m, is_no_length, ..of(values, top) }
+            let (kind, unit_m, lacks) = (kind_of_array(&name, ""), length_in_name(&name), lacks_length(&name));
+            DepthNumbers { from: named(&name), kind, unit_m, lacks, ..of(values, top) }
         }
         _ if is_of(path, MATLAB_OR_HDF5) => {
             let Plane { name, values, top, unit_m, words } = read_plane(path, told)?.told_in(&mut notes);
@@ -82,8 +84,8 @@ pub(super) fn depth_numbers(path: &Path, told: Option<&str>) -> Result<Noted<Dep
                 return Err(unreadable(path, reason));
             }
             let unit_m = unit_m.or(named_m);
-            let is_no_length = is_no_length(&name) || is_no_length(&words);
-            DepthNumbers { from: named(&name), kind, unit_m, is_no_length, ..of(values, top) }
+            let lacks = lacks_length(&name).or_else(|| lacks_length(&words));
+            DepthNumbers { from: named(&name), kind, unit_m, lacks, ..of(values, top) }
         }
         "exr" => {
             let DepthChannel { name, plane, kind, frame } = read_depth_exr(path, told)?.told_in(&mut notes);
@@ -96,9 +98,19 @@ pub(super) fn depth_numbers(path: &Path, told: Option<&str>) -> Result<Noted<Dep
             return Err(unreadable(path, reason));
         }
         _ => {
-            let gray = read_gray(path, told)?.told_in(&mut notes);
-            let top = gray.top;
-            of(gray.into_stored(path, &mut notes), top)
+            let GrayPicture { values, top, page, .. } = read_gray(path, TiffAs::Depths, told)?.told_in(&mut notes);
+            if page.is_white_zero {
+                notes.push(format!(
+                    "{}: its mark that 0 is white (tag 262) says how it is shown: its numbers are taken as they stand",
+                    name_of(path)
+                ));
+            }
+            match page.depth_map.map(|tags| tags.depths(values.clone(), top)) {
+                Some(MappedDepths { values, kind, top, unit_m, lacks }) => {
+                    DepthNumbers { kind, unit_m, lacks, ..of(values, top) }
+                }
+                None => of(values, top),
+            }
         }
     };
     Ok(Noted::new(numbers, notes))
@@ -115,10 +127,12 @@ fn kind_of_array(name: &str, words: &str) -> DepthKind {
     if !says_axis && (says_ray || last.eq_ignore_ascii_case("distance")) { DepthKind::Radial } else { DepthKind::Axial }
 }
 
-/// Whether words speak of what is no length.
-fn is_no_length(words: &str) -> bool {
+/// Returns what is asked for where words speak of what is no length.
+fn lacks_length(words: &str) -> Option<&'static str> {
     let lower = words.to_lowercase();
-    lower.contains("disparit") || lower.contains("inverse")
+    (lower.contains("disparit") || lower.contains("inverse")).then_some(
+        "its words say that it holds disparities or inverse distances: expected --depth-kind, as disparity:BASELINE_M or inverse",
+    )
 }
 
 /// Whether a file is the header of an ENVI cube, or has one.
@@ -136,9 +150,10 @@ fn is_envi(path: &Path, ending: &str) -> bool {
     }
 }
 
-/// Returns an array of rows and columns, whatever its sides of 1.
+/// Returns an array of rows and columns, whatever its further sides of 1.
 fn plane_of(path: &Path, array: NpyArray) -> Result<(Array2<f32>, Option<f64>), SceneError> {
-    let sides: Vec<usize> = array.sides.iter().copied().filter(|side| *side != 1).collect();
+    let is_plane = array.sides.len() == 2;
+    let sides: Vec<usize> = array.sides.iter().copied().filter(|side| is_plane || *side != 1).collect();
     let &[rows, columns] = &sides[..] else {
         return Err(unreadable(path, format!("its sides are {:?}, expected rows and columns", array.sides)));
     };

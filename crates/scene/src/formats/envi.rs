@@ -203,7 +203,8 @@ impl EnviFile {
                 Some(wanted) => wanted.to_vec(),
                 None => {
                     let reason = format!(
-                        "the header lacks it: expected it there, or --scene-wavelengths-nm, {} numbers",
+                        "the header lacks it, or does not say in which unit: expected it there, or \
+                         --scene-wavelengths-nm, {} numbers",
                         header.bands
                     );
                     return Err(wrong("wavelength", reason));

@@ -359,7 +359,10 @@ impl Entries<'_> {
         let Some(entry) = self.get(key) else { return Ok(None) };
         match entry.value.parse() {
             Ok(number) => Ok(Some(number)),
-            Err(_) => Err(self.wrong(key, format!("'{}' is not a number that can stand here", shown(&entry.value)))),
+            Err(_) => {
+                let what = format!("'{}' is not a number that can stand here", shown(&entry.value));
+                Err(self.wrong(key, what + ": expected a single one, without a point where it counts"))
+            }
         }
     }
 

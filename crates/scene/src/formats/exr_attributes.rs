@@ -29,8 +29,10 @@ const LIGHT: &str = "sceneLight";
 pub(crate) struct Attributes {
     /// Of radiance or irradiance, `None` where nothing is said; or the text of a unit that is not known.
     pub(super) unit: Result<Option<LightUnit>, String>,
-    /// The words of that unit, where it names no length of wavelength outside the layout that understands a nanometre.
-    open_unit: Option<String>,
+    /// The words of that unit.
+    unit_words: Option<String>,
+    /// Whether it is in the layout that understands a nanometre where no length of wavelength is named.
+    is_in_layout: bool,
     pub(crate) pitch_um: Option<f64>,
     focal_px: Option<f64>,
     center_x_px: Option<f64>,
@@ -116,9 +118,27 @@ impl Attributes {
         Self { others: Stated::new("attribute", vec![]), ..self.clone() }
     }
 
-    /// Returns what is understood of a unit that does not state it.
+    /// Takes unit and brightness of another part of the picture where it states none of its own.
+    pub(super) fn inherit(&mut self, first: &Self) {
+        if self.unit == Ok(None) {
+            self.unit.clone_from(&first.unit);
+            self.unit_words.clone_from(&first.unit_words);
+            self.is_in_layout = first.is_in_layout;
+        }
+        self.white_cd_m2 = self.white_cd_m2.or(first.white_cd_m2);
+    }
+
+    /// Returns the unit in the file's words, with the nanometre that is understood; `None` where nothing is stated.
+    pub(super) fn told_unit(&self) -> Option<String> {
+        let words = self.unit_words.as_ref()?;
+        let understood = if LightUnit::lacks_wavelength(words) { ", a nanometre" } else { "" };
+        Some(short(words) + understood)
+    }
+
+    /// Returns what is understood of a unit that does not state it, outside the layout that says so.
     pub(super) fn note_of_unit(&self, path: &Path) -> Option<String> {
-        let words = self.open_unit.as_ref()?;
+        let words =
+            self.unit_words.as_ref().filter(|words| !self.is_in_layout && LightUnit::lacks_wavelength(words))?;
         Some(format!(
             "{}: its {UNITS} '{}' names no length of wavelength: a nanometre is understood",
             name_of(path),
@@ -184,14 +204,12 @@ pub(crate) fn from_layer(layer: &LayerAttributes) -> Attributes {
         Some(AttributeValue::Text(text)) => words_of(text).trim().parse().ok(),
         _ => None,
     };
-    let unit = match get(UNITS) {
-        // `W.m^-2.sr^-1` is what the layout's reference library writes for values a nanometre.
-        Some(AttributeValue::Text(text)) => {
-            let text = words_of(text);
-            LightUnit::parse(&text).map(Some).ok_or(text)
-        }
-        _ => Ok(None),
+    let unit_words = match get(UNITS) {
+        Some(AttributeValue::Text(text)) => Some(words_of(text)),
+        _ => None,
     };
+    // `W.m^-2.sr^-1` is what the layout's reference library writes for values a nanometre.
+    let unit = unit_words.as_ref().map(|text| LightUnit::parse(text).ok_or_else(|| text.clone())).transpose();
     let ours = [LAYOUT_VERSION, UNITS, PITCH, FOCAL, CENTER_X, CENTER_Y, FOV, LIGHT];
     let own = layer.other.keys().map(words_of).filter(|name| !ours.contains(&name.as_str()));
     let own = own.filter_map(|name| match get(&name).filter(|_| COLOR_SPACES.contains(&name.as_str())) {
@@ -227,13 +245,10 @@ pub(crate) fn from_layer(layer: &LayerAttributes) -> Attributes {
         }
         _ => Ok(None),
     };
-    let open_unit = match get(UNITS).filter(|_| get(LAYOUT_VERSION).is_none()) {
-        Some(AttributeValue::Text(text)) => Some(words_of(text)).filter(|text| LightUnit::lacks_wavelength(text)),
-        _ => None,
-    };
     Attributes {
         light,
-        open_unit,
+        unit_words,
+        is_in_layout: get(LAYOUT_VERSION).is_some(),
         white_cd_m2: layer.white_luminance.map(f64::from),
         environment: layer.environment_map,
         others: Stated::new("attribute", others.into_iter().map(|name| (name, ())).collect()),

@@ -48,8 +48,9 @@ pub(super) fn depth_name<'a>(names: impl Iterator<Item = &'a str>, prefix: &str)
             return Some(((*one).to_owned(), DepthKind::Axial));
         }
     }
-    if names.contains(&"distance") {
-        return Some(("distance".to_owned(), DepthKind::Radial));
+    let distances = [format!("{prefix}.distance"), "distance".to_owned()];
+    if let Some(name) = distances.into_iter().find(|name| names.contains(&name.as_str())) {
+        return Some((name, DepthKind::Radial));
     }
     // The way along the ray, as Mitsuba writes its depth.
     let ways: Vec<&&str> = names.iter().filter(|name| name.ends_with(".T") && name.len() > 2).collect();
@@ -104,6 +105,7 @@ mod tests {
         check(&["X", "Y", "Z"], "", None);
         check(&["X", "Y", "Z", "distance"], "", Some("distance"));
         check(&["Y", "Z"], "", Some("Z"));
+        check(&["front.distance", "distance"], "front", Some("front.distance"));
         // Mitsuba calls the way along the ray T, and reflectances of bands have names that begin so.
         check(&["dd.y.T", "albedo.R"], "", Some("dd.y.T"));
         check(&["a.T", "b.T"], "", None);

@@ -18,6 +18,9 @@ use super::{
 };
 use crate::SceneError;
 
+/// The name of the layer that holds what lies behind the first surface.
+pub(crate) const HIDDEN_LAYER: &str = "hidden";
+
 /// The most columns, and rows, of a picture.
 const MOST_SAMPLES: usize = 1 << 20;
 
@@ -90,9 +93,20 @@ impl RawLayer {
         self.planes.iter().any(|(name, _)| band_name::parse(name).is_some())
     }
 
-    /// Splits off what stands behind the name of a layer of bands and a point, as `a.S0.550nm` and `a.Z` of `a`.
+    /// Whether it is what lies behind the first surface: bands, or colors and a depth, under that name.
+    pub(super) fn is_behind(&self) -> bool {
+        let has_depth = self.planes.iter().any(|(name, _)| name == "Z");
+        self.name == HIDDEN_LAYER && (self.has_bands() || self.has_colors() && has_depth)
+    }
+
+    /// Splits off what stands behind the name of a layer of bands and a point, as `a.S0.550nm` and `a.Z` of `a`, and colors that lie
+    /// behind the first surface.
     fn split(mut self) -> Vec<Self> {
         let mut names: Vec<String> = vec![];
+        let has = |letter: &str| self.planes.iter().any(|(name, _)| *name == format!("{HIDDEN_LAYER}.{letter}"));
+        if has("Z") && (["R", "G", "B"].iter().all(|letter| has(letter)) || has("Y")) {
+            names.push(HIDDEN_LAYER.to_owned());
+        }
         for prefix in self.planes.iter().filter_map(|(name, _)| band_name::layer_of(name)) {
             if names.iter().all(|own| own != prefix) {
                 names.push(prefix.to_owned());

@@ -620,6 +620,27 @@ fn channels_of_a_layer_hidden_are_what_lies_behind() {
     let colors = [("hidden.R", flat(1.0)), ("hidden.Z", flat(5.0))];
     let scene = read(bands.iter().chain(&colors).cloned().collect());
     assert!(scene.hidden.is_none() && scene.notes.iter().any(|note| note.contains("--hidden")), "{:?}", scene.notes);
+    // Colors behind colors, and behind bands.
+    let gray = |start: &str, value: f32| ["R", "G", "B"].map(|letter| (format!("{start}{letter}"), flat(value)));
+    let colors = [gray("", 0.2).to_vec(), gray("hidden.", 0.8).to_vec()].concat();
+    let named = |colors: &[(String, FlatSamples)]| {
+        let depths = [("Z", flat(1.0)), ("hidden.Z", flat(5.0))];
+        let colors: Vec<_> = colors.iter().map(|(name, plane)| (name.as_str(), plane.clone())).collect();
+        read(colors.into_iter().chain(depths).collect::<Vec<_>>())
+    };
+    let scene = named(&colors);
+    let white = named(&[gray("", 1.0).to_vec(), gray("hidden.", 0.0).to_vec()].concat()).radiance.planes()[1][(1, 1)];
+    check_layers(&scene, [0.2 * white, 0.8 * white, 1.0, 5.0], &["behind the first surface, linear colors"]);
+    assert_eq!(scene.notes.len(), 2, "{:?}", scene.notes);
+    let scene = read(
+        bands
+            .iter()
+            .cloned()
+            .chain(colors[3..].iter().map(|(name, plane)| (name.as_str(), plane.clone())))
+            .chain([("hidden.Z", flat(5.0))])
+            .collect(),
+    );
+    assert_eq!(scene.hidden.unwrap().depth.range_m(), (5.0, 5.0));
 }
 
 #[test]
@@ -633,8 +654,13 @@ fn a_unit_without_a_wavelength_is_named() {
     };
     let bare = ("emissiveUnits", "W.m^-2.sr^-1");
     assert!(matches!(&notes(&[bare])[..], [note] if note.contains("'W.m^-2.sr^-1'") && note.contains("nanometre")));
-    // The layout understands a nanometre.
-    assert!(notes(&[bare, ("spectralLayoutVersion", "1.0")]).is_empty());
+    // The layout understands a nanometre, of which the line of what was understood has a word.
+    let in_layout = [bare, ("spectralLayoutVersion", "1.0")];
+    assert!(notes(&in_layout).is_empty());
+    let file = file();
+    write_raw(&file.path, vec![("S0.450nm", flat(1.0)), ("S0.550nm", flat(1.0))], &in_layout);
+    let scene = read_scene(&file.path, &ReadOptions::default()).unwrap();
+    assert!(scene.notes[0].contains("radiance in W.m^-2.sr^-1, a nanometre"), "{:?}", scene.notes);
     assert!(notes(&[("emissiveUnits", "W.m^-2.sr^-1.nm^-1")]).is_empty());
     assert!(notes(&[("emissiveUnits", "W.m^-3.sr^-1")]).is_empty());
 }

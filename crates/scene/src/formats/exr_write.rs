@@ -12,9 +12,9 @@ use ndarray::{Array2, s};
 
 use super::{
     band_name, exr_attributes,
+    exr_layers::HIDDEN_LAYER,
     exr_samples::{ExrSamples, Stored, check_size},
     exr_stream::SpectralHead,
-    spectral_exr::HIDDEN_LAYER,
     unusable::{open_new, unwritable},
 };
 use crate::{HiddenLayer, Scene, SceneError, SceneLight, View};

@@ -10,11 +10,12 @@ use super::{
     picture_parts::{note_of_orientation, notes_on_parts},
     stated::{Noted, name_of, note_of},
     tiff_file::{TiffAs, TiffFile, TiffStack, is_tiff, read_tiff},
+    tiff_page::PageWords,
     unusable::unreadable,
 };
 use crate::SceneError;
 
-/// The numbers of a gray picture, counted from black.
+/// The numbers of a gray picture as they stand there.
 pub(super) struct GrayPicture {
     /// What stands for none is no number.
     pub(super) values: Array2<f32>,
@@ -22,33 +23,18 @@ pub(super) struct GrayPicture {
     pub(super) top: Option<f64>,
     /// The wavelength that the file states, nm.
     pub(super) wavelength_nm: Option<f64>,
-    /// Whether the file counts from white, so that the numbers are not those that stand there.
-    is_white_zero: bool,
-}
-
-impl GrayPicture {
-    /// Returns the numbers as they stand in the file, of which light is not what they count.
-    pub(super) fn into_stored(self, path: &Path, notes: &mut Vec<String>) -> Array2<f32> {
-        if !self.is_white_zero {
-            return self.values;
-        }
-        notes.push(format!(
-            "{}: its mark that 0 is white (tag 262) is not used: its numbers are taken as they stand",
-            name_of(path)
-        ));
-        let top = self.top.unwrap_or(1.0) as f32;
-        self.values.mapv(|v| top - v)
-    }
+    /// What a page of a TIFF says of them.
+    pub(super) page: PageWords,
 }
 
 /// Reads a gray picture, which may be saved as a colored one; of a TIFF of several planes that of the number told, from 1.
 ///
 /// # Errors
 /// When it cannot be read, has colors, or several planes of which none is told.
-pub(super) fn read_gray(path: &Path, told: Option<&str>) -> Result<Noted<GrayPicture>, SceneError> {
+pub(super) fn read_gray(path: &Path, wanted: TiffAs, told: Option<&str>) -> Result<Noted<GrayPicture>, SceneError> {
     if is_tiff(path) {
         let mut notes = vec![];
-        let file = read_tiff(path, TiffAs::Planes(None))?.told_in(&mut notes);
+        let file = read_tiff(path, wanted)?.told_in(&mut notes);
         let gray = of_tiff(path, file, told, &mut notes)?;
         return Ok(Noted::new(gray, notes));
     }
@@ -79,16 +65,19 @@ fn of_tiff(
     let mut gray = match file {
         TiffFile::Picture(page) => {
             notes.extend(page.note_of_orientation(path));
-            codes_of(path, notes)?
+            // What decodes pictures counts them from black.
+            let mut gray = codes_of(path, notes)?;
+            page.count_from_black(&mut gray.values, gray.top);
+            gray
         }
         TiffFile::Linear([values, ..], _) => {
-            GrayPicture { values, top: None, wavelength_nm: None, is_white_zero: false }
+            GrayPicture { values, top: None, wavelength_nm: None, page: PageWords::default() }
         }
         TiffFile::Stack(stack) => plane_of(path, stack, told, notes)?,
     };
-    page.ignore(&mut gray.values, gray.top);
-    gray.is_white_zero = page.is_white_zero;
-    notes.extend(page.note_of_description(path));
+    page.ignore(&mut gray.values);
+    gray.page = page.clone();
+    notes.extend(page.notes_of_description(path));
     Ok(gray)
 }
 
@@ -117,14 +106,14 @@ fn plane_of(
         (0..n).filter(|own| *own != index && !are_alike).map(|own| (own + 1).to_string()).collect();
     notes.extend(note_of(path, "plane", &others));
     let wavelength_nm = stack.wavelengths_nm.as_ref().map(|list| list[index]);
-    Ok(GrayPicture { values: stack.planes.swap_remove(index), top: stack.top, wavelength_nm, is_white_zero: false })
+    Ok(GrayPicture { values: stack.planes.swap_remove(index), top: stack.top, wavelength_nm, page: stack.page })
 }
 
 /// Returns the codes of a gray picture and the largest that there can be.
 fn codes_of(path: &Path, notes: &mut Vec<String>) -> Result<GrayPicture, SceneError> {
     let of = |size: (u32, u32), codes: Vec<f32>, top: u16| {
         let values = Array2::from_shape_vec((size.1 as usize, size.0 as usize), codes).expect("a code a pixel");
-        GrayPicture { values, top: Some(top.into()), wavelength_nm: None, is_white_zero: false }
+        GrayPicture { values, top: Some(top.into()), wavelength_nm: None, page: PageWords::default() }
     };
     let picture = decode(path, 4)?;
     let size = (picture.width(), picture.height());

@@ -40,7 +40,7 @@ pub(super) fn read_hidden(
         let reason = format!("its samples are others than those of {}, behind which they lie", name_of(first));
         return Err(unreadable(file, reason));
     }
-    let words = words(file, options)?;
+    let (words, _) = words(file, options)?;
     contents.depth = match contents.depth.take() {
         Some(own) => Some(own.told(DepthWords { unit_m: None, ..words })?),
         None => depth_beside(file, words)?,
@@ -114,7 +114,7 @@ pub(super) fn hidden_layer(
     notes.append(&mut contents.notes);
     notes.extend(depth.notes.iter().cloned());
     let needs_view = || unreadable(&file, "the depth of its hidden layer needs a field of view (--fov-deg)");
-    let z_m = depth.axial_m(front.view)?.ok_or_else(needs_view)?;
+    let z_m = depth.axial_m(front.view).ok_or_else(needs_view)?;
     let n_known = z_m.iter().filter(|z| **z > 0.0).count();
     if n_known == 0 {
         return Err(unreadable(&file, "its depth is nowhere a number above 0, so that nothing would lie behind"));

@@ -71,6 +71,7 @@ mod stated;
 mod statement_tests;
 mod text_depth;
 mod tiff_bands;
+mod tiff_depth_map;
 mod tiff_directory;
 mod tiff_file;
 mod tiff_page;

@@ -12,7 +12,7 @@ use zip::{CompressionMethod, ZipArchive, ZipWriter, result::ZipError, write::Sim
 use super::{
     axes,
     contents::Cube,
-    mat::{DEPTHS, WAVES, is_called},
+    mat::{DEPTHS, is_called, rank_of_waves},
     npy::{NpyArray, is_array_of, npy_bytes, parse, parse_complex},
     read_options::ReadOptions,
     stated::{Noted, name_of, note_of, short},
@@ -84,7 +84,7 @@ impl<'a> Archive<'a> {
             let entry = self.zip.by_name(&name).map_err(|error| wrong(error.to_string()))?;
             let mut start = vec![];
             entry.take(MOST_HEADER_BYTES).read_to_end(&mut start).map_err(|error| wrong(error.to_string()))?;
-            if name.ends_with(".npy") && !is_list(&name) && is_array_of(&start, &is_wanted) {
+            if name.ends_with(".npy") && rank_of_waves(bare(&name)).is_none() && is_array_of(&start, &is_wanted) {
                 found.push(name);
             }
         }
@@ -94,10 +94,6 @@ impl<'a> Archive<'a> {
 
 fn bare(name: &str) -> &str {
     name.trim_end_matches(".npy")
-}
-
-fn is_list(name: &str) -> bool {
-    WAVES.contains(&bare(name))
 }
 
 /// Reads the cube of an archive: the array that is told, or the only one of three axes, with the wavelengths of an array beside it.
@@ -121,7 +117,8 @@ pub(super) fn read_npz(path: &Path, options: &ReadOptions) -> Result<Cube, Scene
         },
     };
     let array = archive.read(&chosen)?;
-    let named = archive.names.iter().find(|name| is_list(name) && **name != chosen).cloned();
+    let lists = archive.names.iter().filter(|name| **name != chosen && rank_of_waves(bare(name)).is_some());
+    let named = lists.min_by_key(|name| rank_of_waves(bare(name))).cloned();
     let own: Option<Vec<f64>> = match &named {
         Some(name) => {
             // Singles of decimals, as they were written.
@@ -161,6 +158,8 @@ pub(super) fn read_npz_plane(path: &Path, told: Option<&str>) -> Result<Noted<(S
         Some(told) => archive.named(told)?,
         None => {
             let planes = archive.of_sides(|sides| sides.iter().filter(|side| **side != 1).count() == 2)?;
+            // One of a single row or column, where there is no other.
+            let planes = if planes.is_empty() { archive.of_sides(|sides| sides.len() == 2)? } else { planes };
             let called = DEPTHS.iter().find_map(|own| planes.iter().find(|name| is_called(bare(name), own)));
             match (called, &planes[..]) {
                 (Some(called), _) => called.clone(),

@@ -386,6 +386,11 @@ fn undecodable(path: &Path, error: &ImageError) -> SceneError {
             format!("it ends before all of its samples ({said})")
         }
         ImageError::Decoding(_) => format!("it is broken, or of another format than its name says ({said})"),
+        ImageError::Unsupported(_) if said.contains("color type `Unknown") => {
+            "its samples are of other bits or channels than those of pictures: expected gray, or red, green and blue with or without \
+             opacity, of 8 or 16 bits, or bands of a TIFF, which --scene-wavelengths-nm tells"
+                .to_owned()
+        }
         ImageError::Unsupported(_) => format!(
             "it is of a kind that is not read ({said}): expected gray or red, green and blue as .png, .jpg, .tif, .webp, .bmp, .ppm or .hdr, or \
              numbers as .exr, .pfm, .npy, .npz, .mat, .h5 or .txt"
@@ -475,7 +480,7 @@ mod tests {
         page.encoder().write_tag(tiff::tags::Tag::PhotometricInterpretation, 51_177_u16).unwrap();
         page.write_data(&[1, 2]).unwrap();
         let message = refused("a.tif", file.get_ref());
-        assert!(message.contains("depth map of DNG") && !message.contains("develop"), "{message}");
+        assert!(message.contains("depth map (DNG)") && !message.contains("develop"), "{message}");
     }
 
     /// The checksum of a chunk (PNG, third edition, annex D).

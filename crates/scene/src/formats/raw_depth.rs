@@ -27,8 +27,8 @@ pub(super) struct RawDepth {
     pub(super) unit: DepthUnit,
     /// The largest number of whole numbers, which stands for none where it is that of their type.
     pub(super) top: Option<f64>,
-    /// Columns of the file, which a disparity is counted in.
-    pub(super) columns: usize,
+    /// Columns of the file a column of these, the first being what a disparity counts.
+    pub(super) columns_per_column: f64,
     /// The picture of which the depths are a part, where the file tells.
     pub(super) frame: Option<Frame>,
     pub(super) file: PathBuf,
@@ -53,9 +53,18 @@ pub(super) struct DepthWords<'a> {
 impl RawDepth {
     /// Depths in metres of a scene's own file.
     pub(super) fn in_file(file: &Path, from: String, values: Array2<f32>, kind: DepthKind) -> Self {
-        let columns = values.ncols();
-        let (unit, file) = (DepthUnit::Metres(1.0), file.to_owned());
-        Self { values, kind, unit, top: None, columns, frame: None, file, from, is_picture: false, notes: vec![] }
+        Self {
+            values,
+            kind,
+            unit: DepthUnit::Metres(1.0),
+            top: None,
+            columns_per_column: 1.0,
+            frame: None,
+            file: file.to_owned(),
+            from,
+            is_picture: false,
+            notes: vec![],
+        }
     }
 
     /// Takes what is said of the depth in place of what is usual.
@@ -76,7 +85,7 @@ impl RawDepth {
             DepthUnit::Metres(_) => !(is_disparity || is_inverse && words.unit.is_some_and(is_length)),
         };
         if fits {
-            return Ok(self);
+            return self.between_anchors();
         }
         Err(SceneError::Setting {
             what: "the unit of the depth",
@@ -84,6 +93,23 @@ impl RawDepth {
             expected: "px or 256/px for a disparity, m or 1000/m for an inverse distance, a length for all else"
                 .to_owned(),
         })
+    }
+
+    /// Makes inverse distances of numbers whose largest and smallest are told: those of all the file, before a part of them is taken.
+    fn between_anchors(mut self) -> Result<Self, SceneError> {
+        let DepthKind::InverseBetween { near_m, far_m } = self.kind else { return Ok(self) };
+        let finite = self.values.iter().copied().filter(|v| v.is_finite());
+        let (low, high) = finite.fold((f32::INFINITY, f32::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)));
+        if high.partial_cmp(&low) != Some(std::cmp::Ordering::Greater) {
+            return Err(unreadable(&self.file, "its numbers are all alike, expected some between two anchors"));
+        }
+        let (near, far) = (1.0 / near_m, 1.0 / far_m);
+        self.values.mapv_inplace(|v| {
+            let share = f64::from(v - low) / f64::from(high - low);
+            if v.is_finite() { (far + share * (near - far)) as f32 } else { v }
+        });
+        self.unit = DepthUnit::Metres(1.0);
+        Ok(self)
     }
 
     /// Returns the depths of so many samples at a place of a picture, where the file has depths of that picture or of a part of it; those of
@@ -126,10 +152,15 @@ impl RawDepth {
             return Err(unreadable(&self.file, reason));
         }
         let at = |index: usize, ratio: f64, most: usize| (((index as f64 + 0.5) * ratio) as usize).min(most - 1);
+        let counted = match self.kind {
+            DepthKind::Disparity { .. } => "; its disparities count its own samples",
+            _ => "",
+        };
         self.notes.push(format!(
-            "{}: its {own_columns} × {own_rows} depths become {columns} × {rows}, each that of the nearest sample",
+            "{}: its {own_columns} × {own_rows} depths become {columns} × {rows}, each that of the nearest sample{counted}",
             name_of(&self.file)
         ));
+        self.columns_per_column *= across;
         self.values = Array2::from_shape_fn((rows, columns), |(row, column)| {
             self.values[(at(row, down, own_rows), at(column, across, own_columns))]
         });
@@ -147,19 +178,16 @@ impl RawDepth {
 
     /// Returns the depths in metres along the axis; 0 where none was measured, infinity for the sky. `None` for what needs the
     /// view of the samples and has none.
-    ///
-    /// # Errors
-    /// When two anchors are given and all numbers are alike.
-    pub(super) fn axial_m(&self, view: Option<View>) -> Result<Option<Array2<f32>>, SceneError> {
+    pub(super) fn axial_m(&self, view: Option<View>) -> Option<Array2<f32>> {
         let is_none = |value: f32| self.is_none(value);
         let factor = match self.unit {
             DepthUnit::Metres(factor) | DepthUnit::Samples(factor) => factor,
         };
         let along = |z_m: f64| if z_m >= SKY_M { f32::INFINITY } else { z_m as f32 };
-        Ok(Some(match self.kind {
+        Some(match self.kind {
             DepthKind::Axial => self.values.mapv(|v| if is_none(v) { 0.0 } else { along(factor * f64::from(v)) }),
             DepthKind::Radial => {
-                let Some(view) = view else { return Ok(None) };
+                let view = view?;
                 Array2::from_shape_fn(self.values.dim(), |(row, column)| {
                     let v = self.values[(row, column)];
                     let z_m = factor * f64::from(v) / view.distance_per_depth(row as f64, column as f64);
@@ -167,33 +195,21 @@ impl RawDepth {
                 })
             }
             // The inverse of nothing is the sky; what is no number was not measured.
-            DepthKind::Inverse => self.values.mapv(|v| {
+            DepthKind::Inverse | DepthKind::InverseBetween { .. } => self.values.mapv(|v| {
                 let inverse = f64::from(v) * factor;
                 if v.is_finite() { along(1.0 / inverse) } else { 0.0 }
             }),
-            DepthKind::InverseBetween { near_m, far_m } => {
-                let finite = self.values.iter().copied().filter(|v| v.is_finite());
-                let (low, high) = finite.fold((f32::INFINITY, f32::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)));
-                if high.partial_cmp(&low) != Some(std::cmp::Ordering::Greater) {
-                    return Err(unreadable(&self.file, "its numbers are all alike, expected some between two anchors"));
-                }
-                let (near, far) = (1.0 / near_m, 1.0 / far_m);
-                self.values.mapv(|v| {
-                    let share = f64::from(v - low) / f64::from(high - low);
-                    if v.is_finite() { along(1.0 / (far + share * (near - far))) } else { 0.0 }
-                })
-            }
             DepthKind::Disparity { baseline_m, offset_px } => {
-                let Some(view) = view else { return Ok(None) };
+                let view = view?;
                 // A disparity counts the file's own samples.
-                let focal_px = view.focal_px * self.columns as f64 / self.values.ncols() as f64;
+                let focal_px = view.focal_px * self.columns_per_column;
                 self.values.mapv(|v| {
                     let shift_px = factor * f64::from(v) + offset_px;
                     let is_measured = v.is_finite() && v > 0.0 && shift_px > 0.0;
                     if is_measured { along(focal_px * baseline_m / shift_px) } else { 0.0 }
                 })
             }
-        }))
+        })
     }
 
     /// Returns the words for where the depth comes from.

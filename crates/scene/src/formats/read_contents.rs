@@ -11,6 +11,7 @@ use super::{
     chart_table::read_chart,
     contents::{Contents, Cube, Heeds, Hidden, Image, MATLAB_OR_HDF5, is_of},
     cube_folder::CubeFolder,
+    depth::read_depth,
     envi::{contents_of_envi, header_of},
     light_unit::LightUnit,
     mat::{MatScene, read_mat},
@@ -28,7 +29,7 @@ use super::{
     reduced::reduced_size,
     spectral_exr::{AskedChannels, RawFile, RawHidden, RawImage, read_raw_exr},
     stated::{name_of, note_of},
-    tiff_file::{RAW, TiffAs, TiffFile, TiffStack, is_tiff, read_tiff},
+    tiff_file::{RAW, TiffAs, TiffFile, TiffStack, has_depth_map, is_tiff, read_tiff},
     unusable::{starts_with, unreadable},
 };
 use crate::{SceneError, View};
@@ -126,6 +127,26 @@ fn of_pfm(path: &Path) -> Result<Contents, SceneError> {
 }
 
 fn of_tiff(path: &Path, options: &ReadOptions) -> Result<Contents, SceneError> {
+    let mut contents = pages_of_tiff(path, options)?;
+    let reading = &options.reading;
+    match &reading.depth {
+        _ if !has_depth_map(path) => {}
+        Some(file) => {
+            let note = (file != path).then(|| format!("{}: its depth map is not used", name_of(path)));
+            contents.notes.extend(note);
+        }
+        None => {
+            let (kind, unit, variable) =
+                (reading.depth_kind, reading.depth_unit.as_deref(), reading.depth_variable.as_deref());
+            let depth = read_depth(path, DepthWords { kind, unit, variable, unit_m: None })?;
+            contents.depth = Some(RawDepth { from: "its depth map".to_owned(), ..depth });
+        }
+    }
+    Ok(contents)
+}
+
+/// The picture, or the bands, of a TIFF file.
+fn pages_of_tiff(path: &Path, options: &ReadOptions) -> Result<Contents, SceneError> {
     // Bands that are told make a cube of what would be a picture.
     let n_told = options.reading.wavelengths_nm.as_ref().map(Vec::len);
     let wanted = n_told.map_or(TiffAs::Marked, |n| TiffAs::Planes(Some(n)));
@@ -133,12 +154,18 @@ fn of_tiff(path: &Path, options: &ReadOptions) -> Result<Contents, SceneError> {
     match read_tiff(path, wanted)?.told_in(&mut notes) {
         TiffFile::Picture(_) => of_picture(path, options, notes),
         TiffFile::Linear(mut planes, page) => {
-            planes.iter_mut().for_each(|plane| page.ignore(plane, None));
+            for plane in &mut planes {
+                page.ignore(plane);
+                page.count_from_black(plane, None);
+            }
             Ok(linear(planes, None, notes))
         }
         TiffFile::Stack(mut stack) => {
-            stack.planes.iter_mut().for_each(|plane| stack.page.ignore(plane, stack.top));
-            notes.extend(stack.page.note_of_description(path));
+            for plane in &mut stack.planes {
+                stack.page.ignore(plane);
+                stack.page.count_from_black(plane, stack.top);
+            }
+            notes.extend(stack.page.notes_of_description(path));
             let TiffStack { planes, wavelengths_nm, top, .. } = stack;
             Cube { planes, top, wavelengths_nm, quantity: None, unit: None, notes }.into_contents(path, options)
         }
@@ -166,18 +193,18 @@ fn of_exr(path: &Path, options: &ReadOptions) -> Result<Contents, SceneError> {
     let RawFile { image, depth, view, frame, panorama, light, hidden, mut notes } = read_raw_exr(path, asked)?;
     let view = view.map(|view| CameraData::of_view(path, view));
     let (image, what, heeds) = match image {
-        RawImage::Spectral { image, is_unit_stated } => {
+        RawImage::Spectral { image, unit: stated } => {
             // Of a film, which a scene is none.
             let pitch = image.pitch_um().map(|_| "samplePitchUm".to_owned());
             notes.extend(note_of(path, "attribute", pitch.as_slice()));
-            let unit = told_unit(path, &image, is_unit_stated, reading)?;
-            let contents = of_bands(path, image, is_unit_stated, (unit, reading))?;
+            let unit = told_unit(path, &image, stated.is_some(), reading)?;
+            let contents = of_bands(path, image, stated.as_deref(), (unit, reading))?;
             notes.extend(contents.notes);
             (contents.image, contents.what, contents.heeds)
         }
         RawImage::Rgb { planes, white_cd_m2 } => {
-            let what = "linear colors as a display shows them".to_owned();
-            (Image::Linear { planes, white_cd_m2 }, what, Heeds::Scale)
+            let Contents { image, what, heeds, .. } = linear(planes, white_cd_m2, vec![]);
+            (image, what, heeds)
         }
     };
     let hidden = hidden.map(|hidden| layer_behind(path, hidden, options).map(Box::new));
@@ -219,7 +246,7 @@ fn told_unit(
 fn of_bands(
     path: &Path,
     image: SpectralImage,
-    is_unit_stated: bool,
+    stated: Option<&str>,
     (unit, reading): (Option<LightUnit>, &FileReading),
 ) -> Result<Contents, SceneError> {
     let (quantity, grid) = (image.quantity(), image.grid().clone());
@@ -235,37 +262,49 @@ fn of_bands(
     let notes: Vec<String> = mend(path, &grid, &mut planes, choice)?.note(path, choice).into_iter().collect();
     let values = |reason: SpectrumError| SceneError::Values { file: path.to_owned(), reason };
     let image = SpectralImage::new(quantity, grid, planes).map_err(values)?;
-    let what = match (is_light, is_unit_stated) {
+    let what = match (is_light, stated) {
         (false, _) => "reflectance".to_owned(),
-        (true, true) => "radiance".to_owned(),
-        (true, false) => format!("radiance, taken for {}", reading.unit.as_deref().unwrap_or("W/m^2/sr/nm")),
+        (true, Some(stated)) => format!("radiance in {stated}"),
+        (true, None) => format!("radiance, taken for {}", reading.unit.as_deref().unwrap_or("W/m^2/sr/nm")),
     };
-    let heeds = if is_light && !is_unit_stated { Heeds::Unit } else { Heeds::Scale };
+    let heeds = if is_light && stated.is_none() { Heeds::Unit } else { Heeds::Scale };
     Ok(Contents { notes, heeds, ..Contents::of(Image::Spectral(image), what) })
 }
 
 /// Returns what lies behind the first surface in a layer of its file, under what is said of that where the layer does not say itself what it is.
 fn layer_behind(path: &Path, hidden: RawHidden, options: &ReadOptions) -> Result<Hidden, SceneError> {
-    let RawHidden { image, is_unit_stated, depth } = hidden;
+    let RawHidden { image, depth } = hidden;
     let told = &options.reading;
-    let (unit, reading, words) = match told_unit(path, &image, is_unit_stated, told) {
-        Ok(unit) => (unit, told.clone(), "counts for it too"),
-        Err(error @ SceneError::Units { .. }) => {
-            let reading = FileReading { quantity: None, unit: None, scale: None, ..told.clone() };
-            let unit = told_unit(path, &image, is_unit_stated, &reading).map_err(|_| error)?;
-            (unit, reading, "does not count for it, which says itself what it is")
+    let (mut contents, words) = match image {
+        RawImage::Rgb { planes, white_cd_m2 } => (linear(planes, white_cd_m2, vec![]), "counts for it too"),
+        RawImage::Spectral { image, unit: stated } => {
+            let own = FileReading { quantity: None, unit: None, scale: None, ..told.clone() };
+            let (unit, reading, words) = match told_unit(path, &image, stated.is_some(), told) {
+                Ok(unit) => (unit, told, "counts for it too"),
+                Err(error @ SceneError::Units { .. }) => {
+                    let unit = told_unit(path, &image, stated.is_some(), &own).map_err(|_| error)?;
+                    (unit, &own, "does not count for it, which says itself what it is")
+                }
+                Err(error) => return Err(error),
+            };
+            (of_bands(path, image, stated.as_deref(), (unit, reading))?, words)
         }
-        Err(error) => return Err(error),
     };
-    let mut contents = of_bands(path, image, is_unit_stated, (unit, &reading))?;
-    let given =
-        [("--quantity", told.quantity.is_some()), ("--unit", told.unit.is_some()), ("--scale", told.scale.is_some())];
-    let names: Vec<&str> = given.into_iter().filter(|(_, is_given)| *is_given).map(|(name, _)| name).collect();
-    let note = (!names.is_empty()).then(|| {
-        let told = names.join(", ");
-        format!("{}, layer 'hidden': what was said of the first surface ({told}) {words}", name_of(path))
-    });
-    contents.notes.extend(note);
+    let is_picture = matches!(contents.image, Image::Linear { .. });
+    let given = [
+        ("--quantity", told.quantity.is_some(), !is_picture || told.quantity == Some(FileQuantity::Reflectance)),
+        ("--unit", told.unit.is_some(), !is_picture),
+        ("--scale", told.scale.is_some(), true),
+    ];
+    for (applies, words) in [(true, words), (false, "does not count for it, whose colors have none")] {
+        let own = given.iter().filter(|(_, is_given, own)| *is_given && *own == applies);
+        let names: Vec<&str> = own.map(|(name, ..)| *name).collect();
+        let note = (!names.is_empty()).then(|| {
+            let told = names.join(", ");
+            format!("{}, layer 'hidden': what was said of the first surface ({told}) {words}", name_of(path))
+        });
+        contents.notes.extend(note);
+    }
     // What is told of a file of depth is told of that of the first surface.
     let depth = match told.depth {
         Some(_) => depth,

@@ -72,7 +72,7 @@ fn camera_of(path: &Path, contents: &mut Contents, options: &ReadOptions) -> Res
         }
         (None, Some(file)) => {
             leave(own.as_ref(), beside.as_ref().filter(|beside| beside.file != *file));
-            let data = of_frame(&CameraFile::read(file)?)?;
+            let data = of_frame(&CameraFile::read(file, path)?)?;
             let from = name_of(&data.file);
             Some((data, Some(from)))
         }

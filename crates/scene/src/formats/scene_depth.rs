@@ -18,16 +18,41 @@ use super::{
 };
 use crate::{SceneError, View};
 
-/// Returns what is said of a depth, and by the camera file beside the picture.
-pub(super) fn words<'a>(path: &Path, options: &'a ReadOptions) -> Result<DepthWords<'a>, SceneError> {
+/// What nerfstudio takes 1 of a depth for, m, where nothing says otherwise.
+const NERFSTUDIO_UNIT_M: f64 = 1e-3;
+
+/// Returns what is said of a depth, and by the camera file of the picture, and that file.
+pub(super) fn words<'a>(
+    path: &Path,
+    options: &'a ReadOptions,
+) -> Result<(DepthWords<'a>, Option<CameraFile>), SceneError> {
     let reading = &options.reading;
     let camera = match &reading.view {
-        Some(file) => Some(CameraFile::read(file)?),
+        Some(file) => Some(CameraFile::read(file, path)?),
         None => CameraFile::beside(path)?,
     };
-    let unit_m = camera.and_then(|camera| camera.depth_unit_m);
+    let unit_m = camera.as_ref().and_then(|camera| camera.depth_unit_m);
     let (kind, variable) = (reading.depth_kind, reading.depth_variable.as_deref());
-    Ok(DepthWords { kind, unit: reading.depth_unit.as_deref(), variable, unit_m })
+    Ok((DepthWords { kind, unit: reading.depth_unit.as_deref(), variable, unit_m }, camera))
+}
+
+/// Reads the depth that a picture's frame of nerfstudio names.
+fn depth_of_frame(file: &Path, camera: &Path, words: DepthWords<'_>) -> Result<RawDepth, SceneError> {
+    if !file.is_file() {
+        let reason =
+            format!("its depth_file_path names '{}', which is no file: --depth FILE names another", file.display());
+        return Err(unreadable(camera, reason));
+    }
+    let usual = words.unit_m.unwrap_or(NERFSTUDIO_UNIT_M);
+    let mut depth = read_depth(file, DepthWords { unit_m: Some(usual), ..words })?;
+    if depth.top.is_none() && words.unit_m.is_none() && depth.unit == DepthUnit::Metres(usual) {
+        depth.notes.push(format!(
+            "{}: its floats are taken for millimetres, as nerfstudio takes them where {} states no depth_unit_scale_factor",
+            name_of(file),
+            name_of(camera)
+        ));
+    }
+    Ok(depth)
 }
 
 /// Returns the depth as it stands in its file, on the image's samples, and notes what else there was.
@@ -37,10 +62,16 @@ pub(super) fn raw_depth(
     frame: Frame,
     options: &ReadOptions,
 ) -> Result<Option<RawDepth>, SceneError> {
-    let words = words(path, options)?;
+    let (words, camera) = words(path, options)?;
     let (rows, columns) = contents.size();
     let own = contents.depth.take();
-    let beside = || files_beside(path).iter().map(|file| name_of(file)).collect::<Vec<_>>();
+    let of_frame = camera.and_then(|camera| Some((camera.depth_file?, camera.file)));
+    let beside = || {
+        let framed = of_frame.iter().map(|(file, _)| file.clone());
+        let mut names: Vec<String> = framed.chain(files_beside(path)).map(|file| name_of(&file)).collect();
+        names.dedup();
+        names
+    };
     let mut unused = vec![];
     let depth = match (&options.reading.depth, own) {
         (Some(file), own) => {
@@ -51,13 +82,23 @@ pub(super) fn raw_depth(
         (None, own) if words.variable.is_some() && (is_of(path, MATLAB_OR_HDF5) || is_of(path, &["npz"])) => {
             unused = beside();
             unused.extend(own.map(|own| own.from));
-            Some(read_depth(path, words)?)
+            let mut depth = read_depth(path, words)?;
+            // The other arrays are the scene's, which names those that are not used.
+            let others = format!("{}: its array", name_of(path));
+            depth.notes.retain(|note| !note.starts_with(&others));
+            Some(depth)
         }
         (None, Some(own)) => {
             unused = beside();
             Some(own.told(DepthWords { unit_m: None, ..words })?)
         }
-        (None, None) => depth_beside(path, words)?,
+        (None, None) => match &of_frame {
+            Some((file, camera)) => {
+                unused.extend(beside().into_iter().filter(|name| *name != name_of(file)));
+                Some(depth_of_frame(file, camera, words)?)
+            }
+            None => depth_beside(path, words)?,
+        },
     };
     let is_told = words.kind.is_some() || words.unit.is_some() || words.variable.is_some();
     let Some(depth) = depth else {
@@ -102,7 +143,7 @@ pub(super) fn depth_of(
 ) -> Result<Option<DepthMap>, SceneError> {
     let file = &raw.file;
     let values = |reason| SceneError::Values { file: file.clone(), reason };
-    let Some(values_m) = raw.axial_m(view)? else {
+    let Some(values_m) = raw.axial_m(view) else {
         notes.push(format!("{}: its depth {} needs the field of view and is not used", name_of(file), raw.describe()));
         return Ok(None);
     };

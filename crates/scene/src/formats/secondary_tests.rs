@@ -251,6 +251,24 @@ fn one_of_several_planes_of_depth_is_asked_for() {
     assert!(with(Some("3")).is_err() && with(Some("z")).is_err());
 }
 
+/// Two gray samples whose wavelengths a description lists are bands, as they stand whatever the mark says of white.
+#[test]
+fn two_gray_samples_are_bands() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("a.tif");
+    let mut encoder = TiffEncoder::new(fs::File::create(&file).unwrap()).unwrap();
+    let mut image = encoder.new_image::<colortype::Gray8>(COLUMNS as u32, ROWS as u32).unwrap();
+    image.extra_samples(&[ExtraSamples::Unspecified]).unwrap();
+    image.encoder().write_tag(Tag::PhotometricInterpretation, 0_u16).unwrap();
+    image.encoder().write_tag(Tag::ImageDescription, r#"{"wavelengths_nm": [550, 450]}"#).unwrap();
+    image.write_data(&[200_u8, 99].repeat(ROWS * COLUMNS)).unwrap();
+    drop(encoder);
+    let scene = read_scene(&file, &told(Some(FileQuantity::Radiance), None, false)).unwrap();
+    assert_eq!(scene.radiance.grid().centers_nm(), [450.0, 550.0]);
+    assert_eq!([0, 1].map(|band: usize| scene.radiance.planes()[band][(1, 1)]), [99.0, 200.0]);
+    check_named(&scene, "0 is white (tag 262) is not used");
+}
+
 /// Bands in which a display sends no light at all are no black scene.
 #[test]
 fn pictures_in_the_infrared_are_refused() {
@@ -455,5 +473,52 @@ fn nothing_can_be_said_of_a_scene_of_isetcam() {
     ] {
         let message = read_scene(&path, &ReadOptions { reading, ..ReadOptions::default() }).unwrap_err().to_string();
         assert!(message.contains(word), "{message}");
+    }
+}
+
+/// The frame of a picture in nerfstudio's file names its depth, in millimetres unless the file says otherwise.
+#[test]
+fn frames_of_nerfstudio_name_their_depth() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    fs::create_dir(at("images")).unwrap();
+    let room = picture(&at("images"));
+    let codes = image::ImageBuffer::from_pixel(COLUMNS as u32, ROWS as u32, image::Luma([2500_u16]));
+    dioptric_pictures::save(&codes.into(), &at("d.png")).unwrap();
+    let floats: Vec<u8> = [2500.0_f32; ROWS * COLUMNS].iter().flat_map(|v| v.to_le_bytes()).collect();
+    fs::write(at("d.npy"), npy("<f4", false, "(3, 4)", &floats)).unwrap();
+    let read = |more: &str, frame: &str| {
+        let other = r#"{"file_path": "images/hall.png", "depth_file_path": "absent.png"}"#;
+        let text = format!(
+            r#"{{"w": 4, "h": 3, "fl_x": 9, "fl_y": 9, "cx": 2, "cy": 1.5{more}, "frames": [{other}, {{{frame}}}]}}"#
+        );
+        fs::write(at("transforms.json"), text).unwrap();
+        let reading = FileReading { view: Some(at("transforms.json")), ..FileReading::default() };
+        read_scene(&room, &ReadOptions { reading, ..ReadOptions::default() })
+    };
+    let file = r#""file_path": "images/room.png""#;
+    let with = |depth: &str| format!(r#"{file}, "depth_file_path": "{depth}""#);
+    for (more, frame, z_m, words) in [
+        ("", with("d.png"), 2.5, ""),
+        (r#", "depth_unit_scale_factor": 0.01"#, with("d.png"), 25.0, ""),
+        ("", with("d.npy"), 2.5, "taken for millimetres"),
+        ("", with("d.png").replace("room.png", "room"), 2.5, ""),
+        ("", with("d.png") + r#", "mask_path": "m.png""#, 2.5, "its key 'mask_path' is not used"),
+    ] {
+        let scene = read(more, &frame).unwrap();
+        let depth = scene.require_depth().unwrap().range_m();
+        assert!((depth.0 - z_m).abs() < 1e-6 && depth.0 == depth.1, "{frame}: {depth:?}");
+        assert_eq!(scene.notes.len(), 1 + usize::from(!words.is_empty()), "{:?}", scene.notes);
+        assert!(scene.notes.iter().any(|note| note.contains(words)), "{:?}", scene.notes);
+    }
+    let longer = read("", &(with("d.png") + r#", "fl_x": 18, "fl_y": 18"#)).unwrap();
+    assert_eq!(longer.view.unwrap().focal_px, 18.0);
+    let scene = read("", r#""file_path": "images/lobby.png""#).unwrap();
+    check_named(&scene, "none of the file_path of its frames is room.png");
+    for (frame, words) in
+        [(with("absent.png"), "absent.png', which is no file"), (r#""fl_x": 1"#.to_owned(), "none of their file_path")]
+    {
+        let message = read("", &frame).unwrap_err().to_string();
+        assert!(message.contains(words), "{message}");
     }
 }

@@ -11,7 +11,7 @@ use super::{
     exr_attributes::{Attributes, is_harmless},
     exr_colors::{ColorsOf, EXPECTED, colors_of, is_called_picture, srgb_from, srgb_from_xyz},
     exr_depth,
-    exr_layers::{RawLayer, leave_other_views, read_headers, read_layers, split_layers},
+    exr_layers::{HIDDEN_LAYER, Head, RawLayer, leave_other_views, read_headers, read_layers, split_layers},
     light_unit::LightUnit,
     primaries::into_srgb,
     raw_depth::RawDepth,
@@ -21,9 +21,6 @@ use super::{
     wavelength_unit::PLAUSIBLE_NM,
 };
 use crate::{HiddenLayer, SceneError, SceneLight, View};
-
-/// The name of the layer that holds what lies behind the first surface.
-pub(crate) const HIDDEN_LAYER: &str = "hidden";
 
 /// What a spectral EXR file holds.
 #[derive(Clone, Debug, PartialEq)]
@@ -87,15 +84,14 @@ pub fn read_spectral_exr(path: &Path) -> Result<Noted<SpectralFile>, SceneError>
         return Err(unreadable(path, "it is an environment map, expected a picture in perspective"));
     }
     let values = |reason| SceneError::Values { file: path.to_owned(), reason };
-    let image = match image {
-        RawImage::Spectral { image, .. } => image,
-        RawImage::Rgb { .. } => return Err(SceneError::NoBands { file: path.to_owned(), expected: EXPECTED }),
+    let bands_of = |image: RawImage| match image {
+        RawImage::Spectral { image, .. } => image.check_samples().map(|()| image).map_err(values),
+        RawImage::Rgb { .. } => Err(SceneError::NoBands { file: path.to_owned(), expected: EXPECTED }),
     };
-    image.check_samples().map_err(values)?;
+    let image = bands_of(image)?;
     let hidden = match hidden {
-        Some(RawHidden { image, depth, .. }) => {
-            image.check_samples().map_err(values)?;
-            Some(HiddenLayer { radiance: image, depth: DepthMap::new(depth.values).map_err(values)? })
+        Some(RawHidden { image, depth }) => {
+            Some(HiddenLayer { radiance: bands_of(image)?, depth: DepthMap::new(depth.values).map_err(values)? })
         }
         None => None,
     };
@@ -125,8 +121,8 @@ pub(super) struct RawFile {
 
 /// The picture of an EXR file.
 pub(super) enum RawImage {
-    /// Light whose unit is not stated is W m⁻² sr⁻¹ nm⁻¹.
-    Spectral { image: SpectralImage, is_unit_stated: bool },
+    /// Light whose unit is not stated is W m⁻² sr⁻¹ nm⁻¹; the words of one that is, by itself or of the first layer.
+    Spectral { image: SpectralImage, unit: Option<String> },
     /// Linear red, green and blue of sRGB's primaries, of a file without bands.
     Rgb {
         planes: [Array2<f32>; 3],
@@ -135,11 +131,9 @@ pub(super) enum RawImage {
     },
 }
 
-/// Light, or reflectances, and depth of the layer behind.
+/// Light, reflectances or colors, and depth of the layer behind.
 pub(super) struct RawHidden {
-    pub(super) image: SpectralImage,
-    /// Whether its unit is stated, by itself or of the first layer.
-    pub(super) is_unit_stated: bool,
+    pub(super) image: RawImage,
     pub(super) depth: RawDepth,
 }
 
@@ -162,7 +156,10 @@ pub(super) fn read_raw_exr(path: &Path, asked: AskedChannels<'_>) -> Result<RawF
     let (head, mut layers) = read_layers(path)?;
     let mut notes: Vec<String> = note_of(path, "view", &leave_other_views(&mut layers)).into_iter().collect();
     let mut layers = split_layers(layers);
-    let hidden = layers.iter().position(|layer| layer.name == HIDDEN_LAYER && layer.has_bands());
+    let hidden = layers
+        .iter()
+        .position(RawLayer::is_behind)
+        .filter(|index| layers[*index].has_bands() || asked.layer != Some(HIDDEN_LAYER));
     let hidden = hidden.filter(|_| layers.len() > 1).map(|index| layers.remove(index));
     let panorama = panorama_of(path, &layers, &mut notes);
     let band_layers: Vec<String> = layers
@@ -179,19 +176,7 @@ pub(super) fn read_raw_exr(path: &Path, asked: AskedChannels<'_>) -> Result<RawF
     let mut channels = Stated::new("channel", first.planes);
     let bands = channels.take_all(|name| band_name::parse(name).is_some());
     let (image, prefix) = if bands.is_empty() {
-        let (prefix, what, mut planes) = colors_of(path, &mut channels, asked.layer)?;
-        if what == ColorsOf::Xyz {
-            into_srgb(&mut planes, &srgb_from_xyz());
-            let what = "channels X, Y and Z are taken for CIE XYZ under D65, whose white has a Y of 1: they become linear sRGB";
-            notes.push(format!("{}: its {what}", name_of(path)));
-            let unused = head.chromaticities.as_ref().map(|_| "chromaticities".to_owned());
-            notes.extend(note_of(path, "attribute", unused.as_slice()));
-        } else if let Some(own) = &head.chromaticities {
-            let no_colors = || unreadable(path, "its chromaticities are no three primaries and a white");
-            into_srgb(&mut planes, &srgb_from(own).ok_or_else(no_colors)?);
-            notes.push(format!("{}: its primaries become those of sRGB, its white D65", name_of(path)));
-        }
-        (RawImage::Rgb { planes, white_cd_m2: attributes.white_cd_m2.filter(|white| *white > 0.0) }, prefix)
+        rgb_of(path, (&head, &attributes), &mut channels, asked.layer, &mut notes)?
     } else if let Some(told) = asked.layer.filter(|_| !is_layer_told) {
         let expected = match band_layers.is_empty() {
             true => "in no layer with a name: expected it without --variable".to_owned(),
@@ -199,7 +184,6 @@ pub(super) fn read_raw_exr(path: &Path, asked: AskedChannels<'_>) -> Result<RawF
         };
         return Err(unreadable(path, format!("it has spectral bands, {expected}")));
     } else {
-        let is_unit_stated = !matches!(attributes.unit, Ok(None));
         let image = image_of(path, &attributes, bands)?;
         notes.extend(attributes.note_of_unit(path).filter(|_| image.quantity() != Quantity::Reflectance));
         let image = match attributes.pitch_um {
@@ -208,7 +192,7 @@ pub(super) fn read_raw_exr(path: &Path, asked: AskedChannels<'_>) -> Result<RawF
         };
         // A preview of the bands.
         channels.take_all(|name| ["R", "G", "B"].contains(&name));
-        (RawImage::Spectral { image, is_unit_stated }, String::new())
+        (RawImage::Spectral { image, unit: attributes.told_unit() }, String::new())
     };
     let depth = depth_of(path, &mut channels, &prefix, asked.depth, &mut notes)?;
     // Opacity of 1 everywhere is none.
@@ -220,7 +204,8 @@ pub(super) fn read_raw_exr(path: &Path, asked: AskedChannels<'_>) -> Result<RawF
         channels.names().any(|name| name.strip_prefix(HIDDEN_LAYER).is_some_and(|rest| rest.starts_with('.')));
     notes.extend(channels.note(path, |_| false));
     if is_behind && hidden.is_none() {
-        let expected = "a layer 'hidden' has bands (S0.… or T.…) and a channel Z to be what lies behind, or is a file of its own (--hidden)";
+        let expected = "a layer 'hidden' has bands (S0.… or T.…), or R, G and B, and a channel Z to be what lies behind, or is a file of its \
+                        own (--hidden)";
         notes.push(format!("{}: {expected}", name_of(path)));
     }
     let hidden = match hidden {
@@ -231,12 +216,10 @@ pub(super) fn read_raw_exr(path: &Path, asked: AskedChannels<'_>) -> Result<RawF
             ));
         }
         Some(mut layer) => {
-            if layer.attributes.unit == Ok(None) {
-                layer.attributes.unit.clone_from(&attributes.unit);
-            }
+            layer.attributes.inherit(&attributes);
             let kind = "attribute of the layer 'hidden'";
             notes.extend(note_of(path, kind, &attributes.other_of(&layer.attributes)));
-            Some(hidden_of(path, layer, &mut notes)?)
+            Some(hidden_of(path, &head, layer, &mut notes)?)
         }
         None => None,
     };
@@ -329,19 +312,55 @@ fn depth_of(
     Ok(channels.take(&name).map(|values| RawDepth::in_file(path, format!("channel '{name}'"), values, kind)))
 }
 
-/// Returns radiance and depth of the layer behind; what else it has is named.
-fn hidden_of(path: &Path, layer: RawLayer, notes: &mut Vec<String>) -> Result<RawHidden, SceneError> {
+/// Takes linear red, green and blue, in the primaries of sRGB, of the layer told or of a picture, and what stands before their letters.
+fn rgb_of(
+    path: &Path,
+    (head, attributes): (&Head, &Attributes),
+    channels: &mut Stated<Array2<f32>>,
+    told: Option<&str>,
+    notes: &mut Vec<String>,
+) -> Result<(RawImage, String), SceneError> {
+    let (prefix, what, mut planes) = colors_of(path, channels, told)?;
+    if what == ColorsOf::Xyz {
+        into_srgb(&mut planes, &srgb_from_xyz());
+        let what =
+            "channels X, Y and Z are taken for CIE XYZ under D65, whose white has a Y of 1: they become linear sRGB";
+        notes.push(format!("{}: its {what}", name_of(path)));
+        let unused = head.chromaticities.as_ref().map(|_| "chromaticities".to_owned());
+        notes.extend(note_of(path, "attribute", unused.as_slice()));
+    } else if let Some(own) = &head.chromaticities {
+        let no_colors = || unreadable(path, "its chromaticities are no three primaries and a white");
+        into_srgb(&mut planes, &srgb_from(own).ok_or_else(no_colors)?);
+        let note = format!("{}: its primaries become those of sRGB, its white D65", name_of(path));
+        notes.extend(Some(note).filter(|note| !notes.contains(note)));
+    }
+    let white_cd_m2 = attributes.white_cd_m2.filter(|white| *white > 0.0);
+    Ok((RawImage::Rgb { planes, white_cd_m2 }, prefix))
+}
+
+/// Returns light, or colors, and depth of the layer behind; what else it has is named.
+fn hidden_of(path: &Path, head: &Head, layer: RawLayer, notes: &mut Vec<String>) -> Result<RawHidden, SceneError> {
     let mut channels = Stated::new("channel of the layer 'hidden'", layer.planes);
-    let bands = channels.take_all(|name| band_name::parse(name).is_some());
-    let image = image_of(path, &layer.attributes, bands)?;
-    let unit = layer.attributes.note_of_unit(path).filter(|_| image.quantity() != Quantity::Reflectance);
-    notes.extend(unit.filter(|note| !notes.contains(note)));
     let z_m = channels.take("Z").ok_or_else(|| unreadable(path, "the layer 'hidden' has no channel 'Z'"))?;
-    notes.extend(channels.note(path, |name| ["R", "G", "B"].contains(&name)));
+    let bands = channels.take_all(|name| band_name::parse(name).is_some());
+    let image = if bands.is_empty() {
+        rgb_of(path, (head, &layer.attributes), &mut channels, None, notes)?.0
+    } else {
+        let image = image_of(path, &layer.attributes, bands)?;
+        let unit = layer.attributes.note_of_unit(path).filter(|_| image.quantity() != Quantity::Reflectance);
+        notes.extend(unit.filter(|note| !notes.contains(note)));
+        channels.take_all(|name| ["R", "G", "B"].contains(&name));
+        RawImage::Spectral { image, unit: layer.attributes.told_unit() }
+    };
+    // Opacity of 1 everywhere is none.
+    if channels.get("A").is_some_and(|plane| plane.iter().all(|v| *v == 1.0)) {
+        channels.take("A");
+    }
+    notes.extend(channels.note(path, |_| false));
     let attributes = layer.attributes.others.note(path, is_harmless);
     notes.extend(attributes.map(|note| format!("{note} (of the layer 'hidden')")));
     let depth = RawDepth::in_file(path, "channel 'Z' of the layer 'hidden'".to_owned(), z_m, DepthKind::Axial);
-    Ok(RawHidden { image, is_unit_stated: layer.attributes.unit != Ok(None), depth })
+    Ok(RawHidden { image, depth })
 }
 
 /// Planes of samples, each with the name of its channel.

@@ -9,17 +9,21 @@ use std::{
 use ndarray::Array2;
 use tiff::decoder::{Decoder, DecodingResult, Limits};
 
-use super::{
-    tiff_directory::Directory,
-    tiff_page::{Marked, Page},
-};
+use super::{tiff_directory::Directory, tiff_page::Page};
 
 /// The tag of what samples are marked as.
 const PHOTOMETRIC: u16 = 262;
 
-/// A TIFF file whose pages of red, green and blue are marked as gray.
+/// The tag of what kind a page is.
+const KIND: u16 = 254;
+/// The mark, and the bit of the kind, of depth maps (DNG 1.5).
+const DEPTH_MAP: u64 = 51_177;
+const DEPTH_MAP_KIND: u64 = 8;
+
+/// A TIFF file whose pages are marked as gray, 0 being black, so that samples are decoded as they stand.
 ///
-/// What decodes pages of colors leaves out the samples that are none: a near infrared, further bands.
+/// What decodes pages of colors leaves out the samples that are none: a near infrared, further bands. It turns round what is counted
+/// from white, and takes no depth maps.
 pub(super) struct AsGray {
     file: File,
     at: u64,
@@ -28,23 +32,40 @@ pub(super) struct AsGray {
 }
 
 impl AsGray {
+    /// Opens a file, and returns the places of the directories of its depth maps, which are marked as gray.
+    pub(super) fn with_depth_maps(path: &Path, most: usize) -> std::io::Result<(BufReader<Self>, Vec<u64>)> {
+        let mut file = File::open(path)?;
+        let mut maps = vec![];
+        // What is broken is named by what decodes it.
+        for (at, directory) in Directory::all(&mut file, most).unwrap_or_default() {
+            let mut number = |tag| directory.number_of(&mut file, tag);
+            if number(PHOTOMETRIC)? == Some(DEPTH_MAP) || number(KIND)?.is_some_and(|kind| kind & DEPTH_MAP_KIND != 0) {
+                maps.push(at);
+            }
+        }
+        let reader = Self::marked(file, maps.iter().copied())?;
+        Ok((reader, maps))
+    }
+
     /// Opens the file again in which the pages were found at these places.
     pub(super) fn open(path: &Path, pages: &[(Page, u64)]) -> std::io::Result<Decoder<BufReader<Self>>> {
-        let mut file = File::open(path)?;
+        let plain = pages.iter().filter(|(page, _)| page.has_plain_samples()).map(|(_, at)| *at);
+        let reader = Self::marked(File::open(path)?, plain)?;
+        let mut limits = Limits::default();
+        limits.decoding_buffer_size = 4 << 30;
+        Ok(Decoder::new(reader).map_err(std::io::Error::other)?.with_limits(limits))
+    }
+
+    fn marked(mut file: File, directories: impl Iterator<Item = u64>) -> std::io::Result<BufReader<Self>> {
         let mut marks = vec![];
-        for (page, at) in pages {
-            if page.marked == Marked::Rgb && page.has_plain_samples() {
-                let directory = Directory::read(&mut file, *at)?;
-                // 1 is gray, 0 being black.
-                marks.extend(directory.place_of(PHOTOMETRIC).map(|place| (place, directory.bytes_of(1))));
-            }
+        for at in directories {
+            let directory = Directory::read(&mut file, at)?;
+            // 1 is gray, 0 being black.
+            marks.extend(directory.place_of(PHOTOMETRIC).map(|place| (place, directory.bytes_of(1))));
         }
         marks.sort_unstable();
         file.rewind()?;
-        let mut limits = Limits::default();
-        limits.decoding_buffer_size = 4 << 30;
-        let decoder = Decoder::new(BufReader::new(Self { file, at: 0, marks })).map_err(std::io::Error::other)?;
-        Ok(decoder.with_limits(limits))
+        Ok(BufReader::new(Self { file, at: 0, marks }))
     }
 }
 

@@ -14,6 +14,8 @@ pub(super) struct Directory {
     is_big_file: bool,
     /// Each tag, with the place of its entry.
     entries: Vec<(u16, u64)>,
+    /// The place of the next directory; 0 behind the last.
+    next: u64,
 }
 
 impl Directory {
@@ -26,14 +28,23 @@ impl Directory {
             let place = at + n_count as u64 + n_entry * index;
             this.entries.push((this.number_at(file, place, 2)? as u16, place));
         }
+        let end = at + n_count as u64 + n_entry * count;
+        this.next = this.number_at(file, end, if this.is_big_file { 8 } else { 4 }).unwrap_or(0);
         Ok(this)
     }
 
-    /// Reads the first directory of a file.
-    pub(super) fn first(file: &mut File) -> Result<Self> {
+    /// Reads the directories of all pages up to so many, each with its place.
+    pub(super) fn all(file: &mut File, most: usize) -> Result<Vec<(u64, Self)>> {
         let head = Self::head(file)?;
-        let at = if head.is_big_file { head.number_at(file, 8, 8)? } else { head.number_at(file, 4, 4)? };
-        Self::read(file, at)
+        let mut at = if head.is_big_file { head.number_at(file, 8, 8)? } else { head.number_at(file, 4, 4)? };
+        let mut all: Vec<(u64, Self)> = vec![];
+        while at != 0 && all.len() < most && all.iter().all(|(own, _)| *own != at) {
+            let directory = Self::read(file, at)?;
+            let next = directory.next;
+            all.push((at, directory));
+            at = next;
+        }
+        Ok(all)
     }
 
     /// Reads how numbers stand in the file.
@@ -41,13 +52,15 @@ impl Directory {
         let mut start = [0; 4];
         file.rewind()?;
         file.read_exact(&mut start)?;
-        let this = Self { is_big_endian: start[0] == b'M', is_big_file: false, entries: vec![] };
+        let this = Self { is_big_endian: start[0] == b'M', is_big_file: false, entries: vec![], next: 0 };
         Ok(Self { is_big_file: this.number(&start[2..]) == 43, ..this })
     }
 
-    /// Returns the number of two bytes of a tag that has one.
+    /// Returns the number of two or four bytes of a tag that has one.
     pub(super) fn number_of(&self, file: &mut File, tag: u16) -> Result<Option<u64>> {
-        self.place_of(tag).map(|place| self.number_at(file, place, 2)).transpose()
+        let Some((_, entry)) = self.entries.iter().find(|(own, _)| *own == tag) else { return Ok(None) };
+        let n_bytes = if self.number_at(file, entry + 2, 2)? == 4 { 4 } else { 2 };
+        self.place_of(tag).map(|place| self.number_at(file, place, n_bytes)).transpose()
     }
 
     /// Returns where the values of a tag stand that fit into its entry.

@@ -1,6 +1,9 @@
 //! TIFF files of numbers: stacks of pages, many samples a pixel, floats and signed numbers.
 
-use std::{fs::File, io::BufReader, path::Path};
+use std::{
+    fs::{self, File},
+    path::Path,
+};
 
 use ndarray::Array2;
 use tiff::{
@@ -23,6 +26,8 @@ use crate::SceneError;
 const DESCRIPTION: u16 = 270;
 /// The tag of what samples are marked as.
 const PHOTOMETRIC: u16 = 262;
+/// What of it is decoded, and a depth map.
+const KNOWN_MARKS: [u64; 11] = [0, 1, 2, 3, 4, 5, 6, 8, 9, 10, 51_177];
 /// Pages of a file.
 const LIMIT_PAGES: usize = 10_000;
 
@@ -52,18 +57,21 @@ fn broken(path: &Path, error: &TiffError) -> SceneError {
     )
 }
 
-/// Returns what the first page of a file is marked as, where that is known but not read, and the way on.
+/// Returns what a page of a file is marked as that is known but not read, and the way on.
 fn unknown_mark(path: &Path) -> Option<String> {
     let mut file = File::open(path).ok()?;
-    let mark = Directory::first(&mut file).ok()?.number_of(&mut file, PHOTOMETRIC).ok()??;
+    let pages = Directory::all(&mut file, LIMIT_PAGES).ok()?;
+    // The first that is none of those of TIFF 6.0 and its notes.
+    let mut marks = pages.iter().filter_map(|(_, page)| page.number_of(&mut file, PHOTOMETRIC).ok()?);
+    let mark = marks.find(|mark| !KNOWN_MARKS.contains(mark))?;
     Some(match mark {
         32_803 | 34_892 => {
-            "its samples are those of a sensor, which are no scene: `dioptric develop` makes a picture of a DNG".to_owned()
+            "its samples are those of a sensor, which are no scene: `dioptric develop` makes a picture of a DNG"
+                .to_owned()
         }
-        51_177 => "it is marked as a depth map of DNG (tag 262 is 51177), which is no gray picture: expected its depths in a file \
-                   marked as gray (1), as --depth of a picture"
-            .to_owned(),
-        32_844 | 32_845 => "it holds logarithms of light (LogL or LogLuv), expected linear floats: convert it".to_owned(),
+        32_844 | 32_845 => {
+            "it holds logarithms of light (LogL or LogLuv), expected linear floats: convert it".to_owned()
+        }
         other => format!(
             "its samples are marked as {other} (tag 262), which is not read, expected gray (0 or 1) or red, green and blue (2)"
         ),
@@ -76,13 +84,31 @@ pub(super) fn is_tiff(path: &Path) -> bool {
     by_content.map_or_else(|| is_of(path, &["tif", "tiff"]), |format| format == dioptric_pictures::ImageFormat::Tiff)
 }
 
+/// Returns what is said where no page is a picture.
+fn no_page(path: &Path) -> SceneError {
+    let reason = if has_depth_map(path) {
+        "it holds a depth map (DNG) and no picture: expected it as --depth of one"
+    } else {
+        "it has no page of full size"
+    };
+    unreadable(path, reason)
+}
+
+/// Whether a page of a TIFF file is marked as a depth map.
+pub(super) fn has_depth_map(path: &Path) -> bool {
+    AsGray::with_depth_maps(path, LIMIT_PAGES).is_ok_and(|(_, maps)| !maps.is_empty())
+}
+
 /// What is wanted of a TIFF file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum TiffAs {
-    /// What it is marked as: a picture, or a stack of planes.
+    /// What it is marked as: a picture, or a stack of planes; depth maps are left to who asks.
     Marked,
-    /// Planes of numbers, whatever they are marked as; so many where it is known, so that one marked as an opacity may be among them.
+    /// Planes of numbers, whatever they are marked as; so many where it is known, so that one marked as an opacity may be among them,
+    /// and with depth maps left to who asks.
     Planes(Option<usize>),
+    /// The depths of a picture: those of pages that are marked so, where there are any, or else planes of numbers.
+    Depths,
 }
 
 /// What a TIFF file holds.
@@ -110,10 +136,13 @@ pub(super) struct TiffStack {
 /// # Errors
 /// When it is none, is truncated or too large, or its pages differ in size.
 pub(super) fn read_tiff(path: &Path, wanted: TiffAs) -> Result<Noted<TiffFile>, SceneError> {
-    let Pages { mut pages, unused, mut notes } = pages_of(path)?;
-    let Some((first, _)) = pages.first() else { return Err(unreadable(path, "it has no page of full size")) };
+    let Pages { mut pages, unused, mut notes } = pages_of(path, wanted)?;
+    let Some((first, _)) = pages.first() else { return Err(no_page(path)) };
     let words = first.words();
-    let as_planes = first.is_stack() || (wanted != TiffAs::Marked && first.has_plain_samples());
+    // A picture of two gray samples may be told by its description to be one of two bands.
+    let is_listed = first.n_listed() == Some(pages.iter().map(|(page, _)| page.n_samples).sum());
+    let as_planes = first.is_stack() || ((wanted != TiffAs::Marked || is_listed) && first.has_plain_samples());
+    notes.extend(first.note_of_white(path).filter(|_| as_planes));
     // Gray pages are planes of a stack, colored ones a picture and others.
     let is_picture = !as_planes && (pages.len() == 1 || first.n_samples > 1);
     if is_picture {
@@ -146,7 +175,7 @@ pub(super) fn read_tiff(path: &Path, wanted: TiffAs) -> Result<Noted<TiffFile>, 
     if let Some(n_stated) = n_stated.filter(|n| *n != planes.len()) {
         return Err(unreadable(path, format!("it states {n_stated} wavelengths, but has {} planes", planes.len())));
     }
-    notes.extend(note_of(path, "key of its description", &bands.keys));
+    notes.extend(note_of(path, "description key", &bands.keys));
     notes.extend(note_of(path, "page name", &bands.names));
     let mut page = words;
     page.descriptions = described(&own, bands.are_described);
@@ -171,16 +200,31 @@ struct Pages {
     notes: Vec<String>,
 }
 
-fn pages_of(path: &Path) -> Result<Pages, SceneError> {
+/// Reads what pages state: those of depths where they are wanted and there, or else all others.
+fn pages_of(path: &Path, wanted: TiffAs) -> Result<Pages, SceneError> {
     let broken = |error| broken(path, &error);
-    let file = File::open(path).map_err(|error| unreadable(path, error))?;
-    let length = file.metadata().map_err(|error| unreadable(path, error))?.len();
-    let mut decoder = Decoder::new(BufReader::new(file)).map_err(broken)?.with_limits(Limits::default());
+    let (reader, maps) = AsGray::with_depth_maps(path, LIMIT_PAGES).map_err(|error| unreadable(path, error))?;
+    let length = fs::metadata(path).map_err(|error| unreadable(path, error))?.len();
+    let mut decoder = Decoder::new(reader).map_err(broken)?.with_limits(Limits::default());
     let mut pages: Vec<(Page, u64)> = vec![];
     let (mut bytes, mut unused, mut unknown) = (0, vec![], vec![]);
     for index in 1.. {
-        let mut page = Page::of(&mut decoder, index - 1).map_err(broken)?;
+        if index > LIMIT_PAGES {
+            return Err(unreadable(path, format!("it has more than {LIMIT_PAGES} pages")));
+        }
+        if index > 1 {
+            if !decoder.more_images() {
+                break;
+            }
+            decoder.next_image().map_err(broken)?;
+        }
         let at = decoder.ifd_pointer().map_or(0, |place| place.0);
+        let mut page = Page::of(&mut decoder, index - 1, maps.contains(&at)).map_err(broken)?;
+        let is_depth = page.depth_map.is_some();
+        if is_depth != (wanted == TiffAs::Depths && !maps.is_empty()) {
+            unused.extend((is_depth && wanted == TiffAs::Planes(None)).then(|| format!("{index} (a depth map)")));
+            continue;
+        }
         if pages.is_empty() && !page.is_reduced && !page.descriptions.is_empty() {
             // What decodes the file keeps the last of two.
             let mut file = File::open(path).map_err(|error| unreadable(path, error))?;
@@ -190,9 +234,6 @@ fn pages_of(path: &Path) -> Result<Pages, SceneError> {
         bytes += page.bytes();
         // Its numbers as they stand, and as single floats.
         check_memory(path, bytes.saturating_mul(2), length)?;
-        if index > LIMIT_PAGES {
-            return Err(unreadable(path, format!("it has more than {LIMIT_PAGES} pages")));
-        }
         if page.is_raw {
             return Err(unreadable(path, RAW));
         }
@@ -214,10 +255,6 @@ fn pages_of(path: &Path) -> Result<Pages, SceneError> {
                 format!("its page {index} is {own}, its first {first}: expected pages of one size, a band each");
             return Err(unreadable(path, reason));
         }
-        if !decoder.more_images() {
-            break;
-        }
-        decoder.next_image().map_err(broken)?;
     }
     unknown.sort();
     unknown.dedup();
@@ -230,9 +267,9 @@ fn pages_of(path: &Path) -> Result<Pages, SceneError> {
 /// # Errors
 /// When the file is of a kind that is not read, or its samples are no picture's.
 pub(super) fn float_planes(path: &Path) -> Result<Option<Noted<Vec<Array2<f32>>>>, SceneError> {
-    let Pages { mut pages, .. } = pages_of(path)?;
+    let Pages { mut pages, .. } = pages_of(path, TiffAs::Planes(None))?;
     pages.truncate(1);
-    let Some((first, _)) = pages.first() else { return Err(unreadable(path, "it has no page of full size")) };
+    let Some((first, _)) = pages.first() else { return Err(no_page(path)) };
     match first.depth {
         SampleDepth::Float => {}
         SampleDepth::Unsigned(..=16) => return Ok(None),
@@ -242,6 +279,8 @@ pub(super) fn float_planes(path: &Path) -> Result<Option<Noted<Vec<Array2<f32>>>
         }
     }
     let mut planes = planes_of_pages(path, &pages)?;
+    let words = first.words();
+    planes.iter_mut().for_each(|plane| words.count_from_black(plane, None));
     let note = without_opacity(path, &pages[0].0, &mut planes);
     Ok(Some(Noted::new(planes, note)))
 }
@@ -249,7 +288,7 @@ pub(super) fn float_planes(path: &Path) -> Result<Option<Noted<Vec<Array2<f32>>>
 /// Returns what is said of the pages and samples of a TIFF file of which the first picture is taken; of one that is not read here nothing, since whoever
 /// decodes it says what is wrong.
 pub(super) fn notes_on_pages(path: &Path) -> Vec<String> {
-    let Ok(Pages { pages, unused, mut notes }) = pages_of(path) else { return vec![] };
+    let Ok(Pages { pages, unused, mut notes }) = pages_of(path, TiffAs::Planes(None)) else { return vec![] };
     notes.extend(notes_on_others(path, &pages, unused));
     notes
 }

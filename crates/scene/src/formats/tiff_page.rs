@@ -15,6 +15,7 @@ use tiff::{
 use super::{
     picture_parts::differ,
     stated::{name_of, note_of},
+    tiff_depth_map::{DEPTH_TAGS, DepthMapTags},
 };
 
 /// The name of a page.
@@ -78,6 +79,8 @@ pub(super) struct Page {
     /// What each of the last samples is: 0 unspecified, 1 and 2 an opacity.
     pub(super) extra: Vec<u16>,
     pub(super) is_reduced: bool,
+    /// What it says of its depths, where it is marked as a map of them.
+    pub(super) depth_map: Option<DepthMapTags>,
     /// Whether it is a page of a raw photograph.
     pub(super) is_raw: bool,
     pub(super) has_tiles_of_planes: bool,
@@ -95,7 +98,14 @@ pub(super) struct Page {
 
 impl Page {
     /// Reads what the page states that a decoder stands at.
-    pub(super) fn of<R: Read + Seek>(decoder: &mut Decoder<R>, index: usize) -> tiff::TiffResult<Self> {
+    ///
+    /// # Errors
+    /// When a tag cannot be read.
+    pub(super) fn of<R: Read + Seek>(
+        decoder: &mut Decoder<R>,
+        index: usize,
+        is_depth_map: bool,
+    ) -> tiff::TiffResult<Self> {
         let size = decoder.dimensions()?;
         let n_samples = decoder.find_tag_unsigned::<u16>(Tag::SamplesPerPixel)?.unwrap_or(1).max(1);
         let bits = decoder.find_tag_unsigned_vec::<u16>(Tag::BitsPerSample)?.and_then(|list| list.first().copied());
@@ -115,6 +125,10 @@ impl Page {
         let mut unknown: Vec<u16> = tags.filter(|tag| !HARMLESS.contains(tag)).collect();
         if is_of_usual_range(decoder.find_tag(REFERENCE_BLACK_WHITE).ok().flatten(), bits) {
             unknown.retain(|tag| *tag != REFERENCE_BLACK_WHITE.to_u16());
+        }
+        let depth_map = is_depth_map.then(|| DepthMapTags::of(decoder));
+        if depth_map.is_some() {
+            unknown.retain(|tag| !DEPTH_TAGS.contains(tag));
         }
         let mut resolution = |tag| match decoder.find_tag(tag) {
             Ok(Some(Value::Rational(over, under))) if over > 0 && under > 0 => Some(f64::from(over) / f64::from(under)),
@@ -146,6 +160,7 @@ impl Page {
             },
             extra,
             is_reduced: kind & 1 != 0,
+            depth_map,
             is_raw: unknown.contains(&DNG_VERSION),
             has_tiles_of_planes: is_planar && n_samples > 1 && has_tiles,
             is_jpeg: matches!(compression, 6 | 7),
@@ -164,6 +179,7 @@ impl Page {
             is_white_zero: self.marked == Marked::Gray { is_white_zero: true } && self.n_samples == 1,
             descriptions: self.descriptions.clone(),
             orientation: self.orientation,
+            depth_map: self.depth_map,
         }
     }
 
@@ -173,7 +189,9 @@ impl Page {
 
     /// Whether its samples are no gray or colors of a picture.
     pub(super) fn is_stack(&self) -> bool {
-        let most = if self.is_colored() { 4 } else { 2 };
+        // Beside gray a sample that is no opacity is a band of whole numbers; of floats it is named.
+        let is_gray = self.opacities().len() == 1 || self.depth == SampleDepth::Float;
+        let most = if self.is_colored() { 4 } else { 1 + usize::from(is_gray) };
         matches!(self.depth, SampleDepth::Signed(_))
             || self.n_samples > most
             || self.bits > 16 && self.depth != SampleDepth::Float
@@ -181,6 +199,22 @@ impl Page {
 
     pub(super) fn is_colored(&self) -> bool {
         self.marked == Marked::Rgb
+    }
+
+    /// Returns how many wavelengths its description lists.
+    pub(super) fn n_listed(&self) -> Option<usize> {
+        listed_in(self).map(|(list, _)| list.len())
+    }
+
+    /// Returns what is said of a mark that 0 is white where a pixel has several samples, none of which is counted from white.
+    pub(super) fn note_of_white(&self, path: &Path) -> Option<String> {
+        let is_marked = self.marked == Marked::Gray { is_white_zero: true } && self.n_samples > 1;
+        is_marked.then(|| {
+            format!(
+                "{}: its mark that 0 is white (tag 262) is not used: its bands are taken as they stand",
+                name_of(path)
+            )
+        })
     }
 
     /// Whether its samples are numbers by themselves, a plane each.
@@ -231,18 +265,26 @@ fn is_of_usual_range(value: Option<Value>, bits: u8) -> bool {
 pub(super) struct PageWords {
     /// The number that stands for none.
     pub(super) no_data: Option<f64>,
-    /// Whether 0 is white, so that what decodes samples turned them round: they are counted from black, as light is.
+    /// Whether 0 is white.
     pub(super) is_white_zero: bool,
     pub(super) descriptions: Vec<String>,
     orientation: u16,
+    pub(super) depth_map: Option<DepthMapTags>,
 }
 
 impl PageWords {
-    /// Makes what stands for no number no number, in decoded samples whose largest is `top`, 1 of floats.
-    pub(super) fn ignore(&self, plane: &mut Array2<f32>, top: Option<f64>) {
-        let decoded = |none: f64| if self.is_white_zero { top.unwrap_or(1.0) - none } else { none };
-        if let Some(none) = self.no_data.map(|none| decoded(none) as f32) {
+    /// Makes what stands for no number no number.
+    pub(super) fn ignore(&self, plane: &mut Array2<f32>) {
+        if let Some(none) = self.no_data.map(|none| none as f32) {
             plane.mapv_inplace(|v| if v == none { f32::NAN } else { v });
+        }
+    }
+
+    /// Counts samples whose largest is `top`, 1 of floats, from black, as light is.
+    pub(super) fn count_from_black(&self, plane: &mut Array2<f32>, top: Option<f64>) {
+        if self.is_white_zero {
+            let top = top.unwrap_or(1.0) as f32;
+            plane.mapv_inplace(|v| top - v);
         }
     }
 
@@ -252,13 +294,65 @@ impl PageWords {
             .then(|| format!("{}: its orientation, {} (tag 274), is not used", name_of(path), self.orientation))
     }
 
-    /// Returns what is said of a description that nothing took.
-    pub(super) fn note_of_description(&self, path: &Path) -> Option<String> {
-        // Writers put the shape of the array there.
-        let says = |text: &&String| !(text.starts_with("{\"shape\":") || text.starts_with("ImageJ="));
-        let described: Vec<String> = self.descriptions.iter().filter(says).cloned().collect();
-        note_of(path, "description", &described)
+    /// Returns what is said of descriptions that nothing took; of those that programs write by themselves it is the keys that say more
+    /// than they usually do.
+    pub(super) fn notes_of_description(&self, path: &Path) -> Vec<String> {
+        let (mut keys, mut described) = (vec![], vec![]);
+        for text in &self.descriptions {
+            match written_keys(text) {
+                Some(own) => {
+                    keys.extend(own.into_iter().filter(|(key, value)| !is_usual(key, value)).map(|(key, _)| key))
+                }
+                None => described.push(text.clone()),
+            }
+        }
+        let notes = [note_of(path, "description key", &keys), note_of(path, "description", &described)];
+        notes.into_iter().flatten().collect()
     }
+}
+
+/// Returns the keys of a description that tifffile or `ImageJ` wrote, with their values; none of another.
+fn written_keys(text: &str) -> Option<Vec<(String, String)>> {
+    if text.starts_with("ImageJ=") {
+        let pairs = text.lines().filter_map(|line| line.split_once('='));
+        return Some(pairs.map(|(key, value)| (key.trim().to_owned(), value.trim().to_owned())).collect());
+    }
+    match serde_json::from_str(text) {
+        Ok(Json::Object(map)) if map.contains_key("shape") => {
+            Some(map.into_iter().map(|(key, value)| (key, words(&value))).collect())
+        }
+        _ => None,
+    }
+}
+
+fn words(value: &Json) -> String {
+    value.as_str().map_or_else(|| value.to_string(), str::to_owned)
+}
+
+/// Whether a key of a description is one of the shape of the array, in rows before columns, or of how `ImageJ` shows it.
+fn is_usual(key: &str, value: &str) -> bool {
+    const KEYS: [&str; 19] = [
+        "ImageJ",
+        "shape",
+        "truncated",
+        "images",
+        "channels",
+        "slices",
+        "frames",
+        "hyperstack",
+        "mode",
+        "loop",
+        "unit",
+        "yunit",
+        "zunit",
+        "tunit",
+        "spacing",
+        "finterval",
+        "fps",
+        "min",
+        "max",
+    ];
+    KEYS.contains(&key) || (key == "axes" && value.to_uppercase().contains("YX"))
 }
 
 /// What pages say of their bands.
@@ -309,7 +403,7 @@ fn listed_in(page: &Page) -> Option<(Vec<f64>, Vec<String>)> {
     let list = WAVELENGTHS.iter().find_map(|key| map.remove(*key))?;
     let list = list.as_array()?.iter().map(Json::as_f64).collect::<Option<Vec<f64>>>()?;
     // The shape of the array is written by tifffile.
-    let left = map.into_iter().map(|(key, _)| key).filter(|key| !["shape", "axes"].contains(&key.as_str())).collect();
+    let left = map.into_iter().filter(|(key, value)| !is_usual(key, &words(value))).map(|(key, _)| key).collect();
     Some((list, left))
 }
 

@@ -93,6 +93,18 @@ fn pages_and_descriptions_may_not_say_two_things() {
     check_named(&read().unwrap(), "'green', 'red'", 1);
     write_pages(&path, &[&[name("450 nm")], &[name("550 nm"), list("exposure 2")]]);
     check_named(&read().unwrap(), "'exposure 2'", 1);
+    // What programs write by themselves is the shape of the array; what more they say is named.
+    for (text, names) in [
+        (r#"{"shape": [2, 3, 4], "axes": "CYX"}"#, ""),
+        (r#"{"shape": [2, 3, 4], "axes": "CXY", "gain": 2.5}"#, "'axes', 'gain'"),
+        ("ImageJ=1.53\nimages=2\nslices=2\nmin=0.0\nloop=false", ""),
+        ("ImageJ=1.53\nimages=2\ncf=0\nc0=-32768.0\nc1=1.0", "'cf', 'c0', 'c1'"),
+    ] {
+        write_pages(&path, &[&[name("450 nm"), list(text)], &[name("550 nm")]]);
+        let scene = read().unwrap();
+        assert_eq!(scene.notes.len(), 1 + usize::from(!names.is_empty()), "{:?}", scene.notes);
+        assert!(scene.notes.iter().any(|note| note.contains(names)), "{:?}", scene.notes);
+    }
 }
 
 #[test]
@@ -299,12 +311,17 @@ fn unknown_words_of_stacks_and_attributes_are_named() {
             let mut file = hdf5_pure::FileBuilder::new();
             let cube = file.create_dataset("cube");
             cube.with_data(&super::kinds_tests::in_order("yxb")).with_shape(&[3, 4, 5]);
-            if case % 2 == 0 {
+            if case % 3 == 0 {
                 cube.set_attr(&word, hdf5_pure::AttrValue::F64(2.0));
             }
             file.create_dataset("wave").with_data(&super::kinds_tests::WAVE_NM).with_shape(&[5]);
-            if case % 2 == 1 {
+            if case % 3 == 1 {
                 file.set_attr(&word, hdf5_pure::AttrValue::F64(2.0));
+            }
+            if case % 3 == 2 {
+                let mut group = file.create_group("of");
+                group.set_attr(&word, hdf5_pure::AttrValue::F64(2.0));
+                file.add_group(group.finish());
             }
             fs::write(&h5, file.finish().unwrap()).unwrap();
             check_named(&read_scene(&h5, &options).unwrap(), &word, 1);

@@ -4,6 +4,8 @@
 //! round, the first being the fastest; arrays of other programs have the last as the fastest. How MATLAB marks its variables was
 //! taken from files that it wrote: attributes `MATLAB_class` and `MATLAB_empty`, structures as groups, cells as references.
 
+use std::collections::{BTreeMap, HashMap};
+
 use exr::prelude::f16;
 use hdf5_pure::{AttrValue, DType, Dataset, Datatype, DatatypeByteOrder, File, FloatingPointLayout, Group};
 
@@ -11,6 +13,7 @@ use super::{
     super::unusable::said,
     dimensions::Dimensions,
     elements::{self, LIMIT_ARRAYS, LIMIT_DEPTH, Listed},
+    links::take_links,
     packing::{Attribute, Value},
 };
 
@@ -19,6 +22,8 @@ pub(super) struct Hdf5 {
     file: File,
     /// Whether MATLAB wrote it, or one of its kind.
     pub(super) is_matlab: bool,
+    /// Links by name, each with where it leads.
+    links: BTreeMap<String, String>,
 }
 
 /// An array or a group, and what is known of it without its content.
@@ -46,14 +51,31 @@ impl Entry {
 
 impl Hdf5 {
     /// Opens a file that is in memory.
-    pub(super) fn open(bytes: Vec<u8>) -> Result<Self, String> {
+    pub(super) fn open(mut bytes: Vec<u8>) -> Result<Self, String> {
         let is_matlab = bytes.starts_with(b"MATLAB 7.3");
-        Ok(Self { file: File::from_bytes(bytes).map_err(broken)?, is_matlab })
+        let links = take_links(&mut bytes);
+        Ok(Self { file: File::from_bytes(bytes).map_err(broken)?, is_matlab, links })
     }
 
     /// Returns what the file states of itself.
     pub(super) fn attributes(&self) -> Vec<Attribute> {
-        self.file.root().attrs().map(telling).unwrap_or_default()
+        let mut all = vec![];
+        self.list_attributes(&self.file.root(), "", LIMIT_DEPTH, &mut all);
+        all
+    }
+
+    /// Lists the attributes of a group and of those in it, by their paths; MATLAB's are those of its variables.
+    fn list_attributes(&self, group: &Group, before: &str, depth: usize, all: &mut Vec<Attribute>) {
+        let own = telling(group.attrs(), group.attr_datatypes()).into_iter();
+        all.extend(own.map(|own| Attribute { name: format!("{before}{}", own.name), value: own.value }));
+        if depth == 0 || self.is_matlab || all.len() > LIMIT_ARRAYS {
+            return;
+        }
+        for name in group.groups().unwrap_or_default() {
+            if let Ok(inner) = group.group(&name) {
+                self.list_attributes(&inner, &format!("{before}{name}/"), depth - 1, all);
+            }
+        }
     }
 
     /// Lists the variables of MATLAB, or the arrays of all groups, by their paths.
@@ -69,6 +91,11 @@ impl Hdf5 {
         entries.iter_mut().zip(axes).for_each(|(entry, axes)| entry.axes = axes);
         // What is but the name and the length of an axis.
         entries.retain(|entry| !entry.dimensions.is_bare);
+        for (name, target) in &self.links {
+            let name = format!("{name} (a link to {target})");
+            let listed = Listed { name, sides: vec![], is_numeric: false, is_complex: false };
+            entries.push(Entry::without_content(listed, String::new(), false));
+        }
         Ok(entries)
     }
 
@@ -89,7 +116,7 @@ impl Hdf5 {
             let n_bytes = sides.iter().map(|side| *side as u64).fold(8, u64::saturating_mul);
             let is_complex = dataset.dtype().is_ok_and(|kind| is_complex(&kind));
             let listed = Listed { name: path.clone(), sides, is_numeric, is_complex };
-            let attributes = dataset.attrs().map(telling).unwrap_or_default();
+            let attributes = telling(dataset.attrs(), dataset.attr_datatypes());
             let (words, dimensions) = (words_of(&dataset), Dimensions::of(&dataset));
             entries.push(Entry {
                 n_bytes,
@@ -187,8 +214,12 @@ fn words_of(dataset: &Dataset) -> String {
     ["long_name", "standard_name"].into_iter().filter_map(text).collect::<Vec<_>>().join("; ")
 }
 
-/// Returns the attributes that may change what numbers mean, in the order of their names.
-fn telling(attributes: impl IntoIterator<Item = (String, AttrValue)>) -> Vec<Attribute> {
+/// Returns the attributes that may change what numbers mean, in the order of their names; those of types that are not read, as half
+/// floats, by their names alone.
+fn telling(
+    values: Result<HashMap<String, AttrValue>, hdf5_pure::Error>,
+    types: Result<HashMap<String, Datatype>, hdf5_pure::Error>,
+) -> Vec<Attribute> {
     const HARMLESS: [&str; 17] = [
         "CLASS",
         "NAME",
@@ -217,8 +248,12 @@ fn telling(attributes: impl IntoIterator<Item = (String, AttrValue)>) -> Vec<Att
         (None, None, Some(text)) => Value::Text(text.to_owned()),
         _ => Value::Other,
     };
-    let own = attributes.into_iter().filter(|(name, _)| is_telling(name));
-    let mut own: Vec<Attribute> = own.map(|(name, value)| Attribute { name, value: value_of(value) }).collect();
+    let (values, types) = (values.unwrap_or_default(), types.unwrap_or_default());
+    let unread = types.into_keys().filter(|name| !values.contains_key(name)).map(|name| (name, Value::Other));
+    let unread: Vec<_> = unread.collect();
+    let all = values.into_iter().map(|(name, value)| (name, value_of(value))).chain(unread);
+    let own = all.filter(|(name, _)| is_telling(name));
+    let mut own: Vec<Attribute> = own.map(|(name, value)| Attribute { name, value }).collect();
     own.sort_by(|a, b| a.name.cmp(&b.name));
     own
 }
@@ -302,14 +337,14 @@ fn numbers_of(dataset: &Dataset) -> Result<Vec<u8>, String> {
 
 fn broken(error: hdf5_pure::Error) -> String {
     let said = said(error);
-    // Links by name have no place.
-    let has_link = said.contains(&u64::MAX.to_string());
-    let way = if said.contains("unexpected EOF") && !has_link {
+    let way = if said.contains("unexpected EOF") {
         "expected all of it, for it ends too early"
+    } else if said.contains("virtual") || said.contains("external files") {
+        "expected its numbers in the file itself (h5repack --layout=CONTI)"
     } else if said.contains("unsupported filter") {
         "expected none or gzip (h5repack -f GZIP=4)"
     } else {
-        "expected one without links, which older programs read as well (h5repack --high=V18)"
+        "expected one that older programs read as well (h5repack --high=V18)"
     };
     format!("it is HDF5 that cannot be read ({said}): {way}")
 }
@@ -320,4 +355,20 @@ fn too_many() -> String {
 
 fn too_large() -> String {
     "an array of it takes 4 GiB or more, expected smaller ones".to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn attributes_of_types_that_are_not_read_are_named() {
+        let values =
+            HashMap::from([("units".to_owned(), AttrValue::F64(1.0)), ("CLASS".to_owned(), AttrValue::F64(1.0))]);
+        let types = ["units", "CLASS", "scale_factor", "DIMENSION_LIST"]
+            .map(|name| (name.to_owned(), hdf5_pure::make_f64_type()));
+        let names = telling(Ok(values), Ok(HashMap::from(types))).into_iter().map(|own| (own.name, own.value));
+        let expected = [("scale_factor", Value::Other), ("units", Value::Numbers(vec![1.0]))];
+        assert!(names.eq(expected.map(|(name, value)| (name.to_owned(), value))));
+    }
 }

@@ -22,7 +22,7 @@ use super::{
     container::{Content, MatArray, MatFile, WHOLE},
     elements::Listed,
     iset_kinds,
-    packing::{Packing, WAVES},
+    packing::{Packing, rank_of_waves},
 };
 use crate::{SceneError, SceneLight};
 
@@ -93,7 +93,7 @@ pub(in super::super) struct IsetScene {
 pub(in super::super) fn read_mat(path: &Path, reading: &FileReading) -> Result<MatScene, SceneError> {
     let told = reading.variable.as_deref();
     let is_cube = |own: &Listed| own.is_numeric && own.sides.len() == 3;
-    let is_list = |own: &Listed| WAVES.contains(&last_part(&own.name)) && own.is_numeric;
+    let is_list = |own: &Listed| rank_of_waves(last_part(&own.name)).is_some() && own.is_numeric;
     let wanted = |own: &Listed| {
         let name = own.name.as_str();
         match told {
@@ -147,7 +147,7 @@ pub(in super::super) fn read_mat(path: &Path, reading: &FileReading) -> Result<M
                 return Err(wrong(complex(&names.collect::<Vec<_>>().join(", "))));
             }
             [] => {
-                let others = file.listed.iter().filter(|own| own.sides.len() == 3 && !own.is_numeric);
+                let others = file.listed.iter().filter(|own| matches!(own.sides.len(), 0 | 3) && !own.is_numeric);
                 let names = others.map(|own| format!(", and its '{}' has no numbers that are read", own.name));
                 let expected =
                     "expected a variable 'scene', 'mcCOEF' or 'photons', or an array of three axes outside structures";
@@ -255,13 +255,14 @@ impl UnitOf {
 /// Returns the name of the list of wavelengths beside a cube of these sides, and the list, nm; none where wavelengths are told and the list is no
 /// likely one.
 fn waves_of(file: &MatFile, cube: &str, sides: &[usize], is_told: bool) -> Result<Option<(String, Vec<f64>)>, String> {
-    for list in WAVES {
-        let Some(own) = file.listed.iter().find(|own| last_part(&own.name) == list && own.name != cube) else {
-            continue;
-        };
+    let rank = |own: &&Listed| rank_of_waves(last_part(&own.name));
+    let mut lists: Vec<&Listed> = file.listed.iter().filter(|own| own.name != cube && rank(own).is_some()).collect();
+    lists.sort_by_key(rank);
+    for own in lists {
         let numbers = file.array(&own.name)?.and_then(|array| array.list());
         let Some(numbers) = numbers.filter(|list| sides.contains(&list.len())) else { continue };
-        let unit = Packing::of(file.attributes_of(&own.name)).unit.or(list.ends_with("_nm").then(|| "nm".to_owned()));
+        let unit =
+            Packing::of(file.attributes_of(&own.name)).unit.or(own.name.ends_with("_nm").then(|| "nm".to_owned()));
         return match listed_nm(&own.name, unit.as_deref(), &numbers) {
             Ok(list) => Ok(list.map(|list| (own.name.clone(), list))),
             Err(_) if is_told => Ok(None),

@@ -11,6 +11,7 @@ mod iset_film;
 mod iset_kinds;
 mod iset_write;
 mod isetcam;
+mod links;
 mod packing;
 mod plane;
 #[cfg(test)]
@@ -22,5 +23,5 @@ pub use iset_write::write_iset_scene;
 #[cfg(test)]
 use isetcam::IsetScene;
 pub(super) use isetcam::{MatScene, read_mat};
-pub(super) use packing::WAVES;
+pub(super) use packing::rank_of_waves;
 pub(super) use plane::{DEPTHS, Plane, is_called, read_plane};

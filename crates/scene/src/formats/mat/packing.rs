@@ -2,9 +2,18 @@
 
 use super::super::wavelength_unit::without_unit;
 
-/// Names of the list of wavelengths beside a cube.
-pub(in super::super) const WAVES: [&str; 9] =
+/// Names of the list of wavelengths beside a cube, the likelier first.
+const WAVES: [&str; 9] =
     ["wave", "wavelength", "wavelengths", "wavelengths_nm", "waves", "lambda", "bands", "wl", "wlens"];
+/// Words in the names of lists of other numbers of wavelengths.
+const NO_WAVES: [&str; 7] = ["width", "fwhm", "error", "uncert", "offset", "shift", "delta"];
+
+/// Returns how likely a name is that of a list of wavelengths, 0 the most; none of other names.
+pub(in super::super) fn rank_of_waves(name: &str) -> Option<usize> {
+    let lower = name.to_lowercase();
+    let is_like = lower.contains("wavelength") && !NO_WAVES.iter().any(|word| lower.contains(word));
+    WAVES.iter().position(|own| *own == lower).or_else(|| is_like.then_some(WAVES.len()))
+}
 
 /// An attribute of an array.
 #[derive(Clone, Debug, PartialEq)]
@@ -68,7 +77,7 @@ impl<'a> Packing<'a> {
     /// Returns the list of wavelengths of so many bands.
     pub(super) fn wavelengths_nm(&self, n_bands: &[usize]) -> Option<Vec<f64>> {
         self.attributes.iter().find_map(|own| match &own.value {
-            Value::Numbers(list) if WAVES.contains(&own.name.as_str()) && n_bands.contains(&list.len()) => {
+            Value::Numbers(list) if rank_of_waves(&own.name).is_some() && n_bands.contains(&list.len()) => {
                 without_unit(list)
             }
             _ => None,
@@ -81,7 +90,7 @@ impl<'a> Packing<'a> {
             "scale_factor" | "add_offset" => matches!(&own.value, Value::Numbers(list) if list.len() == 1),
             name if MISSING.contains(&name) => matches!(own.value, Value::Numbers(_)),
             name if UNITS.contains(&name) => is_unit_used,
-            name => are_waves_used && WAVES.contains(&name),
+            name => are_waves_used && rank_of_waves(name).is_some(),
         };
         self.attributes.iter().filter(|own| !is_used(own)).map(|own| own.name.clone()).collect()
     }
@@ -90,6 +99,12 @@ impl<'a> Packing<'a> {
 #[cfg(test)]
 mod tests {
     use super::{super::super::length_unit::length_m, *};
+
+    #[test]
+    fn lists_of_wavelengths_are_known_by_their_names() {
+        let ranks = ["wave", "Wavelengths", "WL", "band_wavelengths", "bandwidth_wavelengths", "waveform"];
+        assert_eq!(ranks.map(rank_of_waves), [Some(0), Some(2), Some(7), Some(9), None, None]);
+    }
 
     #[test]
     fn packed_numbers_are_unpacked() {
