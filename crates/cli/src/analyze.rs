@@ -224,6 +224,12 @@ fn spot_table(analysis: &LensAnalysis) -> String {
             cell(wavefront.and_then(|w| w.strehl), 4),
         ]);
     }
+    let reasons = analysis.spots.iter().filter_map(|spot| spot.wavefront.as_ref()?.no_strehl.as_deref());
+    let (n, first) = (reasons.clone().count(), reasons.into_iter().next());
+    if let Some(reason) = first {
+        let more = if n > 1 { format!(" (and {} more rows)", n - 1) } else { String::new() };
+        text += &format!("no Strehl ratio: {reason}{more}\n");
+    }
     text
 }
 

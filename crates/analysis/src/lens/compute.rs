@@ -305,13 +305,17 @@ impl Bench {
             sigma_x_um: um(sigma_x_mm),
             sigma_y_um: um(sigma_y_mm),
             ray_share: spot.ray_share(),
-            wavefront: wavefront.map(|wavefront| WavefrontRow {
-                rms_waves: wavefront.rms_waves(),
-                peak_to_valley_waves: wavefront.peak_to_valley_waves(),
-                strehl: PupilSamples::peak_of(lens, &point, self.film_distance_mm).ok().map(|peak| peak.strehl),
-                strehl_of_rms: (-(std::f64::consts::TAU * wavefront.rms_waves()).powi(2)).exp(),
-                zernike_waves: wavefront.zernike_waves(ZERNIKE_TERMS),
-                fringe_waves: wavefront.fringe_waves(FRINGE_TERMS),
+            wavefront: wavefront.map(|wavefront| {
+                let peak = PupilSamples::peak_of(lens, &point, self.film_distance_mm);
+                WavefrontRow {
+                    rms_waves: wavefront.rms_waves(),
+                    peak_to_valley_waves: wavefront.peak_to_valley_waves(),
+                    strehl: peak.as_ref().ok().map(|peak| peak.strehl),
+                    no_strehl: peak.err().map(|error| error.to_string()),
+                    strehl_of_rms: (-(std::f64::consts::TAU * wavefront.rms_waves()).powi(2)).exp(),
+                    zernike_waves: wavefront.zernike_waves(ZERNIKE_TERMS),
+                    fringe_waves: wavefront.fringe_waves(FRINGE_TERMS),
+                }
             }),
             pupil,
             points_um: center_mm.map_or(Vec::new(), |center_mm| {

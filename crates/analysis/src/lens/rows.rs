@@ -204,6 +204,9 @@ pub struct WavefrontRow {
     /// Strehl's ratio: the highest point of the point spread function over that of the same light all in phase; none of a blur that
     /// needs more nodes than a wave sum has.
     pub strehl: Option<f64>,
+    /// Why there is none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub no_strehl: Option<String>,
     /// What Maréchal's formula makes of the root mean square, exp(−(2πσ)²): within a hundredth down to ratios of 0.8.
     pub strehl_of_rms: f64,
     /// Zernike coefficients over the unit disc of the stop, in Noll's order from piston, waves rms: `OpticStudio`'s standard ones.
