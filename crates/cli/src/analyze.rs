@@ -38,6 +38,7 @@ pub(crate) fn run(arguments: &LensAnalyzeArgs, common: &Common) -> anyhow::Resul
         for (name, svg) in [
             ("analysis", plots.page_svg()),
             ("spots", plots.spots_svg()),
+            ("focus_spots", plots.focus_spots_svg(&shown.focus_spots)),
             ("opd", plots.opd_svg()),
             ("distortion", plots.grid_svg()),
             ("footprints", plots.footprints_svg(&shown.footprints)),
@@ -65,8 +66,8 @@ pub(crate) fn run(arguments: &LensAnalyzeArgs, common: &Common) -> anyhow::Resul
         remark(
             common.quiet,
             &format!(
-                "wrote analysis.json, analysis.html, and analysis, spots, opd, distortion, footprints, mtf and curves over field, focus and \
-                 wavelength as {} (curves as .csv too), in {}",
+                "wrote analysis.json, analysis.html, and analysis, spots, focus_spots, opd, distortion, footprints, mtf \
+                 and curves over field, focus and wavelength as {} (curves as .csv too), in {}",
                 if DRAWS_PNG { ".svg and .png" } else { ".svg" },
                 path.display()
             ),
