@@ -200,7 +200,7 @@ impl Bench {
         self.cancel.check()?;
         let field_rows =
             |fields: &[Field]| self.each(fields, |field| self.field_row(field, (straight.as_ref(), axial_cone)));
-        let apertures = NumericalApertures::find(self.reference(), &axis);
+        let apertures = NumericalApertures::find(self.reference(), request.distance_mm);
         let is_round = self.reference().is_rotational();
         let conjugate_x = self.reference().conjugate_x(request.distance_mm);
         let film_curvature = self.reference().image_surface().curvature_per_mm;
