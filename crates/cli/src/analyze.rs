@@ -237,7 +237,7 @@ fn spot_table(analysis: &LensAnalysis) -> String {
 fn field_table(analysis: &LensAnalysis) -> String {
     let is_round = analysis.x_plane.is_none();
     let (first, second) = if is_round { ("sag. mm", "tan. mm") } else { ("x foc. mm", "y foc. mm") };
-    let header = ["field", height_header(analysis), "f tan θ %", "f θ %", first, second, "light"];
+    let header = ["field", height_header(analysis), "f tan θ %", "f θ %", "f θ cal. %", first, second, "light"];
     let mut text = line(&header.map(|name| in_units(name, analysis)));
     let foci = |row: &FieldRow| match is_round {
         true => [row.sagittal_focus_mm, row.tangential_focus_mm],
@@ -250,6 +250,7 @@ fn field_table(analysis: &LensAnalysis) -> String {
             height_cell(row.height_mm, analysis),
             cell(row.distortion_tangent_percent, 4),
             cell(row.distortion_angle_percent, 4),
+            cell(row.distortion_calibrated_percent, 4),
             first,
             second,
             cell(row.relative_illumination, 4),
