@@ -22,9 +22,9 @@ pub use chart::{Corner, LineChart, Scale, Series};
 pub use filter_table::{FilterRow, built_in_filters};
 pub use lens::{
     AfocalView, AnalysisFields, AnalysisFilm, AnalysisRequest, AxialColorRow, ComparedLens, ComparisonRow,
-    ConfigurationData, ConvertedLens, FanRow, FieldPlace, FieldRow, FilmPlace, FilmUse, FocusData, Footprint,
-    GRID_LINES, GhostField, GhostPair, GhostRow, GhostTable, GhostTableRequest, GlassData, GlassRow, GridRow,
-    ImageData, Landing, LensAnalysis, LensComparison, LensCurves, LensData, LensDefaults, LensInfoRequest,
+    ConfigurationData, ConvertedLens, FanRow, FieldPlace, FieldRow, FilmPlace, FilmUse, FocusData, FocusSpot,
+    Footprint, GRID_LINES, GhostField, GhostPair, GhostRow, GhostTable, GhostTableRequest, GlassData, GlassRow,
+    GridRow, ImageData, Landing, LensAnalysis, LensComparison, LensCurves, LensData, LensDefaults, LensInfoRequest,
     LensModulation, LensPageData, LensRow, OpdMap, PlaneData, PupilRow, RayTable, SharpDepths, SpotRow, SurfaceRow,
     TraceError, TraceSettings, WavefrontRow, built_in_lenses, convert_lens, ends_of, glass_data, glass_rows,
     placement_lines, surface_rows,

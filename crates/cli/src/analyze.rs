@@ -38,6 +38,7 @@ pub(crate) fn run(arguments: &LensAnalyzeArgs, common: &Common) -> anyhow::Resul
         for (name, svg) in [
             ("analysis", plots.page_svg()),
             ("spots", plots.spots_svg()),
+            ("focus_spots", plots.focus_spots_svg(&shown.focus_spots)),
             ("opd", plots.opd_svg()),
             ("distortion", plots.grid_svg()),
             ("footprints", plots.footprints_svg(&shown.footprints)),
@@ -65,8 +66,8 @@ pub(crate) fn run(arguments: &LensAnalyzeArgs, common: &Common) -> anyhow::Resul
         remark(
             common.quiet,
             &format!(
-                "wrote analysis.json, analysis.html, and analysis, spots, opd, distortion, footprints, mtf and curves over field, focus and \
-                 wavelength as {} (curves as .csv too), in {}",
+                "wrote analysis.json, analysis.html, and analysis, spots, focus_spots, opd, distortion, footprints, mtf \
+                 and curves over field, focus and wavelength as {} (curves as .csv too), in {}",
                 if DRAWS_PNG { ".svg and .png" } else { ".svg" },
                 path.display()
             ),
@@ -224,13 +225,19 @@ fn spot_table(analysis: &LensAnalysis) -> String {
             cell(wavefront.and_then(|w| w.strehl), 4),
         ]);
     }
+    let reasons = analysis.spots.iter().filter_map(|spot| spot.wavefront.as_ref()?.no_strehl.as_deref());
+    let (n, first) = (reasons.clone().count(), reasons.into_iter().next());
+    if let Some(reason) = first {
+        let more = if n > 1 { format!(" (and {} more rows)", n - 1) } else { String::new() };
+        text += &format!("no Strehl ratio: {reason}{more}\n");
+    }
     text
 }
 
 fn field_table(analysis: &LensAnalysis) -> String {
     let is_round = analysis.x_plane.is_none();
     let (first, second) = if is_round { ("sag. mm", "tan. mm") } else { ("x foc. mm", "y foc. mm") };
-    let header = ["field", height_header(analysis), "f tan θ %", "f θ %", first, second, "light"];
+    let header = ["field", height_header(analysis), "f tan θ %", "f θ %", "f θ cal. %", first, second, "light"];
     let mut text = line(&header.map(|name| in_units(name, analysis)));
     let foci = |row: &FieldRow| match is_round {
         true => [row.sagittal_focus_mm, row.tangential_focus_mm],
@@ -243,6 +250,7 @@ fn field_table(analysis: &LensAnalysis) -> String {
             height_cell(row.height_mm, analysis),
             cell(row.distortion_tangent_percent, 4),
             cell(row.distortion_angle_percent, 4),
+            cell(row.distortion_calibrated_percent, 4),
             first,
             second,
             cell(row.relative_illumination, 4),

@@ -3,16 +3,13 @@
 use std::fmt::Write;
 
 use dioptric_analysis::{GlassRow, glass_data, glass_rows};
-use dioptric_pipeline::GlassRange;
+use dioptric_pipeline::{GlassRange, number};
 
 use crate::{
     args::Common,
     lens_args::{BandArgs, GlassCommand},
     terminal::{print, print_json},
 };
-
-/// Wavelengths where none are asked for, nm.
-const USUAL_NM: [f64; 7] = [400.0, 450.0, 500.0, 550.0, 600.0, 650.0, 700.0];
 
 pub(crate) fn run(command: &GlassCommand, common: &Common) -> anyhow::Result<()> {
     match command {
@@ -46,7 +43,7 @@ fn show(
     glass_range: GlassRange,
     common: &Common,
 ) -> anyhow::Result<()> {
-    let data = glass_data(name, makers, &bands.nm()?.unwrap_or(USUAL_NM.to_vec()), glass_range)?;
+    let data = glass_data(name, makers, bands.nm()?, glass_range)?;
     if common.json {
         return print_json(&data);
     }
@@ -63,7 +60,7 @@ fn show(
             error if error > 0.0 => format!(" {error:>14.1e}"),
             _ => String::new(),
         };
-        writeln!(text, "{wavelength_nm:>14} {index:>12.7} {through:>14}{off}")?;
+        writeln!(text, "{:>14} {index:>12.7} {through:>14}{off}", number(*wavelength_nm))?;
     }
     print(&text)
 }

@@ -6,7 +6,7 @@ use anyhow::Context;
 use dioptric_analysis::{
     AnalysisFields, AnalysisRequest, ComparedLens, LensAnalysis, LensComparison, LensDefaults, LensPageData,
 };
-use dioptric_pipeline::Staged;
+use dioptric_pipeline::{Staged, number};
 use dioptric_report::{AnalysisPlots, LensComparisonPage, LensPage, chart_svg, write_drawing};
 
 use crate::{
@@ -30,6 +30,7 @@ pub(crate) fn run(arguments: &LensCompareArgs, common: &Common) -> anyhow::Resul
     for one in [&first, &second] {
         one.analysis.notes.iter().for_each(|note| remark(common.quiet, &format!("{}: {note}", one.analysis.lens)));
     }
+    note_on_object(&first, &second).iter().for_each(|note| remark(common.quiet, note));
     let comparison = LensComparison::of([first.compared(), second.compared()]);
     let pages = first.page().zip(second.page());
     if let (Some(staged), Some(path), Some((page, other))) = (staged, &arguments.out, pages) {
@@ -47,6 +48,21 @@ pub(crate) fn run(arguments: &LensCompareArgs, common: &Common) -> anyhow::Resul
         remark(common.quiet, &words);
     }
     if common.json { print_json(&comparison) } else { print(&table(&comparison)?) }
+}
+
+/// Says that the second lens is looked at with the object of the first, where its file has another one.
+fn note_on_object(first: &Analyzed, second: &Analyzed) -> Option<String> {
+    let (own_mm, used_mm) = (second.used.distance_mm, first.request.distance_mm);
+    let far = |mm: f64| if mm.is_finite() { format!("{} mm before it", number(mm)) } else { "far away".to_owned() };
+    (own_mm != used_mm && own_mm.is_finite()).then(|| {
+        format!(
+            "{}: it is looked at with an object {}, as {} is; that of its own file is {}",
+            second.analysis.lens,
+            far(used_mm),
+            first.analysis.lens,
+            far(own_mm)
+        )
+    })
 }
 
 /// A lens that was analyzed.

@@ -164,7 +164,7 @@ pub fn pupil_samples(
         return Ok(nodes);
     }
     let mut nodes = trace(PupilGrid::STANDARD)?;
-    while let Some(grid) = nodes.finer_grid(extent_mm)? {
+    while let Some(grid) = nodes.finer_grid(extent_mm, LARGEST_BANDWIDTH)? {
         nodes = trace(grid)?;
     }
     Ok(nodes)
@@ -192,15 +192,15 @@ impl WaveWindow {
 
 impl PupilSamples {
     /// Returns the grid that is to be tried instead of this one for places up to `extent_mm` from the reference, or `None`
-    /// if this one does.
-    fn finer_grid(&self, extent_mm: f64) -> Result<Option<PupilGrid>, DiffractionError> {
+    /// if this one does; refused beyond a range of phases.
+    fn finer_grid(&self, extent_mm: f64, limit: f64) -> Result<Option<PupilGrid>, DiffractionError> {
         let range = self.phase_range(extent_mm);
         if self.grid.covers(PupilGrid::needed(range)) {
             return Ok(None);
         }
         let bandwidth = range.total();
-        if bandwidth > LARGEST_BANDWIDTH {
-            return Err(DiffractionError::TooBlurred { bandwidth, limit: LARGEST_BANDWIDTH });
+        if bandwidth > limit {
+            return Err(DiffractionError::TooBlurred { bandwidth, limit });
         }
         // More nodes reach nearer to the edge, and may find that still more are needed: hence the hundredth to spare.
         let needed = PupilGrid::needed(range.scaled(1.01));

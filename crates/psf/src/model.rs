@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use dioptric_optics::Lens;
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 
 use crate::{
     Diffraction, FilmMap, FilmQuery, ImageSettings, Kernel, LensImage, PointImage, PsfArray, PsfError, PupilDivision,
@@ -51,7 +51,13 @@ impl LensImageModel {
         let stored = self.stored.as_ref()?;
         let FilmQuery { place_mm, dioptres, wavelength_nm, .. } = query;
         let direction = self.shared.direction(place_mm, wavelength_nm);
-        Some((stored, StoredPoint { direction, dioptres, wavelength_nm }))
+        Some((stored, self.stored_point(direction, dioptres, wavelength_nm)))
+    }
+
+    /// Returns the point that a direction of the scene shows, as the lens on its own axis sees it.
+    fn stored_point(&self, direction: DVec3, dioptres: f64, wavelength_nm: f64) -> StoredPoint {
+        let moved = self.shared.decenter().mm() * (1e-3 * dioptres * direction.z);
+        StoredPoint { direction: direction - moved.extend(0.0), dioptres, wavelength_nm }
     }
 
     fn stored_about(
@@ -88,8 +94,11 @@ impl LensImageModel {
     pub fn point(&self, field_tan: DVec2, dioptres: f64, wavelength_nm: f64) -> Option<PointImage> {
         if let Some(stored) = &self.stored {
             let map = self.shared.survey_of_film(&self.shared.color(wavelength_nm), 0.0).map.clone();
-            let place_mm = map.place_mm(field_tan).filter(|place_mm| map.irradiance_sr(*place_mm) > 0.0)?;
-            let point = StoredPoint { direction: field_tan.extend(1.0), dioptres, wavelength_nm };
+            // The map is that of points in focus.
+            let out_of_focus = self.shared.decenter().mm() * (1e-3 * (dioptres - self.focus_dioptres()));
+            let place_mm =
+                map.place_mm(field_tan - out_of_focus).filter(|place_mm| map.irradiance_sr(*place_mm) > 0.0)?;
+            let point = self.stored_point(field_tan.extend(1.0), dioptres, wavelength_nm);
             return Some(PointImage::stored(stored.clone(), point, place_mm));
         }
         PointImage::trace(self.lens(), self.settings(), field_tan, dioptres, wavelength_nm).ok().flatten()

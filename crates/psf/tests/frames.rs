@@ -2,10 +2,15 @@
 
 #![expect(clippy::unwrap_used, reason = "a helper of tests fails by panicking")]
 
+use std::sync::Arc;
+
 use dioptric_diffraction::{CircularStop, Hurb, trace_stop_rays};
 use dioptric_optics::{CoordinateBreak, Glass, ImageSurface, Interface, Lens, ObjectPoint, Surface, rays_towards};
-use dioptric_psf::{Diffraction, ImageSettings, LensImage, LensImageModel, PointImage};
+use dioptric_psf::{
+    ArrayFields, Diffraction, FilmQuery, ImageSettings, LensImage, LensImageModel, PointImage, PsfArray, PsfArrayParts,
+};
 use glam::{DMat2, DVec2};
+use ndarray::Array5;
 
 const NM: f64 = 550.0;
 
@@ -77,6 +82,39 @@ fn decentered_stop_keeps_psf() {
     let [(a, _), (b, _)] = [a, b].map(|image| image.picture(2.0, 81));
     let l1: f64 = (&a - &b).iter().map(|d| d.abs()).sum();
     assert!(l1 < 2e-3, "{l1}");
+}
+
+/// Functions of an array go with the axis of a lens that is moved aside, at every depth.
+#[test]
+fn stored_functions_move_with_the_axis() {
+    let all = (0, double_gauss().interfaces().len() - 1);
+    let moved = placed(&double_gauss(), all, [0.9, -1.7, 0.0], [0.0; 3]);
+    // The light of a field of 4 degrees lies beside the middle sample, that of the axis in it.
+    let mut samples = Array5::zeros((2, 1, 1, 3, 3));
+    samples[(0, 0, 0, 1, 1)] = 1.0;
+    samples[(1, 0, 0, 1, 2)] = 1.0;
+    let fields = ArrayFields::Heights(vec![0.0, 4.0]);
+    let parts = PsfArrayParts { fields, distances_mm: vec![], wavelengths_nm: vec![], pitch_um: vec![5.0], samples };
+    let settings = ImageSettings::new(moved.at(NM).unwrap().first_order().bfl_mm + 8.0, Diffraction::None);
+    let traced = LensImageModel::new(&moved, &[NM], &settings).unwrap();
+    let stored = traced.clone().with_psfs(Arc::new(PsfArray::new(parts).unwrap())).unwrap();
+    let focus_dioptres = stored.focus_dioptres();
+    assert!(focus_dioptres > 2.0, "{focus_dioptres}");
+    for dioptres in [focus_dioptres, 0.5 * focus_dioptres, 0.0] {
+        // What lies straight before the moved axis is seen there.
+        let ahead = DVec2::new(0.9, -1.7) * (1e-3 * dioptres);
+        let image = stored.point(ahead, dioptres, NM).unwrap();
+        assert!((image.centroid_mm() - DVec2::new(-0.9, 1.7)).length() < 1e-6, "{}", image.centroid_mm());
+        let kernel = image.kernel(5.0).0;
+        assert_eq!((kernel.samples.iter().copied().fold(0.0, f32::max), kernel.samples.len()), (1.0, 1), "{dioptres}");
+        // Elsewhere a point lies where its light does, but for the lens's aberrations.
+        let aside = DVec2::new(0.06, 0.02);
+        let [place_mm, light_mm] = [&stored, &traced].map(|of| of.point(aside, dioptres, NM).unwrap().centroid_mm());
+        assert!((place_mm - light_mm).length() < 0.01, "{place_mm} {light_mm}");
+    }
+    let query =
+        FilmQuery { place_mm: DVec2::new(-0.9, 1.7), dioptres: focus_dioptres, wavelength_nm: NM, pitch_um: 5.0 };
+    assert_eq!(stored.kernel(query).samples.len(), 1);
 }
 
 /// What lands on a film that is moved aside, or turned about its normal, has other coordinates there.

@@ -35,8 +35,16 @@ fn analysis_page_names_its_curves() {
     let page = LensPage { plots, shown: &shown, tables: "a < b" };
     let html = page.html().unwrap();
     assert!(html.contains("<pre>a &lt; b</pre>") && html.contains("front &amp; first") && !html.contains("NaN"));
-    for part in ["Prescription", "First order", "Modulation over field", "Through focus", "Glasses", "Airy", "550.0 nm"]
-    {
+    for part in [
+        "Prescription",
+        "First order",
+        "Modulation over field",
+        "Through focus",
+        "film +0.000 mm",
+        "Glasses",
+        "Airy",
+        "550.0 nm",
+    ] {
         assert!(html.contains(part), "{part}");
     }
 }

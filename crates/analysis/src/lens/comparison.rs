@@ -73,17 +73,27 @@ fn whole(both: [ComparedLens<'_>; 2]) -> Vec<ComparisonRow> {
         let shifts = || analysis.axial_color.iter().map(|row| row.paraxial_shift_mm);
         Some(shifts().fold(f64::NEG_INFINITY, f64::max) - shifts().fold(f64::INFINITY, f64::min))
     };
-    vec![
+    let magnification = |one: ComparedLens<'_>| {
+        let lens = one.lens.at(one.analysis.reference_nm).ok().filter(|_| one.analysis.distance_mm.is_finite());
+        lens.map(|lens| lens.conjugate(one.analysis.distance_mm).magnification)
+    };
+    let rows = vec![
+        row("object before the first vertex, mm", of(&|a| Some(a.distance_mm))),
         row("focal length, mm", of(&|a| Some(a.efl_mm))),
         row("f-number", of(&|a| Some(a.f_number))),
         row("f-number at this object", of(&|a| Some(a.working_f_number))),
+        row("magnification", both.map(magnification)),
+        row("numerical aperture at the object", of(&|a| a.object_na)),
+        row("numerical aperture at the image", of(&|a| a.image_na)),
         row("film behind the last vertex, mm", of(&|a| Some(a.film_distance_mm))),
         row("from the first vertex to the film, mm", both.map(length_mm)),
         row("surfaces", both.map(|one| Some(one.lens.interfaces().len() as f64))),
         row("field of half the light, °", of(&|a| a.half_illumination_deg)),
         row("paraxial axial color, mm", of(&color_mm)),
         row("least spot on the axis, µm rms", of(&|a| a.focus.axis_rms_um)),
-    ]
+    ];
+    // A far object has no distance and no aperture.
+    rows.into_iter().filter(|row| row.values.iter().any(Option::is_some)).collect()
 }
 
 /// The quantities of the `i`-th field, at the reference wavelength.

@@ -200,7 +200,13 @@ impl Bench {
         self.cancel.check()?;
         let field_rows =
             |fields: &[Field]| self.each(fields, |field| self.field_row(field, (straight.as_ref(), axial_cone)));
-        let apertures = NumericalApertures::find(self.reference(), &axis);
+        let (mut of_fields, mut of_curves) = (field_rows(&fields)?, field_rows(&curve_fields)?);
+        let calibrated_scale = calibrated_scale(&of_curves);
+        for row in of_fields.iter_mut().chain(&mut of_curves) {
+            let relative = row.distortion_angle_percent.zip(calibrated_scale);
+            row.distortion_calibrated_percent = relative.map(|(percent, scale)| (100.0 + percent) / scale - 100.0);
+        }
+        let apertures = NumericalApertures::find(self.reference(), request.distance_mm);
         let is_round = self.reference().is_rotational();
         let conjugate_x = self.reference().conjugate_x(request.distance_mm);
         let film_curvature = self.reference().image_surface().curvature_per_mm;
@@ -241,8 +247,9 @@ impl Bench {
             fans: self.each(&pairs, |(field, lens)| self.fan_row(field, lens))?,
             opd_maps: self.each(&pairs, |(field, lens)| self.opd_map(field, lens))?,
             grid: straight.map_or_else(Vec::new, |straight| self.grid(&fields, &straight)),
-            fields: field_rows(&fields)?,
-            curves: field_rows(&curve_fields)?,
+            calibrated_scale,
+            fields: of_fields,
+            curves: of_curves,
         })
     }
 
@@ -305,13 +312,17 @@ impl Bench {
             sigma_x_um: um(sigma_x_mm),
             sigma_y_um: um(sigma_y_mm),
             ray_share: spot.ray_share(),
-            wavefront: wavefront.map(|wavefront| WavefrontRow {
-                rms_waves: wavefront.rms_waves(),
-                peak_to_valley_waves: wavefront.peak_to_valley_waves(),
-                strehl: PupilSamples::peak_of(lens, &point, self.film_distance_mm).ok().map(|peak| peak.strehl),
-                strehl_of_rms: (-(std::f64::consts::TAU * wavefront.rms_waves()).powi(2)).exp(),
-                zernike_waves: wavefront.zernike_waves(ZERNIKE_TERMS),
-                fringe_waves: wavefront.fringe_waves(FRINGE_TERMS),
+            wavefront: wavefront.map(|wavefront| {
+                let peak = PupilSamples::peak_of(lens, &point, self.film_distance_mm);
+                WavefrontRow {
+                    rms_waves: wavefront.rms_waves(),
+                    peak_to_valley_waves: wavefront.peak_to_valley_waves(),
+                    strehl: peak.as_ref().ok().map(|peak| peak.strehl),
+                    no_strehl: peak.err().map(|error| error.to_string()),
+                    strehl_of_rms: (-(std::f64::consts::TAU * wavefront.rms_waves()).powi(2)).exp(),
+                    zernike_waves: wavefront.zernike_waves(ZERNIKE_TERMS),
+                    fringe_waves: wavefront.fringe_waves(FRINGE_TERMS),
+                }
             }),
             pupil,
             points_um: center_mm.map_or(Vec::new(), |center_mm| {
@@ -362,6 +373,7 @@ impl Bench {
             image_mm: place_mm(lens).map(in_picture),
             distortion_tangent_percent: against_tangent.map(|relative| 100.0 * relative),
             distortion_angle_percent: against_angle.map(|relative| 100.0 * relative),
+            distortion_calibrated_percent: None,
             tangential_focus_mm: foci.map(|foci| foci.tangential_mm - film_distance_mm),
             sagittal_focus_mm: foci.map(|foci| foci.sagittal_mm - film_distance_mm),
             x_focus_mm: axes.map(|foci| foci.x_mm - film_distance_mm),
@@ -438,6 +450,15 @@ impl Bench {
         };
         places.par_iter().map(row).collect()
     }
+}
+
+/// Returns c for which Σ (h − c f θ)² is least over rows with h = (1 + relative) f θ; none of the axis alone.
+fn calibrated_scale(rows: &[FieldRow]) -> Option<f64> {
+    let [with_height, with_angle] = rows.iter().fold([0.0; 2], |[a, b], row| {
+        let square = row.place.field_deg.powi(2);
+        row.distortion_angle_percent.map_or([a, b], |percent| [a + square * (1.0 + 0.01 * percent), b + square])
+    });
+    (with_angle > 0.0).then(|| with_height / with_angle)
 }
 
 /// Returns a place on the film in the picture frame, which is turned by half a turn.

@@ -3,7 +3,7 @@
 
 use dioptric_diffraction::{PupilGrid, Wavefront, WavefrontReference};
 use dioptric_optics::{
-    Lens, MonoLens, PupilRegion, SeidelSettings,
+    Lens, MonoLens, ObjectPoint, PupilRegion, SeidelSettings,
     analysis::{PupilLight, PupilRule},
 };
 use rayon::prelude::*;
@@ -40,10 +40,7 @@ impl LensAnalysis {
     /// # Errors
     /// When a glass is not known at a wavelength.
     pub fn lens_curves(&self, lens: &Lens) -> Result<LensCurves, PipelineError> {
-        let lenses = self.wavelengths_nm.iter().map(|&nm| lens.at(nm)).collect::<Result<Vec<MonoLens>, _>>()?;
-        let reference = lens.at(self.reference_nm)?;
-        let dioptres = 1e3 / (self.distance_mm + reference.projection_center_z_mm());
-        let bench = Bench { analysis: self, lens, lenses, reference, dioptres };
+        let bench = Bench::of(self, lens)?;
         let mut curves = vec![
             ("chromatic_focal_shift", bench.chromatic_focal_shift()),
             ("rms_over_field", bench.spots_over_field()),
@@ -64,15 +61,40 @@ impl LensAnalysis {
     }
 }
 
-struct Bench<'a> {
+/// A lens that was analyzed, at its wavelengths, with its object.
+pub(super) struct Bench<'a> {
     analysis: &'a LensAnalysis,
     lens: &'a Lens,
-    lenses: Vec<MonoLens>,
-    reference: MonoLens,
+    pub(super) lenses: Vec<MonoLens>,
+    pub(super) reference: MonoLens,
     dioptres: f64,
 }
 
-impl Bench<'_> {
+impl<'a> Bench<'a> {
+    pub(super) fn of(analysis: &'a LensAnalysis, lens: &'a Lens) -> Result<Self, PipelineError> {
+        let lenses = analysis.wavelengths_nm.iter().map(|&nm| lens.at(nm)).collect::<Result<Vec<MonoLens>, _>>()?;
+        let reference = lens.at(analysis.reference_nm)?;
+        let dioptres = 1e3 / (analysis.distance_mm + reference.projection_center_z_mm());
+        Ok(Self { analysis, lens, lenses, reference, dioptres })
+    }
+
+    /// The point of a place of the field, the same for all wavelengths.
+    pub(super) fn point(&self, place: &FieldPlace) -> ObjectPoint {
+        Field::of_place(place).point(&self.reference, self.dioptres)
+    }
+
+    /// How far the film is moved to each side through focus, mm: as far as the blur of the cone is eight times the pattern of a perfect
+    /// lens, or twice the spot on the axis.
+    pub(super) fn focus_reach_mm(&self) -> f64 {
+        let f_number = self.analysis.working_f_number.abs();
+        let airy_um = 1.22e-3 * self.analysis.reference_nm * f_number;
+        let spot_um = self.analysis.focus.axis_rms_um.unwrap_or(0.0);
+        match 2e-3 * (4.0 * airy_um).max(2.0 * spot_um) * f_number {
+            reach_mm if reach_mm.is_finite() && reach_mm > 0.0 => reach_mm.min(5.0),
+            _ => 1.0,
+        }
+    }
+
     /// The fields of curves over field.
     fn places(&self) -> Vec<FieldPlace> {
         self.analysis.curves.iter().step_by(EACH).map(|row| row.place).collect()
@@ -92,9 +114,8 @@ impl Bench<'_> {
     }
 
     /// The root mean square radius of the spot of a field at a wavelength, µm; NaN where no light gets through.
-    fn rms_um(&self, lens: &MonoLens, place: &FieldPlace, film_mm: f64) -> f64 {
-        let point = Field::of_place(place).point(&self.reference, self.dioptres);
-        let light = PupilLight::to_film(lens, &point, film_mm, PupilRule::of_rings(RINGS));
+    pub(super) fn rms_um(&self, lens: &MonoLens, place: &FieldPlace, film_mm: f64) -> f64 {
+        let light = PupilLight::to_film(lens, &self.point(place), film_mm, PupilRule::of_rings(RINGS));
         light.map_or(f64::NAN, |light| {
             let (_, [xx, yy, _]) = light.moments(lens, film_mm);
             1e3 * (xx + yy).max(0.0).sqrt()
@@ -126,9 +147,8 @@ impl Bench<'_> {
     fn wavefronts_over_field(&self) -> LineChart {
         let film_mm = self.analysis.film_distance_mm;
         let waves = |place: &FieldPlace| {
-            let point = Field::of_place(place).point(&self.reference, self.dioptres);
             let reference = WavefrontReference::Best;
-            let found = Wavefront::trace(&self.reference, &point, film_mm, PupilGrid::STANDARD, reference);
+            let found = Wavefront::trace(&self.reference, &self.point(place), film_mm, PupilGrid::STANDARD, reference);
             (place.field_deg, found.map_or(f64::NAN, |wavefront| wavefront.rms_waves()))
         };
         let points: Vec<(f64, f64)> = self.places().par_iter().map(waves).collect();
@@ -144,14 +164,7 @@ impl Bench<'_> {
     }
 
     fn spots_over_focus(&self) -> LineChart {
-        // As far as the blur of the cone is eight times the pattern of a perfect lens, or twice the spot on the axis.
-        let f_number = self.analysis.working_f_number.abs();
-        let airy_um = 1.22e-3 * self.analysis.reference_nm * f_number;
-        let spot_um = self.analysis.focus.axis_rms_um.unwrap_or(0.0);
-        let reach_mm = match 2e-3 * (4.0 * airy_um).max(2.0 * spot_um) * f_number {
-            reach_mm if reach_mm.is_finite() && reach_mm > 0.0 => reach_mm.min(5.0),
-            _ => 1.0,
-        };
+        let reach_mm = self.focus_reach_mm();
         let film_mm = self.analysis.film_distance_mm;
         let shifts: Vec<f64> =
             (-FOCUS_STEPS..=FOCUS_STEPS).map(|i| reach_mm * f64::from(i) / f64::from(FOCUS_STEPS)).collect();

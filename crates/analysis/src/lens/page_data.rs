@@ -2,7 +2,7 @@
 
 use dioptric_optics::Lens;
 
-use super::{curves::ends_of, footprint::Footprint};
+use super::{curves::ends_of, focus_spots::FocusSpot, footprint::Footprint};
 use crate::{AnalysisRequest, LensAnalysis, LensCurves, LensData, LensDefaults, LensInfoRequest, LensModulation};
 use dioptric_pipeline::PipelineError;
 
@@ -22,6 +22,8 @@ pub struct LensPageData {
     pub sums_field_deg: f64,
     /// Curves over field, focus and wavelength.
     pub curves: LensCurves,
+    /// Spots of each field on a film that goes through focus.
+    pub focus_spots: Vec<Vec<FocusSpot>>,
     /// Where the light of each field meets the surfaces.
     pub footprints: Vec<Footprint>,
     /// The modulation, or why there is none.
@@ -54,6 +56,7 @@ impl LensPageData {
         Ok(Self {
             data: request.wavelengths_nm.iter().map(data).collect::<Result<_, _>>()?,
             curves: analysis.lens_curves(&lens)?,
+            focus_spots: analysis.focus_spots(&lens)?,
             footprints: analysis.footprints(&lens)?,
             modulation: analysis.modulation(&lens, &weights).map_err(|error| error.to_string()),
             surface_comments: used.surface_comments.clone(),

@@ -61,6 +61,8 @@ pub struct LensAnalysis {
     pub spots: Vec<SpotRow>,
     /// Fans, in the same order.
     pub fans: Vec<FanRow>,
+    /// What heights in step with the angle are multiplied by to be nearest to those of the lens, by least squares over the field.
+    pub calibrated_scale: Option<f64>,
     /// What depends on the field alone, at the fields asked for.
     pub fields: Vec<FieldRow>,
     /// The same at equal steps from the axis to the largest of them.
@@ -204,6 +206,9 @@ pub struct WavefrontRow {
     /// Strehl's ratio: the highest point of the point spread function over that of the same light all in phase; none of a blur that
     /// needs more nodes than a wave sum has.
     pub strehl: Option<f64>,
+    /// Why there is none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub no_strehl: Option<String>,
     /// What Maréchal's formula makes of the root mean square, exp(−(2πσ)²): within a hundredth down to ratios of 0.8.
     pub strehl_of_rms: f64,
     /// Zernike coefficients over the unit disc of the stop, in Noll's order from piston, waves rms: `OpticStudio`'s standard ones.
@@ -260,6 +265,8 @@ pub struct FieldRow {
     pub distortion_tangent_percent: Option<f64>,
     /// Distortion against a height in step with the angle, percent.
     pub distortion_angle_percent: Option<f64>,
+    /// The same with the scale for which it is least over the field ([`LensAnalysis::calibrated_scale`]), percent.
+    pub distortion_calibrated_percent: Option<f64>,
     /// The focus of close rays in the plane of the field, mm along the axis behind the film where the chief ray meets it.
     pub tangential_focus_mm: Option<f64>,
     /// The focus of close rays beside it, mm behind the film.

@@ -2,7 +2,7 @@
 
 use dioptric_optics::{
     C_LINE_NM, F_LINE_NM, FirstOrder, Lens, LensFile, MonoLens, SchematicEye, SeidelSettings, SeidelSums,
-    analysis::field_limits_deg,
+    analysis::{NumericalApertures, field_limits_deg},
 };
 use serde::Serialize;
 
@@ -171,7 +171,7 @@ pub struct ImageData {
     pub magnification: f64,
     /// f-number of the cone at the image.
     pub working_f_number: f64,
-    /// Numerical aperture at the object, of real rays; `None` where no light gets through on the axis.
+    /// Numerical aperture at the object, of real rays; `None` where none come through on the axis.
     pub object_na: Option<f64>,
     /// Numerical aperture at the image, of real rays.
     pub image_na: Option<f64>,
@@ -311,10 +311,10 @@ fn image_of(lens: &MonoLens, distance_mm: f64) -> Result<ImageData, PipelineErro
         });
     }
     let conjugate = lens.conjugate(distance_mm);
-    let beam = lens.axial_beam(distance_mm);
+    let apertures = NumericalApertures::find(lens, distance_mm);
     Ok(ImageData {
-        object_na: beam.map(|beam| lens.object_index() * beam.slope_before.atan().sin().abs()),
-        image_na: beam.map(|beam| lens.image_index() * beam.sine_after),
+        object_na: apertures.map(|found| found.object),
+        image_na: apertures.map(|found| found.image),
         distance_mm,
         image_distance_mm: conjugate.image_z_mm,
         magnification: conjugate.magnification,

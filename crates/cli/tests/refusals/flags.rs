@@ -117,6 +117,7 @@ pub(crate) const LINES: &[(&str, &str)] = &[
     ),
     ("psf dgauss-50mm --distances-mm inf --fields-deg 121", "psf: fields_deg is 121, expected angles of up to 120 deg"),
     ("psf dgauss-50mm --distances-mm inf --mode paper --fields-deg 95", "below 90 degrees in the paper mode"),
+    ("glass show N-BK7 --catalog NOSUCH", "catalog is NOSUCH, expected a maker: "),
     ("lens info dgauss-50mm --catalog NOSUCH", "catalog is NOSUCH, expected a catalogue (.agf, .yml) or a maker: "),
     ("psf dgauss-50mm --focus-mm 2000 --fields-deg x", "--fields-deg: 'x' is neither a number nor a range"),
     ("psf dgauss-50mm --focus-mm 2000 --distances-mm 0", "--distances-mm is 0, expected "),

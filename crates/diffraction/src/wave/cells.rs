@@ -85,17 +85,26 @@ impl PupilCells {
         point: &ObjectPoint,
         film_distance_mm: f64,
     ) -> Result<FilmRays, DiffractionError> {
-        let steps = [DVec2::ZERO, DVec2::X, -DVec2::X, DVec2::Y, -DVec2::Y].map(|u| u * self.step_mm);
-        let targets_mm: Vec<DVec2> =
-            steps.iter().flat_map(|step| self.targets_mm.iter().map(move |target| target + step)).collect();
-        let mut rays = self.plane.rays(lens, point, &targets_mm);
-        lens.trace(&mut rays, Vignetting::Off);
-        lens.to_film(&mut rays, film_distance_mm);
-        let (n_rays, n_lost) = (rays.len(), rays.len() - rays.n_in_flight());
-        match n_lost {
-            0 => Ok(FilmRays::new(&rays, lens, film_distance_mm)),
-            _ => Err(DiffractionError::LostRays { wavelength_nm: lens.wavelength_nm(), n_lost, n_rays }),
+        // One after the other: rays take more memory than what is kept of them.
+        let mut on_film: Option<FilmRays> = None;
+        let (mut n_rays, mut n_lost) = (0, 0);
+        for step in [DVec2::ZERO, DVec2::X, -DVec2::X, DVec2::Y, -DVec2::Y] {
+            let targets_mm: Vec<DVec2> = self.targets_mm.iter().map(|target| target + step * self.step_mm).collect();
+            let mut rays = self.plane.rays(lens, point, &targets_mm);
+            lens.trace(&mut rays, Vignetting::Off);
+            lens.to_film(&mut rays, film_distance_mm);
+            (n_rays, n_lost) = (n_rays + rays.len(), n_lost + rays.len() - rays.n_in_flight());
+            let more = FilmRays::new(&rays, lens, film_distance_mm);
+            match &mut on_film {
+                Some(on_film) => on_film.append(more),
+                None => on_film = Some(more),
+            }
         }
+        on_film.filter(|_| n_lost == 0).ok_or(DiffractionError::LostRays {
+            wavelength_nm: lens.wavelength_nm(),
+            n_lost,
+            n_rays,
+        })
     }
 
     /// Returns the mean place on the film.

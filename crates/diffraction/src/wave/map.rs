@@ -9,7 +9,7 @@ use glam::DVec2;
 use multiversion::multiversion;
 
 use super::{
-    PupilGrid, PupilSamples, WavePsf, WaveWindow, WindowCenter,
+    LARGEST_BANDWIDTH, PupilGrid, PupilSamples, WavePsf, WaveWindow, WindowCenter,
     cells::solid_angle_per_area,
     propagation::{FilmRays, Waves, has_few_zones},
     smooth::{Azimuth, Parity, Places, Ray, horner, radial_slope},
@@ -316,7 +316,7 @@ impl PupilFunctionFit {
         ROOM.with_borrow_mut(|room| {
             // A few nodes tell how many are needed.
             self.fill(room, PupilGrid { n_radii: 8, n_azimuths: 32 }, wavelength_nm, turn)?;
-            while let Some(grid) = room.nodes.finer_grid(extent_mm)? {
+            while let Some(grid) = room.nodes.finer_grid(extent_mm, LARGEST_BANDWIDTH)? {
                 self.fill(room, grid, wavelength_nm, turn)?;
             }
             let center = WindowCenter::At(window.center.on_film_mm(|| room.nodes.reference_mm));

@@ -256,15 +256,7 @@ impl PupilSamples {
     /// Returns the irradiance at one film point, per mm² for unit transmitted energy: the sum written out, in double
     /// precision.
     pub fn irradiance_per_mm2(&self, on_film_mm: DVec2) -> f64 {
-        let waves = self.plane_waves(DVec2::ZERO);
-        let at = on_film_mm - self.reference_mm;
-        let (mut re, mut im) = (0.0, 0.0);
-        for j in 0..self.len() {
-            let (c, s) = super::cis::cis(waves.turns_x_per_mm[j] * at.x + waves.turns_y_per_mm[j] * at.y);
-            re += waves.re[j] * c - waves.im[j] * s;
-            im += waves.re[j] * s + waves.im[j] * c;
-        }
-        re * re + im * im
+        self.plane_waves(DVec2::ZERO).irradiance_at(on_film_mm - self.reference_mm).value
     }
 
     /// The irradiance at the peak if all waves were in phase, per mm² for unit transmitted energy.

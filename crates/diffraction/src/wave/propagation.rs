@@ -57,6 +57,13 @@ impl FilmRays {
         }
     }
 
+    /// Adds rays of the same lens on the same film.
+    pub(crate) fn append(&mut self, mut more: Self) {
+        self.points_mm.append(&mut more.points_mm);
+        self.directions.append(&mut more.directions);
+        self.opl_mm.append(&mut more.opl_mm);
+    }
+
     /// Returns where a ray lies on the film, mm from its vertex.
     pub(crate) fn place_mm(&self, ray: usize) -> DVec2 {
         self.points_mm[ray].truncate()

@@ -9,6 +9,9 @@
 //! The code is compiled once for the base instruction set and once for AVX2, chosen at run time; neither uses fused
 //! multiply-add, and the order of every sum is fixed, so every machine gives the same bits.
 
+use std::f64::consts::TAU;
+
+use glam::{DMat2, DVec2};
 use multiversion::multiversion;
 use ndarray::Array2;
 
@@ -29,6 +32,51 @@ impl PlaneWaves {
         let sum: f64 = self.re.iter().zip(&self.im).map(|(re, im)| (re * re + im * im).sqrt()).sum();
         if sum > 0.0 { 1.0 / sum } else { 1.0 }
     }
+
+    /// Returns |Σ waves|² at a place, mm from where they count from, and its derivatives.
+    pub(crate) fn irradiance_at(&self, at_mm: DVec2) -> Irradiance {
+        let [u, x, y, xx, xy, yy] = derivatives(self, at_mm);
+        // ∂|U|² = 2 Re(U* ∂U), and ∂∂'|U|² = 2 Re(∂U* ∂'U + U* ∂∂'U).
+        let of = |a: (f64, f64), b: (f64, f64)| 2.0 * (a.0 * b.0 + a.1 * b.1);
+        let mixed = of(x, y) + of(u, xy);
+        Irradiance {
+            value: 0.5 * of(u, u),
+            slope: DVec2::new(of(u, x), of(u, y)),
+            bend: DMat2::from_cols(DVec2::new(of(x, x) + of(u, xx), mixed), DVec2::new(mixed, of(y, y) + of(u, yy))),
+        }
+    }
+}
+
+/// |Σ waves|² at a place: its value, its derivatives along x and y, per mm, and its second ones.
+#[derive(Clone, Debug)]
+pub(crate) struct Irradiance {
+    pub(crate) value: f64,
+    pub(crate) slope: DVec2,
+    pub(crate) bend: DMat2,
+}
+
+/// Returns U = Σ waves at a place with its derivatives by x, y, xx, xy and yy: real and imaginary parts.
+#[multiversion(targets("x86_64+avx2", "x86_64+avx"))]
+fn derivatives(waves: &PlaneWaves, at_mm: DVec2) -> [(f64, f64); 6] {
+    let mut sums = [(0.0, 0.0); 6];
+    let (x_turns, y_turns) = (&waves.turns_x_per_mm, &waves.turns_y_per_mm);
+    for ((re, im), (x, y)) in waves.re.iter().zip(&waves.im).zip(x_turns.iter().zip(y_turns)) {
+        let (c, s) = cis(x * at_mm.x + y * at_mm.y);
+        let (re, im) = (re * c - im * s, re * s + im * c);
+        let (kx, ky) = (TAU * x, TAU * y);
+        // A derivative is a factor i k.
+        for (sum, (re, im)) in sums.iter_mut().zip([
+            (re, im),
+            (-im * kx, re * kx),
+            (-im * ky, re * ky),
+            (-re * kx * kx, -im * kx * kx),
+            (-re * kx * ky, -im * kx * ky),
+            (-re * ky * ky, -im * ky * ky),
+        ]) {
+            *sum = (sum.0 + re, sum.1 + im);
+        }
+    }
+    sums
 }
 
 /// Places along x in a tile.

@@ -24,6 +24,11 @@ const SURFACE_KEYS: &str =
 /// Reads a lens from the JSON value of an omni file; `name` serves where the file states none.
 pub(super) fn lens_from_omni(value: &Value, name: &str, glasses: &Glasses) -> Result<LensFile, TextError> {
     let file = Object::new(value, "")?;
+    if file.get("polynomials").is_some() && file.get("surfaces").is_none() {
+        let reason = "it is a ray-transfer function, polynomials in place of surfaces: expected a lens of surfaces; what another program makes \
+                      of it can be used with psfs (run --psfs)";
+        return Err(TextError { line: None, reason: reason.to_owned() });
+    }
     let Rows { interfaces, stops, moves } = rows_of(&file, glasses)?;
     let &[stop] = stops.as_slice() else {
         let error = OpticsError::Stops { n_stops: stops.len() };
@@ -303,6 +308,8 @@ mod tests {
         assert!(ior("\"TIF6\"").err().unwrap().reason.starts_with("surfaces[0].ior: no glass is named 'TIF6'"));
         assert!(ior("[[500, 600], [1.6]]").err().unwrap().reason.contains("expected an index or a table"));
         assert!(ior("[[600, 500], [1.6, 1.5]]").err().unwrap().reason.contains("ascending"));
+        let polynomials = message(r#"{"name": "fit", "polynomials": []}"#);
+        assert!(polynomials.contains("ray-transfer") && polynomials.contains("--psfs"), "{polynomials}");
         assert!(ior("-1").err().unwrap().reason.contains("surfaces[0].ior is -1, expected an index above 0"));
     }
 

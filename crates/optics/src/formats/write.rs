@@ -4,7 +4,7 @@ use std::{fmt::Write as _, path::Path};
 
 use serde_json::{Value, json};
 
-use crate::{Glass, Lens, OpticsError, Placement, Shape, Surface, glass::D_LINE_NM};
+use crate::{Glass, Interface, Lens, OpticsError, Placement, Shape, Surface, glass::D_LINE_NM};
 
 use super::{
     lens_file::{Field, LensFile, Microlens},
@@ -61,7 +61,7 @@ impl LensFile {
     /// is curved.
     pub fn to_dat(&self) -> Result<String, OpticsError> {
         const FORMAT: &str = "a .dat file";
-        let wavelength_nm = self.reference_wavelength_nm.unwrap_or(D_LINE_NM);
+        let wavelength_nm = self.dat_nm();
         let lens = &self.lens;
         if let Some(surface) = first_moved(lens) {
             return Err(cannot(FORMAT, surface, "is tilted or decentered"));
@@ -101,13 +101,7 @@ impl LensFile {
     /// When the object is not in air, a surface is an odd asphere, a toroid or an ideal lens, the film is tilted or decentered, or a glass is not
     /// known at one of the wavelengths.
     pub fn to_omni_json(&self) -> Result<String, OpticsError> {
-        let mut wavelengths_nm = self.wavelengths_nm.clone();
-        if wavelengths_nm.is_empty() {
-            wavelengths_nm = (0..=30).map(|step| 400.0 + 10.0 * f64::from(step)).collect();
-        }
-        wavelengths_nm.sort_by(f64::total_cmp);
-        wavelengths_nm.dedup();
-        let lens = &self.lens;
+        let (lens, wavelengths_nm) = (&self.lens, self.omni_nm());
         if lens.film_motion() != Placement::centered(0.0) {
             return Err(cannot(OMNI, lens.interfaces().len(), "(the film) is tilted or decentered"));
         }
@@ -129,6 +123,22 @@ impl LensFile {
 }
 
 impl LensFile {
+    /// The wavelength of the indices of a `.dat` file, nm.
+    fn dat_nm(&self) -> f64 {
+        self.reference_wavelength_nm.unwrap_or(D_LINE_NM)
+    }
+
+    /// The wavelengths of the indices of a `.json` file of ISET, nm.
+    fn omni_nm(&self) -> Vec<f64> {
+        let mut wavelengths_nm = self.wavelengths_nm.clone();
+        if wavelengths_nm.is_empty() {
+            wavelengths_nm = (0..=30).map(|step| 400.0 + 10.0 * f64::from(step)).collect();
+        }
+        wavelengths_nm.sort_by(f64::total_cmp);
+        wavelengths_nm.dedup();
+        wavelengths_nm
+    }
+
     /// Where the film of a file stands that must state one, mm behind the last vertex: the lens's own place of it, or else where
     /// first-order optics focuses the file's object; 0 where there is no such place.
     pub(super) fn film_or_focus_mm(&self) -> f64 {
@@ -191,6 +201,7 @@ impl LensFile {
         let stated = [
             ("its array of microlenses", self.microlens.is_some() && extension != "json"),
             ("the place of the film", self.film_distance_mm.is_some() && !holds_use),
+            ("the curvature of the film", self.lens.image_surface().curvature_per_mm != 0.0 && !holds_use),
             ("the distance of the object", self.object_distance_mm.is_some() && !holds_use),
             ("wavelengths", !self.wavelengths_nm.is_empty() && !holds_use),
             ("fields", !self.fields.is_empty() && !holds_use),
@@ -205,6 +216,22 @@ impl LensFile {
         let mut notes = Vec::new();
         if !left_out.is_empty() {
             notes.push(format!("a .{extension} file has no place for {}: left out", left_out.join(", ")));
+        }
+        let has_dispersion = |side: &Interface| !matches!(side.medium_after, Glass::Air | Glass::Constant { .. });
+        if self.lens.interfaces().iter().any(has_dispersion) {
+            notes.extend(match extension {
+                "dat" => Some(format!("a .dat file has the indices of glasses at {} nm alone", self.dat_nm())),
+                "json" => {
+                    let nm = self.omni_nm();
+                    let n = nm.len();
+                    Some(format!(
+                        "a .json file has the indices of glasses at {n} wavelengths from {} to {} nm: between them they are interpolated",
+                        nm[0],
+                        nm[n - 1]
+                    ))
+                }
+                _ => None,
+            });
         }
         let n_configurations = self.configurations.len();
         if n_configurations > 1 && !holds_use {

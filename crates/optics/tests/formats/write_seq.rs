@@ -227,7 +227,8 @@ fn film_that_is_not_stated_is_at_the_paraxial_focus() {
     assert!(file.left_out("seq")[0].contains("the file has the paraxial focus"), "{:?}", file.left_out("seq"));
     assert_eq!(design().left_out("seq"), Vec::<String>::new());
     let left_out = design().left_out("dat");
-    assert_eq!(left_out.len(), 1);
+    assert_eq!(left_out.len(), 2);
+    assert!(left_out[1].contains("indices of glasses at"), "{left_out:?}");
     assert!(left_out[0].ends_with(
         "has no place for the place of the film, the distance of the object, wavelengths, fields, names of surfaces, \
          comments: left out"

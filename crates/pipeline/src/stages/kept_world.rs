@@ -90,8 +90,7 @@ impl Chain<'_> {
         let film = &inputs.plan.bank.film;
         if film.lens.psfs.is_some() {
             let reason =
-                "are no lens that rays from the film could go through, expected none for a world with method: Backward"
-                    .to_owned();
+                "rays from the film cannot go through them, expected none for a world with method: Backward".to_owned();
             return Err(PipelineError::Unsuitable { what: "psfs", reason });
         }
         let world = self.world(&inputs.scene.geometry)?;

@@ -52,6 +52,7 @@ impl LensPage<'_> {
             "Edges of the light of each field, in the frame of the surface; dashed: rims, openings and obscurations.";
         body += &section("Footprints", &(self.plots.footprints_svg(&self.shown.footprints) + &note(beams)));
         body += &section("Spot diagrams", &self.plots.spots_svg());
+        body += &section("Spots through focus", &self.plots.focus_spots_svg(&self.shown.focus_spots));
         body += &section("Optical path differences", &self.plots.opd_svg());
         body += &section("Distortion", &self.plots.grid_svg());
         if let Some(map) = glass_map_svg(&self.shown.lens) {

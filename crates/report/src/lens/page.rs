@@ -3,7 +3,9 @@
 use dioptric_optics::wavelength_color;
 
 use crate::{panel::Mark, panel::MarkKind, panel::Panel, panel::Sheet};
-use dioptric_analysis::{AfocalView, FanRow, FieldPlace, FieldRow, Footprint, LensAnalysis, SpotRow, line_color};
+use dioptric_analysis::{
+    AfocalView, FanRow, FieldPlace, FieldRow, FocusSpot, Footprint, LensAnalysis, SpotRow, line_color,
+};
 
 /// Margin of a page, and the room for its words above, px.
 pub(super) const MARGIN_PX: f64 = 24.0;
@@ -60,6 +62,34 @@ impl AnalysisPlots<'_> {
         let rows = self.0.spots.len().div_ceil(n_wavelengths) as f64;
         let width = (2.0 * MARGIN_PX + SIDE_PX[0] * n_wavelengths as f64).max(760.0);
         sheet.to_svg(width, HEAD_PX + SIDE_PX[1] * rows + MARGIN_PX)
+    }
+
+    /// Returns the spots as the film goes through focus as SVG, a row a field, all wavelengths together and all to one scale.
+    pub fn focus_spots_svg(&self, rows: &[Vec<FocusSpot>]) -> String {
+        const SIDE_PX: [f64; 2] = [250.0, 248.0];
+        let mut sheet = Sheet::default();
+        self.head(&mut sheet, "spots through focus");
+        let points = rows.iter().flatten().flat_map(|spot| &spot.points_um).flat_map(|(_, points)| points);
+        let range_um = half_range(points.flat_map(|p| [p.0, p.1]));
+        for (i, row) in rows.iter().enumerate() {
+            for (j, spot) in row.iter().enumerate() {
+                let rms = spot.rms_um.map_or("dark".to_owned(), |rms_um| format!("rms {rms_um:.1} µm"));
+                let panel = Panel {
+                    title: format!("{}, film {:+.3} mm, {rms}", spot.place.label(), spot.shift_mm),
+                    x_label: "x, µm".to_owned(),
+                    y_label: "y, µm".to_owned(),
+                    x_range: (-range_um, range_um),
+                    y_range: (-range_um, range_um),
+                    is_to_scale: true,
+                    marks: dots(spot.points_um.iter().map(|(nm, points)| (*nm, points))),
+                };
+                let (x, y) = (MARGIN_PX + SIDE_PX[0] * j as f64, HEAD_PX + SIDE_PX[1] * i as f64);
+                sheet.panel(&self.in_units(panel), [x, y, SIDE_PX[0], SIDE_PX[1]]);
+            }
+        }
+        let n_columns = rows.iter().map(Vec::len).max().unwrap_or(0);
+        let width = (2.0 * MARGIN_PX + SIDE_PX[0] * n_columns as f64).max(760.0);
+        sheet.to_svg(width, HEAD_PX + SIDE_PX[1] * rows.len() as f64 + MARGIN_PX)
     }
 
     /// Returns the footprints of the fields on the surfaces as SVG, with the rims: a plot a surface, each to its own scale.
@@ -173,11 +203,7 @@ impl AnalysisPlots<'_> {
             kind: MarkKind::Line,
             points: circle.map(|t| (airy_um * t.cos(), airy_um * t.sin())).collect(),
         }];
-        marks.extend(spots.iter().map(|spot| Mark {
-            color: wavelength_color(spot.wavelength_nm),
-            kind: MarkKind::Dots,
-            points: spot.points_um.clone(),
-        }));
+        marks.extend(dots(spots.iter().map(|spot| (spot.wavelength_nm, &spot.points_um))));
         let reference = spots.iter().find(|spot| spot.wavelength_nm == self.0.reference_nm).or(spots.first());
         Panel {
             title: reference.map_or(String::new(), |spot| format!("{}{}", spot.place.label(), rms_words(spot))),
@@ -294,6 +320,13 @@ impl AnalysisPlots<'_> {
 /// Writes a length with as many decimals as a short one needs.
 fn short(mm: f64) -> String {
     if mm >= 100.0 { format!("{mm:.0}") } else { format!("{mm:.3}") }
+}
+
+/// The points of spots in the colors of their wavelengths, nm.
+fn dots<'a>(spots: impl Iterator<Item = (f64, &'a Vec<(f64, f64)>)>) -> Vec<Mark> {
+    spots
+        .map(|(nm, points)| Mark { color: wavelength_color(nm), kind: MarkKind::Dots, points: points.clone() })
+        .collect()
 }
 
 fn rms_words(spot: &SpotRow) -> String {

@@ -74,6 +74,13 @@ fn fields_are_chosen_where_none_are_given() {
             && analysis.fields[3].distortion_tangent_percent.is_none_or(|percent| percent < -80.0)
     );
     assert!(analysis.fans[11].tangential_um[FAN_PLACES / 2].is_some(), "the chief ray is found");
+    // The calibrated scale leaves no distortion on the mean, and the last field as far below as the axis is above.
+    let calibrated = |row: &FieldRow| row.distortion_calibrated_percent.unwrap();
+    let sum: f64 = analysis.curves.iter().map(|row| row.place.field_deg.powi(2) * calibrated(row)).sum();
+    let (first, last) = (calibrated(&analysis.fields[0]), calibrated(&analysis.fields[3]));
+    assert!(sum.abs() < 1e-6 && first > 0.0 && last < 0.0, "{sum} {first} {last}");
+    let scale = analysis.calibrated_scale.unwrap();
+    assert!((first - 100.0 * (1.0 / scale - 1.0)).abs() < 1e-9);
 }
 
 #[test]
