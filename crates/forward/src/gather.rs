@@ -378,7 +378,7 @@ fn convolve(
 /// Whether sums take less time than transforms of rectangles of this size for so many sources.
 fn is_better_direct(kernels: &TileKernels, n_out: usize, n_sources: usize, (rows, columns): (usize, usize)) -> bool {
     // Products in a sum that take as long, measured on one core, as a value of a transform, beside what is in proportion to its logarithm.
-    const OF_VALUE: [f64; 2] = [64.0, 11.0];
+    const OF_VALUE: [f64; 2] = [28.0, 5.0];
     let n = (rows * columns) as f64;
     let transform = n * (OF_VALUE[0] + OF_VALUE[1] * n.log2());
     let n_terms = kernels.terms.len() as f64;

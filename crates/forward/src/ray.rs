@@ -131,12 +131,10 @@ impl Paths {
             }
         } else {
             // Where no surface lies in the next layer, one can only lie in the last.
-            for ray in 0..RAYS {
-                crosses[ray] = lies_between(self.surfaces[ray]);
-            }
+            crosses = self.surfaces.map(lies_between);
         }
-        for ray in 0..RAYS {
-            self.ends[ray] = if crosses[ray] { self.ends[ray].min(end) } else { self.ends[ray] };
+        for (ends, crosses) in self.ends.iter_mut().zip(crosses) {
+            *ends = if crosses { (*ends).min(end) } else { *ends };
         }
         (self.last, self.surfaces) = (layer, *surfaces);
     }

@@ -124,12 +124,13 @@ impl FilmPointJob<'_> {
             let (ray, is_mirrored) = (traced.partition_point(|&node_of| node_of < own(node)), own(node) != node);
             // A ray that fails at the very edge of the pupil takes the place of its neighbor inside.
             let inside = node.checked_sub(mesh.n_azimuths).filter(|inside| *inside > 0).unwrap_or(0);
-            if rays.fate[ray].is_in_flight() || node == 0 {
-                seen.push(if is_mirrored { traced_rays[ray].mirrored(1.0) } else { traced_rays[ray] });
-                shares.push(light.share(ray));
-            } else {
-                (seen.push(seen[inside]), shares.push(shares[inside]));
-            }
+            let (seen_here, share) = match (rays.fate[ray].is_in_flight() || node == 0, is_mirrored) {
+                (false, _) => (seen[inside], shares[inside]),
+                (true, false) => (traced_rays[ray], light.share(ray)),
+                (true, true) => (traced_rays[ray].mirrored(1.0), light.share(ray)),
+            };
+            seen.push(seen_here);
+            shares.push(share);
             if let Some(stop) = stopped.get(ray) {
                 let is_known = stop.by_l.across.is_finite() || node == 0;
                 at_stop.push(match (is_known, is_mirrored) {

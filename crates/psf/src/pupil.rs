@@ -57,12 +57,16 @@ impl Outline {
 
     /// Returns the places of a mesh's nodes over the region.
     pub(crate) fn nodes(&self, mesh: Mesh) -> Vec<DVec2> {
-        let node = |(i, (share, azimuth)): (usize, (f64, f64))| {
-            let j = 2 * (i.saturating_sub(1) % mesh.n_azimuths);
-            let azimuth = self.azimuths.as_ref().map_or(azimuth, |azimuths| azimuths[j]);
-            polar(self.center, share * self.rho[j], azimuth)
+        let edge = |j: usize| {
+            let azimuth = self.azimuths.as_ref().map_or(mesh.azimuth(j as f64), |azimuths| azimuths[2 * j]);
+            (DVec2::from_angle(azimuth), self.rho[2 * j])
         };
-        mesh.nodes().enumerate().map(node).collect()
+        let edge: Vec<(DVec2, f64)> = (0..mesh.n_azimuths).map(edge).collect();
+        let ring = |ring: usize| {
+            let share = mesh.share(ring as f64);
+            edge.iter().map(move |(direction, rho)| self.center + *direction * (share * rho))
+        };
+        std::iter::once(self.center).chain((1..=mesh.n_rings).flat_map(ring)).collect()
     }
 
     /// The azimuth of every other place of the edge and that of the one after it, of which the last is the first once around.
