@@ -303,8 +303,8 @@ pub(crate) struct LensAnalyzeArgs {
     pub(crate) lens: LensArgs,
     #[command(flatten)]
     pub(crate) asked: AnalysisArgs,
-    /// Folder for analysis.json, analysis.html and the plots (analysis, spots, focus_spots, opd, distortion, footprints)
-    /// as SVG; as PNG too in a build with the feature png
+    /// Folder for analysis.json, analysis.html and the plots (analysis, spots, also through focus, opd, distortion,
+    /// footprints) as SVG; as PNG too in a build with the feature png
     #[arg(long, short, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
 }

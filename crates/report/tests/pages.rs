@@ -40,7 +40,7 @@ fn analysis_page_names_its_curves() {
         "First order",
         "Modulation over field",
         "Through focus",
-        "film +0.000 mm",
+        "+0.000 mm",
         "Glasses",
         "Airy",
         "550.0 nm",

@@ -230,8 +230,8 @@ fn film_that_is_not_stated_is_at_the_paraxial_focus() {
     assert_eq!(left_out.len(), 2);
     assert!(left_out[1].contains("indices of glasses at"), "{left_out:?}");
     assert!(left_out[0].ends_with(
-        "has no place for the place of the film, the distance of the object, wavelengths, fields, names of surfaces, \
-         comments: left out"
+        "has no place for the place of the film, the curvature of the film, the distance of the object, wavelengths, fields, \
+         names of surfaces, comments: left out"
     ));
 }
 

@@ -68,14 +68,14 @@ impl AnalysisPlots<'_> {
     pub fn focus_spots_svg(&self, rows: &[Vec<FocusSpot>]) -> String {
         const SIDE_PX: [f64; 2] = [250.0, 248.0];
         let mut sheet = Sheet::default();
-        self.head(&mut sheet, "spots through focus");
+        self.head(&mut sheet, "spots through focus, the film moved from the lens");
         let points = rows.iter().flatten().flat_map(|spot| &spot.points_um).flat_map(|(_, points)| points);
         let range_um = half_range(points.flat_map(|p| [p.0, p.1]));
         for (i, row) in rows.iter().enumerate() {
             for (j, spot) in row.iter().enumerate() {
                 let rms = spot.rms_um.map_or("dark".to_owned(), |rms_um| format!("rms {rms_um:.1} µm"));
                 let panel = Panel {
-                    title: format!("{}, film {:+.3} mm, {rms}", spot.place.label(), spot.shift_mm),
+                    title: format!("{}, {:+.3} mm, {rms}", spot.place.label(), spot.shift_mm),
                     x_label: "x, µm".to_owned(),
                     y_label: "y, µm".to_owned(),
                     x_range: (-range_um, range_um),

@@ -74,7 +74,7 @@ fn fields_are_chosen_where_none_are_given() {
             && analysis.fields[3].distortion_tangent_percent.is_none_or(|percent| percent < -80.0)
     );
     assert!(analysis.fans[11].tangential_um[FAN_PLACES / 2].is_some(), "the chief ray is found");
-    // The calibrated scale leaves no distortion on the mean, and the last field as far below as the axis is above.
+    // The calibrated scale leaves no distortion on the mean: heights about the axis lie above it, the last one below.
     let calibrated = |row: &FieldRow| row.distortion_calibrated_percent.unwrap();
     let sum: f64 = analysis.curves.iter().map(|row| row.place.field_deg.powi(2) * calibrated(row)).sum();
     let (first, last) = (calibrated(&analysis.fields[0]), calibrated(&analysis.fields[3]));
