@@ -1,8 +1,8 @@
 //! What of its kernel a point that shines keeps past the edges of nearer surfaces.
 
 use crate::{
-    ray::{Lanes, RAYS, Rays},
-    sight::{Before, Met, Sight, widest_px},
+    ray::Rays,
+    sight::{Before, Lanes, Met, RAYS, Sight, widest_px},
 };
 
 /// A point, as the surfaces before it hide it.

@@ -1,12 +1,6 @@
 //! Rays from the film through the pupil, layer by layer, and where they end.
 
-use crate::sight::{Met, Surfaces};
-
-/// Rays that are followed at once.
-pub(crate) const RAYS: usize = 16;
-
-/// A number of each of some rays.
-pub(crate) type Lanes = [f32; RAYS];
+use crate::sight::{Lanes, Met, RAYS, Surfaces};
 
 /// Rays from film points on their way from the nearest layer to the farthest.
 pub(crate) struct Rays<'a> {

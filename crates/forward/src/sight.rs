@@ -12,7 +12,6 @@ use crate::{
     layers::DEPTH_EDGE_PX,
     places::{SceneRaster, folded},
     raster::{BLOCK, Level, Raster},
-    ray::{Lanes, RAYS},
     rectangle::Rectangle,
     scene_layers::SceneLayers,
     surface::LayerCoordinates,
@@ -54,6 +53,12 @@ pub(crate) struct NearEdges {
     pub(crate) least_px: f32,
     pub(crate) most_px: f32,
 }
+
+/// Rays that are followed at once.
+pub(crate) const RAYS: usize = 16;
+
+/// A number of each of some rays.
+pub(crate) type Lanes = [f32; RAYS];
 
 /// A layer that rays meet, and its blur radius at a place, pixels.
 #[derive(Clone, Copy, Debug)]

@@ -10,9 +10,9 @@ use crate::{
     layers::{DEPTH_EDGE_PX, IN_FOCUS_PX, tent},
     node_kernels::{LayerKernels, NodeKernel},
     raster::BLOCK,
-    ray::{Lanes, RAYS, Rays},
+    ray::Rays,
     rectangle::Rectangle,
-    sight::{Met, NearEdges, Sight, widest_px},
+    sight::{Lanes, Met, NearEdges, RAYS, Sight, widest_px},
     tile::film_pixels,
     tiling::LayerTiles,
 };

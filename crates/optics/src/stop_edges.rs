@@ -108,9 +108,9 @@ fn pieces_of(places: &[DVec2], step_mm: f64, is_clear: &dyn Fn(DVec2) -> bool) -
         if (STRAIGHT_RAD..CORNER_RAD).contains(&turn.abs()) { turn } else { 0.0 }
     };
     let mut pieces: Vec<EdgePiece> = Vec::new();
-    for i in 0..n {
+    for (i, &place) in places.iter().enumerate() {
         let n_steps = (side(i).length() / step_mm).ceil().max(1.0);
-        let at = |k: usize| places[i] + side(i) * ((k as f64 + 0.5) / n_steps);
+        let at = |k: usize| place + side(i) * ((k as f64 + 0.5) / n_steps);
         let n_clear = (0..n_steps as usize).filter(|k| is_clear(at(*k))).count();
         if n_clear == 0 {
             continue;
