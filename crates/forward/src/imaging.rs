@@ -151,8 +151,14 @@ impl Imaging {
 
     /// The points that lie behind the first surface, and those where no film point looks.
     pub(crate) fn points_unseen(&self) -> (usize, usize) {
+        let film = &self.spec.film;
+        // As far beside the film as blurs reach.
+        let half_mm = 0.5e-3 * film.pitch_um * DVec2::new(film.columns as f64, film.rows as f64);
+        let most_mm = half_mm + (self.reach_mm - film.half_diagonal_mm());
+        let place_mm = |point: &Option<Beside>| self.middle_map.place_mm(point.as_ref()?.seen_at().0);
+        let is_beyond = |point: &Option<Beside>| place_mm(point).is_none_or(|mm| mm.abs().cmpgt(most_mm).any());
         let behind = self.points.iter().flatten().filter(|point| point.is_behind()).count();
-        (behind, self.points.iter().filter(|point| point.is_none()).count())
+        (behind, self.points.iter().filter(|point| is_beyond(point)).count())
     }
 
     /// The part of the film from which rays pass behind all surfaces that are known.

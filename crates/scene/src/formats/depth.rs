@@ -256,6 +256,12 @@ mod tests {
             assert!(z_m[(1, 0)] == f32::INFINITY && z_m[(1, 1)].is_nan() && z_m[(1, 2)] == 0.0, "{name}: {z_m}");
         }
         assert!(read_depth(&at("a.pfm"), DepthWords::default()).is_err_and(|e| e.to_string().contains("disparity")));
+        for name in ["left_inverse_depth.npy", "disp.npy"] {
+            fs::copy(at("a.npy"), at(name)).unwrap();
+            assert!(
+                read_depth(&at(name), DepthWords::default()).is_err_and(|e| e.to_string().contains("--depth-kind"))
+            );
+        }
         let gray = image::GrayImage::from_pixel(4, 2, Luma([51]));
         save(&gray.into(), &at("b.png")).unwrap();
         assert!(read_depth(&at("b.png"), DepthWords::default()).is_err_and(|e| e.to_string().contains("8 bits")));

@@ -66,7 +66,7 @@ pub(super) fn depth_numbers(path: &Path, told: Option<&str>) -> Result<Noted<Dep
         }
         "npy" => {
             let (values, top) = plane_of(path, read_npy(path)?.told_in(&mut notes))?;
-            of(values, top)
+            DepthNumbers { lacks: lacks_length(&name_of(path)), ..of(values, top) }
         }
         "npz" => {
             let (name, array) = read_npz_plane(path, told)?.told_in(&mut notes);
@@ -130,8 +130,10 @@ fn kind_of_array(name: &str, words: &str) -> DepthKind {
 /// Returns what is asked for where words speak of what is no length.
 fn lacks_length(words: &str) -> Option<&'static str> {
     let lower = words.to_lowercase();
-    (lower.contains("disparit") || lower.contains("inverse")).then_some(
-        "its words say that it holds disparities or inverse distances: expected --depth-kind, as disparity:BASELINE_M or inverse",
+    let is_disparity =
+        lower.contains("disparit") || lower.split(|c: char| !c.is_alphanumeric()).any(|word| word == "disp");
+    (is_disparity || lower.contains("inverse")).then_some(
+        "its name or words say that it holds disparities or inverse distances: expected --depth-kind, as disparity:BASELINE_M or inverse",
     )
 }
 

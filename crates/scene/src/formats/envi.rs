@@ -322,6 +322,9 @@ impl EnviFile {
             let unit = told_unit.or(own_unit).or_else(gain_unit).or_else(by_quantity).unwrap_or(LightUnit::RADIANCE);
             let words = match (reading.unit.as_deref(), header.data_units.as_deref().filter(|_| own_unit.is_some())) {
                 (Some(told), _) => told.to_owned(),
+                (None, Some(own)) if LightUnit::lacks_wavelength(own) => {
+                    format!("{}, a nanometre understood", short(own))
+                }
                 (None, Some(own)) => short(own),
                 (None, None) if reading.quantity == Some(FileQuantity::Photons) => "photons/s/m^2/sr/nm".to_owned(),
                 (None, None) if is_of_gains => "W/m^2/sr/um by its gains".to_owned(),

@@ -48,7 +48,11 @@ fn parse(bytes: &[u8]) -> Result<(Vec<Array2<f32>>, Vec<String>), String> {
         return Err(format!("it has {columns} × {rows} samples of scale {scale}"));
     }
     let (columns, rows) = (columns as usize, rows as usize);
-    let data = &bytes[at..];
+    let mut data = &bytes[at..];
+    // Programs that write lines as Windows does end it with two.
+    if bytes[at - 1] == b'\r' && data.first() == Some(&b'\n') {
+        data = &data[1..];
+    }
     if data.len() / 4 / n_channels / columns < rows {
         return Err("the file ends too early (truncated)".to_owned());
     }
@@ -84,6 +88,7 @@ mod tests {
         };
         assert_eq!(plain(&of("Pf\n3 2\n-1.0\n", &little)), std::slice::from_ref(&gray));
         assert_eq!(plain(&of("Pf\n3 2\n1\n", &big)), std::slice::from_ref(&gray));
+        assert_eq!(plain(&of("Pf\r\n3 2\r\n-1\r\n", &little)), std::slice::from_ref(&gray));
         assert_eq!(plain(&of("PF\n1 2\n-1\n", &little))[1], ndarray::arr2(&[[4.0], [1.0]]));
         // The size of the scale is named: disparities of Middlebury have 1/255 there, and are what they are.
         let (planes, unused) = parse(&[of("Pf 3 2 -0.003922\n", &little), vec![0; 3]].concat()).unwrap();

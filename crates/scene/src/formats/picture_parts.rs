@@ -170,11 +170,15 @@ pub(super) fn comment(text: &[u8]) -> Option<String> {
 fn of_xmp(content: &[u8]) -> Vec<String> {
     let has = |word: &[u8]| content.windows(word.len()).any(|own| own == word);
     let mut names = vec![];
-    if has(b"GDepth:") || has(b"GCamera:Depth") || has(b"Device:Camera") {
+    // Containers of pictures and what belongs to them say what each is for.
+    let contains = |what: &[u8]| has(b"Item:Semantic") && has(what);
+    if has(b"GDepth:") || has(b"GCamera:Depth") || has(b"Device:Camera") || contains(b"Depth") {
         names.push("depth (XMP)".to_owned());
     }
     if has(b"hdrgm:") {
         names.push("gain map (hdrgm)".to_owned());
+    } else if has(b"HDRGainMap") || contains(b"GainMap") {
+        names.push("gain map (XMP)".to_owned());
     }
     if has(b"GPano:") {
         names.push("panorama (XMP)".to_owned());
@@ -182,6 +186,9 @@ fn of_xmp(content: &[u8]) -> Vec<String> {
     // What cameras of bands state of them, of their light and of their lens.
     const CALIBRATION: [&str; 5] = ["Camera:", "DLS:", "MicaSense:", "Sentera:", "FLIR:"];
     let text = String::from_utf8_lossy(content);
+    // Programs turn a picture by Exif; 1 is upright.
+    let turned = text.split_once("tiff:Orientation").and_then(|(_, rest)| rest.chars().find(char::is_ascii_digit));
+    names.extend(turned.filter(|turned| *turned != '1').map(|turned| format!("orientation {turned} (XMP)")));
     let words = text.split(|c: char| c.is_whitespace() || "<>=/".contains(c));
     let is_stated = |word: &&str| CALIBRATION.iter().any(|start| word.starts_with(start) && word.len() > start.len());
     names.extend(words.filter(is_stated).map(|word| format!("{} (XMP)", short(word))));
@@ -451,6 +458,7 @@ mod tests {
             segment(0xe0, b"JFIF\0\x01\x02\x01\0\x48\0\x90\0\0"),
             segment(0xfe, b"focal 50, made by hand"),
             segment(0xe1, b"http://ns.adobe.com/xap/1.0/\0 <x GDepth:Near='1'>"),
+            segment(0xe1, b"http://ns.adobe.com/xap/1.0/\0 <x Item:Semantic='GainMap' tiff:Orientation='6'>"),
             segment(0xe2, b"MPF\0 more"),
             segment(0xda, b""),
             vec![1, 2, 0xff, 0xd9],
@@ -461,7 +469,9 @@ mod tests {
                 "JFIF (pixels that are not square)",
                 "comment 'focal 50, made by hand'",
                 "depth (XMP)",
-                "further pictures (MPF)"
+                "further pictures (MPF)",
+                "gain map (XMP)",
+                "orientation 6 (XMP)"
             ]
         );
         let webp = |kind: &[u8], content: &[u8]| {

@@ -64,6 +64,8 @@ const UNREAD: [(u16, &str); 7] = [
     (9, "colors of CIE L*a*b* (ICC)"),
     (10, "colors of CIE L*a*b* (ITU)"),
 ];
+/// What is not read of samples whose bits are in reverse order.
+const REVERSED: &str = "samples whose bits stand in reverse order (FillOrder 2)";
 /// The tag of the version of DNG that a file is written by.
 const DNG_VERSION: u16 = 50_706;
 
@@ -118,6 +120,7 @@ impl Page {
         let has_tiles = decoder.find_tag_unsigned::<u32>(Tag::TileWidth)?.is_some();
         let orientation = decoder.find_tag_unsigned::<u16>(Tag::Orientation)?.unwrap_or(1);
         let extra = decoder.find_tag_unsigned_vec::<u16>(Tag::ExtraSamples)?.unwrap_or_default();
+        let is_reversed = decoder.find_tag_unsigned::<u16>(Tag::FillOrder)? == Some(2);
         let mut text = |tag| decoder.get_tag_ascii_string(tag).ok().filter(|text| !text.trim().is_empty());
         let (name, descriptions) = (text(PAGE_NAME), text(Tag::ImageDescription).into_iter().collect());
         let no_data = text(Tag::GdalNodata).and_then(|text| text.trim().parse().ok());
@@ -151,6 +154,7 @@ impl Page {
             },
             bits,
             marked: match photometric {
+                _ if is_reversed => Marked::Unread(REVERSED),
                 0 | 1 => Marked::Gray { is_white_zero: photometric == 0 },
                 2 => Marked::Rgb,
                 other => {
