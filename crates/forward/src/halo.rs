@@ -3,18 +3,20 @@
 //! A window holds all but a hundredth of the light of a point; the rest falls with the third power of the distance (`docs/forward.md`, 2). It is taken
 //! from the finished picture of a band and spread on pixels 2, 4, 8 … times as wide, the farther the wider.
 
-use std::{collections::BTreeMap, f64::consts::PI, ops::Range};
+use std::{collections::BTreeMap, ops::Range};
 
-use dioptric_psf::{FilmQuery, Kernel, LensImage};
-use glam::DVec2;
+use dioptric_psf::{Kernel, LensImage};
 use multiversion::multiversion;
-use ndarray::Array2;
+use ndarray::{Array2, Zip};
 use rayon::prelude::*;
 
 use crate::{
     Film,
+    beyond::{Beyond, POINTS},
     layers::Layers,
     points::Point,
+    splines::{doubled, doubled_row, halved, halved_line},
+    stars::{self, Directions, Star},
     surroundings::{Surroundings, beside},
 };
 
@@ -22,112 +24,16 @@ use crate::{
 const PASSES_OVER: [f64; 2] = [3.0, 4.5];
 /// Distance at which the halo begins on the first raster, in its pixels, or more; where that is less than on the film's own, that is the first.
 const FIRST: f64 = 1.25;
-/// Points along each side of a pixel at which the halo is looked up.
-pub(crate) const POINTS: usize = 8;
 /// Pixels beside the middle that the halo of one raster reaches.
 const REACH: usize = 5;
-
-/// What lies beyond the windows of kernels in a band.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Beyond {
-    /// Share of the light.
-    pub(crate) share: f64,
-    /// The radii between which the samples of the window fade out, pixels.
-    fade_px: [f64; 2],
-    /// The part of the share that falls faster than what edges bend.
-    steep: f64,
-    /// λN, pixels.
-    pub(crate) lambda_n_px: f64,
-}
-
-impl Beyond {
-    /// Of the sharpest layer, on the axis. Where windows are wider, off the axis or out of focus, halos are the same from some distance on.
-    fn of(lens: &dyn LensImage, layers: &Layers, (wavelength_nm, pitch_um): (f64, f64), widest_px: f64) -> Self {
-        let radius_px = |layer: &usize| layers.radius_px_at(*layer as f32);
-        let sharpest = (0..layers.len()).min_by(|a, b| radius_px(a).total_cmp(&radius_px(b))).unwrap_or(0);
-        let factor = (radius_px(&sharpest) / widest_px).log2().ceil().max(0.0).exp2();
-        let dioptres = layers.dioptres()[sharpest];
-        let query = FilmQuery { place_mm: DVec2::ZERO, dioptres, wavelength_nm, pitch_um: factor * pitch_um };
-        let kernel = lens.kernel(query);
-        if kernel.lambda_n_px == 0.0 {
-            // It holds all that there is, whatever it is scaled by.
-            return Self { fade_px: [factor; 2], ..Self::default() };
-        }
-        let fade_px = kernel.fade_px().map(|px| px.max(LEAST_RADIUS));
-        let share = 1.0 - kernel.kept_share;
-        // An edge bends 2 / π² λN over its radius beyond a circle.
-        let bent = 2.0 / (PI * PI) * kernel.lambda_n_px * Fade(fade_px).inverse();
-        Self {
-            share,
-            fade_px: fade_px.map(|px| factor * px),
-            steep: (1.0 - bent / share).clamp(0.0, 1.0),
-            lambda_n_px: factor * kernel.lambda_n_px,
-        }
-    }
-
-    /// Returns a share of the light that begins at a distance, pixels, all of it bent by edges.
-    #[cfg(test)]
-    pub(crate) fn from_step(share: f64, start_px: f64, lambda_n_px: f64) -> Self {
-        Self { share, fade_px: [start_px; 2], steep: 0.0, lambda_n_px }
-    }
-
-    /// Returns what lies beyond between two bands: share times distance, which stands for the halo far out, and the window are linear there.
-    fn between(below: Self, above: Self, fraction: f64) -> Self {
-        let mix = |below: f64, above: f64| below + fraction * (above - below);
-        let fade_px = [0, 1].map(|end| mix(below.fade_px[end], above.fade_px[end]));
-        let far = |beyond: &Self| beyond.share / Fade(beyond.fade_px).inverse();
-        let share = mix(far(&below), far(&above)) * Fade(fade_px).inverse();
-        let (steep, lambda_n_px) = (mix(below.steep, above.steep), mix(below.lambda_n_px, above.lambda_n_px));
-        Self { share, fade_px, steep, lambda_n_px }
-    }
-
-    /// Returns the light of a point of light 1 that lies at a distance from it, for a pixel of the film, were the pupil round and nothing else seen.
-    pub(crate) fn density(&self) -> impl Fn(f64) -> f64 + use<> {
-        let (fade, steep) = (Fade(self.fade_px), self.steep);
-        let (bent, steep) = ((1.0 - steep) / (2.0 * PI * fade.inverse()), steep / (2.0 * PI * fade.inverse_cube()));
-        move |r: f64| {
-            let part = fade.at(r);
-            if part > 0.0 { part * (bent * r.powi(-3) + steep * r.powi(-5)) } else { 0.0 }
-        }
-    }
-}
-
-/// The least radius at which a window may begin to fade, pixels: the law of the tail has no middle.
-const LEAST_RADIUS: f64 = 0.5;
-
-/// A linear rise from 0 to 1 between two radii: what windows leave to the halo.
-#[derive(Clone, Copy)]
-struct Fade([f64; 2]);
-
-impl Fade {
-    fn at(self, radius: f64) -> f64 {
-        let Self([start, end]) = self;
-        if end > start { ((radius - start) / (end - start)).clamp(0.0, 1.0) } else { f64::from(radius >= end) }
-    }
-
-    /// The integral of the rise over r² by r: 1 / r of a step.
-    fn inverse(self) -> f64 {
-        let Self([start, end]) = self;
-        if end > start * 1.0001 { (end / start).ln() / (end - start) } else { 1.0 / end }
-    }
-
-    /// The integral of the rise over r⁴ by r: 1 / 3 r³ of a step.
-    fn inverse_cube(self) -> f64 {
-        let Self([start, end]) = self;
-        if end > start * 1.0001 {
-            let (square, cube) = (start.powi(-2) - end.powi(-2), start.powi(-3) - end.powi(-3));
-            (0.5 * square - start * cube / 3.0) / (end - start) + end.powi(-3) / 3.0
-        } else {
-            end.powi(-3) / 3.0
-        }
-    }
-}
 
 /// The halos of the bands of a plan.
 #[derive(Debug)]
 pub(crate) struct Halos {
     /// None where no light lies beyond the windows.
     of_bands: Vec<Option<Halo>>,
+    /// Where edges of a pupil that is not round bend light to.
+    directions: Option<Directions>,
 }
 
 impl Halos {
@@ -150,7 +56,8 @@ impl Halos {
             let (rows, columns) = (film.rows + 2 * beside(film), film.columns + 2 * beside(film));
             (beyond.share > Kernel::NEGLIGIBLE).then(|| Halo::new(beyond, (rows, columns)))
         };
-        Self { of_bands: (0..n_bands).into_par_iter().map(halo).collect() }
+        let of_bands = (0..n_bands).into_par_iter().map(halo).collect();
+        Self { of_bands, directions: lens.pupil_edges().as_ref().map(Directions::of) }
     }
 
     /// Whether light lies beyond the windows of any band.
@@ -158,9 +65,9 @@ impl Halos {
         self.of_bands.iter().any(Option::is_some)
     }
 
-    /// Returns what lies beyond the windows of a band, if any does.
-    pub(crate) fn beyond(&self, band: usize) -> Option<&Beyond> {
-        self.of_bands.get(band)?.as_ref().map(|halo| &halo.beyond)
+    /// The values in which stars about all that a picture shows are found, of so many pixels.
+    pub(crate) fn star_values(&self, n_pixels: usize) -> usize {
+        if self.directions.is_some() { stars::values(n_pixels) } else { 0 }
     }
 
     /// Returns the picture of a band with the halos of its points and of what lies around it, if any light lies beyond its windows.
@@ -171,9 +78,10 @@ impl Halos {
         (surroundings, radiance, points): (&Surroundings<'_>, &[f32], &[Point]),
     ) -> Array2<f32> {
         match self.of_bands.get(band) {
-            Some(Some(halo)) => {
-                surroundings.with(&picture, (radiance, points), |wide, beside| halo.applied(wide, beside))
-            }
+            Some(Some(halo)) => surroundings.with(&picture, (radiance, points), |wide, beside| {
+                let star = self.directions.as_ref().map(|directions| Star::new(directions, &halo.beyond));
+                halo.applied(wide, beside, star.as_ref())
+            }),
             _ => picture,
         }
     }
@@ -206,18 +114,26 @@ impl Halo {
     /// With T the halo of a point, E + T ⊗ E − E (T ⊗ 1): the sum of the picture is kept, and an even one stays even, for beyond its edges it counts as even.
     ///
     /// What lies less than `beside` pixels from its edges is not wanted.
-    fn applied(&self, mut picture: Array2<f32>, beside: usize) -> Array2<f32> {
+    fn applied(&self, mut picture: Array2<f32>, beside: usize, star: Option<&Star>) -> Array2<f32> {
         let (rows, columns) = picture.dim();
         let wanted = beside..rows - beside;
-        let (brought, landing) = (self.of(&picture, &wanted), self.of_ones((rows, columns), beside));
         let share = self.beyond.share as f32;
+        // Where rasters are sharpened to make up for their blur, next to a bright point, less than nothing may come.
+        let change =
+            |light: &mut f32, (came, went): (f32, f32)| *light = (*light + share * (came - *light * went)).max(0.0);
+        if let Some(star) = star {
+            let [brought, landing] = star.about(&picture, beside);
+            Zip::from(&mut picture)
+                .and(&brought)
+                .and(&landing)
+                .for_each(|light, came, went| change(light, (*came, *went)));
+            return picture;
+        }
+        let (brought, landing) = (self.of(&picture, &wanted), self.of_ones((rows, columns), beside));
         for (row, mut line) in picture.rows_mut().into_iter().enumerate().filter(|(row, _)| wanted.contains(row)) {
             let came = self.on_film(&brought, row, columns);
             let went = self.on_film(&landing, row, columns);
-            for ((light, came), went) in line.iter_mut().zip(came).zip(went) {
-                // Where rasters are sharpened to make up for their blur, next to a bright point, less than nothing may come.
-                *light = (*light + share * (came - *light * went)).max(0.0);
-            }
+            line.iter_mut().zip(came.into_iter().zip(went)).for_each(|(light, both)| change(light, both));
         }
         picture
     }
@@ -361,69 +277,12 @@ fn add_line(energies: &[f32; REACH + 1], padded: &[f32], sums: &mut [f32]) {
     }
 }
 
-/// Pixels beyond the edges that a raster of wider pixels has.
-const MARGIN: usize = 1;
-
-/// Returns the number of pixels twice as wide that cover some, with their margin.
-fn n_halved(n: usize) -> usize {
-    n.div_ceil(2) + 2 * MARGIN
-}
-
-/// Returns the means of a picture over pixels twice as wide, by quadratic splines, with a margin: ⅛, ⅜, ⅜, ⅛ each way.
-fn halved(picture: &Array2<f32>) -> Array2<f32> {
-    let (rows, columns) = picture.dim();
-    let (n_rows, n_columns) = (n_halved(rows), n_halved(columns));
-    let mut means = Array2::zeros((n_rows, n_columns));
-    let mut down = vec![0.0; 2 * n_columns + 2];
-    for (row, mut means) in means.rows_mut().into_iter().enumerate() {
-        // Pixel i of these has the pixels 2 (i − 1) and the next one in it.
-        down.fill(0.0);
-        for (k, weight) in WEIGHTS.into_iter().enumerate() {
-            let line = (2 * row + k).checked_sub(3).filter(|row| *row < rows);
-            let line = line.and_then(|row| picture.as_slice().map(|values| &values[row * columns..][..columns]));
-            if let Some(line) = line {
-                down[3..].iter_mut().zip(line).for_each(|(sum, light)| *sum += weight * light);
-            }
-        }
-        for (mean, four) in means.iter_mut().zip(down.windows(4).step_by(2)) {
-            *mean = WEIGHTS[0] * (four[0] + four[3]) + WEIGHTS[1] * (four[1] + four[2]);
-        }
-    }
-    means
-}
-
-/// Returns the means of a line, as [`halved`] has them.
-fn halved_line(line: &[f32]) -> Vec<f32> {
-    let mean = |i: usize| {
-        let pixels = WEIGHTS.iter().enumerate();
-        pixels.filter_map(|(k, weight)| Some(weight * line.get((2 * i + k).checked_sub(3)?)?)).sum()
-    };
-    (0..n_halved(line.len())).map(mean).collect()
-}
-
-const WEIGHTS: [f32; 4] = [0.125, 0.375, 0.375, 0.125];
-
-/// Returns a plane on pixels half as wide, by quadratic splines: ¾ of the wider pixel and ¼ of the next, each way.
-fn doubled(plane: &Array2<f32>, (rows, columns): (usize, usize)) -> Array2<f32> {
-    let values = (0..rows).flat_map(|row| doubled_row(plane, row, columns)).collect();
-    Array2::from_shape_vec((rows, columns), values).expect("it has a value for each pixel")
-}
-
-fn doubled_row(plane: &Array2<f32>, row: usize, columns: usize) -> Vec<f32> {
-    let own = row / 2 + MARGIN;
-    let next = if row.is_multiple_of(2) { own - 1 } else { own + 1 };
-    let mut line = Vec::with_capacity(plane.ncols());
-    line.extend(plane.row(own).iter().zip(plane.row(next)).map(|(own, next)| 0.75 * own + 0.25 * next));
-    let mut doubled = vec![0.0; 2 * columns.div_ceil(2)];
-    for (two, three) in doubled.as_chunks_mut::<2>().0.iter_mut().zip(line.windows(3)) {
-        *two = [0.75 * three[1] + 0.25 * three[0], 0.75 * three[1] + 0.25 * three[2]];
-    }
-    doubled.truncate(columns);
-    doubled
-}
-
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::PI;
+
+    use glam::DVec2;
+
     use super::*;
 
     fn halo(half_px: f64, share: f64, size: (usize, usize)) -> Halo {
@@ -434,11 +293,11 @@ mod tests {
     fn even_pictures_stay_even_and_sums_are_kept() {
         for (half_px, size) in [(0.5, (33, 70)), (2.5, (64, 48)), (5.5, (101, 90)), (23.5, (40, 61)), (200.5, (7, 1))] {
             let halo = halo(half_px, 0.02, size);
-            for light in halo.applied(Array2::from_elem(size, 3.0), 0) {
+            for light in halo.applied(Array2::from_elem(size, 3.0), 0, None) {
                 assert!((light - 3.0).abs() < 1e-6, "{half_px}: {light}");
             }
             let uneven = Array2::from_shape_fn(size, |(row, column)| ((row * 7 + column * 13) % 11) as f32);
-            let (before, after) = (uneven.sum(), halo.applied(uneven, 0).sum());
+            let (before, after) = (uneven.sum(), halo.applied(uneven, 0, None).sum());
             assert!((after / before - 1.0).abs() < 1e-5, "{half_px}: {before} {after}");
         }
     }
@@ -469,7 +328,7 @@ mod tests {
             for at in [(400, 400), (403, 398), (397, 401)] {
                 let mut point = Array2::zeros((n, n));
                 point[at] = 1.0;
-                let picture = halo.applied(point, 0);
+                let picture = halo.applied(point, 0, None);
                 let from_point = |row: usize, column: usize| {
                     DVec2::new(column as f64 - at.1 as f64, row as f64 - at.0 as f64).length()
                 };

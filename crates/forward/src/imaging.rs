@@ -21,13 +21,12 @@ use crate::{
     lamps::{Lamp, without_lamps},
     node_kernels::NodeKernel,
     places::SceneRaster,
-    points::{Beside, Drawing, Drawn, Maps, Point},
+    points::{Beside, Drawing, Maps, Point},
     raster::{Level, Raster},
     rectangle::Rectangle,
     sampler::Sampler,
     scene_layers::SceneLayers,
     sight::{Before, Sight},
-    stars::{self, Directions, Star},
     stopwatch::{Part, Stopwatch},
     surface::{LayerCoordinates, Surface},
     surroundings::{Surroundings, beside},
@@ -60,8 +59,6 @@ pub(crate) struct Imaging {
     points: Vec<Option<Beside>>,
     kept: Mutex<Kept>,
     halos: Halos,
-    /// Where edges of a pupil that is not round bend light to.
-    directions: Option<Directions>,
     /// The largest that the kernels of a band have been, bytes.
     kernel_bytes: usize,
     pub(crate) stopwatch: Stopwatch,
@@ -127,7 +124,6 @@ impl Imaging {
             points,
             kept: Mutex::new(kept),
             halos,
-            directions: lens.pupil_edges().as_ref().map(Directions::of),
             // Those of the middle band tell how much memory kernels take.
             kernel_bytes: kernels.size_bytes() + kernels.size_bytes() / 4,
             stopwatch,
@@ -254,11 +250,9 @@ impl Imaging {
         let (Film { rows, columns, .. }, (scene_rows, scene_columns)) = (self.spec.film, self.size());
         // Halos: the picture with what lies around it, what they bring and take.
         const HALO_PLANES: usize = 4;
-        // A star of twice its width and as high, and what is drawn of two kinds of points.
-        const STAR_PLANES: usize = 4;
         let m = beside(&self.spec.film);
-        let n = HALO_PLANES + if self.directions.is_some() { STAR_PLANES } else { 0 };
-        let halos = if self.halos.are_any() { n * (rows + 2 * m) * (columns + 2 * m) } else { 0 };
+        let wide = (rows + 2 * m) * (columns + 2 * m);
+        let halos = if self.halos.are_any() { HALO_PLANES * wide + self.halos.star_values(wide) } else { 0 };
         let planes = PLANES * (rows * columns).max(scene_rows * scene_columns) + halos;
         size_of::<f32>() * planes + self.kernel_bytes
     }
@@ -311,8 +305,6 @@ impl Imaging {
         let lamps: Vec<Point> = lamps.into_iter().chain(lamps_behind.unwrap_or_default()).collect();
         let points = self.points.iter().zip(light.points);
         let points: Vec<Point> = points.filter_map(|(point, light)| point.as_ref()?.lit(*light, &maps)).collect();
-        let ([star_lamps, lamps], [star_points, points]) =
-            (self.with_stars(band, lamps), self.with_stars(band, points));
         let front = front.as_standard_layout();
         let occluded = occluded.as_ref().map(|samples| samples.as_standard_layout());
         let surface = |radiance, coordinates| Surface { radiance, coordinates };
@@ -345,10 +337,8 @@ impl Imaging {
             sight: self.visible.as_ref().map(Visible::sight),
         };
         let mut picture = picture.finish();
-        picture.iter_mut().zip(drawing.drawn(&lamps, cancel)?.light).for_each(|(sum, light)| *sum += light);
-        let beside = drawing.drawn(&points, cancel)?.light;
-        let star_lamps = (drawing.drawn(&star_lamps, cancel)?, star_lamps);
-        let star_points = (drawing.drawn(&star_points, cancel)?, star_points);
+        picture.iter_mut().zip(drawing.drawn(&lamps, cancel)?).for_each(|(sum, light)| *sum += light);
+        let beside = drawing.drawn(&points, cancel)?;
         Ok(self.stopwatch.time(Part::Compositing, || {
             // What a pixel sees is spread before it is lit: an even scene stays even.
             let around = Surroundings { film: &self.spec.film, scene: &self.raster, map: &map };
@@ -356,39 +346,8 @@ impl Imaging {
             let picture = self.halos.applied(band, picture, (&around, front, &lamps));
             let beside = (!beside.is_empty()).then(|| Array2::from_shape_vec((rows, columns), beside).ok()).flatten();
             let beside = beside.map(|beside| self.halos.applied(band, beside, (&around, &[], &points)));
-            let [on_picture, on_beside] = self.stars(band, [star_lamps, star_points]);
-            let picture = sum_of(Some(picture), on_picture).unwrap_or_default();
-            self.lit(picture, sum_of(beside, on_beside), &map)
+            self.lit(picture, beside, &map)
         }))
-    }
-
-    /// Parts the brightest points of a band, which get stars where the pupil is not round, from the others.
-    fn with_stars(&self, band: usize, points: Vec<Point>) -> [Vec<Point>; 2] {
-        match self.directions.is_some() && self.halos.beyond(band).is_some() {
-            true => stars::brightest(&points, &self.spec.film),
-            false => [vec![], points],
-        }
-    }
-
-    /// Returns what points with stars bring to the film, of each kind of points; nothing where there are none.
-    fn stars(&self, band: usize, kinds: [(Drawn, Vec<Point>); 2]) -> [Option<Array2<f32>>; 2] {
-        let film = &self.spec.film;
-        let are_any = kinds.iter().any(|(_, points)| !points.is_empty());
-        let beyond = self.halos.beyond(band).filter(|_| are_any);
-        let (Some(beyond), Some(directions)) = (beyond, &self.directions) else { return [None, None] };
-        let star = Star::new(directions, beyond, (film.rows + beside(film), film.columns + beside(film)));
-        let (pixels, at) = (Raster::new(film, Level::PIXEL), film_pixels(film));
-        let first_px = [pixels.down_px(at.first_row), pixels.across_px(at.first_column)];
-        kinds.map(|(drawn, points)| {
-            let mut picture = Array2::from_shape_vec((film.rows, film.columns), drawn.light).ok()?;
-            picture *= (1.0 - beyond.share) as f32;
-            let star_of = |(point, seen): (&Point, f64)| {
-                let place_px = point.place_px(1e-3 * film.pitch_um);
-                ([0, 1].map(|axis| place_px[axis] - first_px[axis]), beyond.share * seen * point.light())
-            };
-            star.add(&mut picture, points.iter().zip(drawn.seen).map(star_of));
-            Some(picture)
-        })
     }
 
     /// Lays what the tiles of a layer gather behind a picture.
@@ -481,14 +440,6 @@ impl Imaging {
             }
         });
         picture
-    }
-}
-
-/// Returns the sum of pictures, of those that there are.
-fn sum_of(one: Option<Array2<f32>>, other: Option<Array2<f32>>) -> Option<Array2<f32>> {
-    match (one, other) {
-        (Some(one), Some(other)) => Some(one + other),
-        (one, other) => one.or(other),
     }
 }
 

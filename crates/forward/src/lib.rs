@@ -12,6 +12,7 @@
 #[doc = include_str!("../README.md")]
 struct Readme;
 
+mod beyond;
 mod blocks;
 mod convolve;
 mod coverage;
@@ -45,6 +46,7 @@ mod scene_layers;
 mod sight;
 mod source;
 mod spec;
+mod splines;
 mod stars;
 mod stopwatch;
 mod surface;

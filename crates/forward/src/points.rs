@@ -175,61 +175,44 @@ const BLUR_STEP_PX: f64 = 0.5;
 const LEAST_CELL_PX: f64 = 0.125;
 const CELLS: f64 = 32.0;
 
-/// Points as a band shows them.
-pub(crate) struct Drawn {
-    /// What they bring to the pixels of the film, row by row: radiance; nothing where there are none.
-    pub(crate) light: Vec<f32>,
-    /// The part of each that is not hidden.
-    pub(crate) seen: Vec<f64>,
-}
-
-/// What points that share a kernel bring to a part of the film.
-struct Patch {
-    at: Rectangle,
-    light: Vec<f32>,
-    /// Points by their numbers, and the part of each that is not hidden.
-    seen: Vec<(usize, f64)>,
-}
-
 impl Drawing<'_> {
-    /// Returns points as they are drawn.
-    pub(crate) fn drawn(&self, points: &[Point], cancel: &Cancel) -> Result<Drawn, Cancelled> {
+    /// Returns what points bring to the pixels of the film, row by row: radiance; nothing where there are none.
+    pub(crate) fn drawn(&self, points: &[Point], cancel: &Cancel) -> Result<Vec<f32>, Cancelled> {
         let film = film_pixels(self.film);
-        let mut light = vec![0.0; if points.is_empty() { 0 } else { film.len() }];
-        let mut seen: Vec<f64> = points.iter().map(|point| if point.before.is_some() { 0.0 } else { 1.0 }).collect();
+        let mut sums = vec![0.0; if points.is_empty() { 0 } else { film.len() }];
         let groups = self.groups(points);
         // One for each thread at once: each may be as large as the film.
         for groups in groups.chunks(rayon::current_num_threads()) {
             cancel.check()?;
-            let patches: Vec<Patch> = groups.par_iter().filter_map(|group| self.patch(group, &film)).collect();
-            for patch in patches {
-                let lines = light[patch.at.offset_in(&film)..].chunks_mut(film.columns);
-                for (line, light) in lines.zip(patch.light.chunks_exact(patch.at.columns)) {
+            let patches: Vec<(Rectangle, Vec<f32>)> =
+                groups.par_iter().filter_map(|group| self.patch(group, &film)).collect();
+            for (at, light) in patches {
+                let lines = sums[at.offset_in(&film)..].chunks_mut(film.columns);
+                for (line, light) in lines.zip(light.chunks_exact(at.columns)) {
                     line.iter_mut().zip(light).for_each(|(sum, light)| *sum += light);
                 }
-                patch.seen.into_iter().for_each(|(number, part)| seen[number] = part);
             }
         }
-        Ok(Drawn { light, seen })
+        Ok(sums)
     }
 
     fn pitch_mm(&self) -> f64 {
         1e-3 * self.film.pitch_um
     }
 
-    /// Returns points that share a kernel, with their numbers.
-    fn groups<'p>(&self, points: &'p [Point]) -> Vec<Vec<(usize, &'p Point)>> {
+    /// Returns points that share a kernel.
+    fn groups<'p>(&self, points: &'p [Point]) -> Vec<Vec<&'p Point>> {
         let radius_px =
             |dioptres: f64| self.lens.blur_radius_mm(DVec2::ZERO, dioptres, self.middle_nm) / self.pitch_mm();
         let per_dioptre = radius_px(1.0) - radius_px(0.0);
         let mut apart_px = APART_PX;
         loop {
-            let mut groups: BTreeMap<[i64; 4], Vec<(usize, &Point)>> = BTreeMap::new();
-            for (number, point) in points.iter().enumerate() {
+            let mut groups: BTreeMap<[i64; 4], Vec<&Point>> = BTreeMap::new();
+            for point in points {
                 let cell = (point.middle_mm / self.pitch_mm() / apart_px).floor();
                 let blur = (point.dioptres * per_dioptre / BLUR_STEP_PX).round() as i64;
                 let width = (point.width_mm / self.pitch_mm() * 8.0).round() as i64;
-                groups.entry([cell.x as i64, cell.y as i64, blur, width]).or_default().push((number, point));
+                groups.entry([cell.x as i64, cell.y as i64, blur, width]).or_default().push(point);
             }
             if groups.len() <= MOST_KERNELS || apart_px > 4.0 * (self.film.rows + self.film.columns) as f64 {
                 return groups.into_values().collect();
@@ -239,13 +222,13 @@ impl Drawing<'_> {
     }
 
     /// Returns what points that share a kernel bring to the film, and where.
-    fn patch(&self, group: &[(usize, &Point)], film: &Rectangle) -> Option<Patch> {
+    fn patch(&self, group: &[&Point], film: &Rectangle) -> Option<(Rectangle, Vec<f32>)> {
         // The same in all bands in which the same points shine.
         let n = group.len() as f64;
-        let place_mm = group.iter().map(|(_, point)| point.middle_mm).sum::<DVec2>() / n;
-        let dioptres = group.iter().map(|(_, point)| point.dioptres).sum::<f64>() / n;
+        let place_mm = group.iter().map(|point| point.middle_mm).sum::<DVec2>() / n;
+        let dioptres = group.iter().map(|point| point.dioptres).sum::<f64>() / n;
         let pitch_mm = self.pitch_mm();
-        let width_px = group[0].1.width_mm / pitch_mm;
+        let width_px = group[0].width_mm / pitch_mm;
         let spread_px = self.lens.spread_mm(place_mm, dioptres, self.middle_nm) / pitch_mm;
         let blur_px = self.lens.blur_radius_mm(place_mm, dioptres, self.middle_nm) / pitch_mm;
         let most_px = LEAST_CELL_PX * (spread_px / (CELLS * LEAST_CELL_PX)).log2().ceil().max(0.0).exp2();
@@ -260,11 +243,10 @@ impl Drawing<'_> {
 
         let pixels = Raster::new(self.film, Level::PIXEL);
         let reached =
-            group.iter().filter_map(|(_, point)| whole.reached(point.place_px(pitch_mm), &pixels).intersection(film));
+            group.iter().filter_map(|point| whole.reached(point.place_px(pitch_mm), &pixels).intersection(film));
         let at = Rectangle::around(reached)?;
         let mut light = vec![0.0; at.len()];
-        let mut parts_seen = Vec::new();
-        for &(number, point) in group {
+        for point in group {
             let place = point.place_px(pitch_mm);
             let Some(reached) = whole.reached(place, &pixels).intersection(film) else { continue };
             // Where nothing nearer lies in a bundle, it is seen by all of the pupil, or by none from behind a surface.
@@ -282,7 +264,6 @@ impl Drawing<'_> {
                     };
                     let pupil = OpenPupil::of(sight, &met, &hidden);
                     let seen = Sums::of(&kernel, (cell_px, wide), &|below, beside| pupil.part_at(below, beside));
-                    parts_seen.push((number, seen.total()));
                     seen.on_pixels(place, &pixels, &reached)
                 }
                 None if point.before.is_some() => continue,
@@ -293,7 +274,7 @@ impl Drawing<'_> {
                 sums.iter_mut().zip(parts).for_each(|(sum, part)| *sum += (point.light * part) as f32);
             }
         }
-        Some(Patch { at, light, seen: parts_seen })
+        Some((at, light))
     }
 }
 
@@ -343,11 +324,6 @@ impl Sums {
         }
         let first_px = [at.first_row, at.first_column].map(|first| (first as f64 - margin as f64 - 0.5) * cell_px);
         Self { rows: wide_rows + 1, columns: wide_columns, sums, first_px, cell_px }
-    }
-
-    /// Returns all of its light.
-    fn total(&self) -> f64 {
-        self.sums[(self.rows - 1) * self.columns..].iter().sum()
     }
 
     /// Returns the pixels that some of it falls on, of a point so far below and to the right of the film's middle.

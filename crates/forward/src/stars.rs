@@ -1,27 +1,21 @@
-//! Stars about bright points: what diffraction takes beyond the windows of their kernels, where the pupil is not round.
+//! Stars: what diffraction takes beyond the windows of kernels, where the pupil is not round.
 //!
 //! Each piece of an edge bends light across itself, as much as it is long, and as far as a round edge does (`docs/forward.md`, 2). Straight edges
-//! make spikes, as wide as light from a slit of their length; round ones fans. What a scene is made of otherwise has round halos: so many
-//! stars beside each other are round too.
+//! make spikes, as wide as light from a slit of their length; round ones fans. A picture is convolved with the star of a point, by transforms.
 
-use std::{
-    collections::{BTreeMap, BTreeSet},
-    f64::consts::PI,
-};
+use std::f64::consts::PI;
 
+use dioptric_fft::Complex;
 use dioptric_psf::PupilEdges;
-use ndarray::{Array2, s};
+use ndarray::Array2;
 use rayon::prelude::*;
 
 use crate::{
-    Film,
-    halo::{Beyond, POINTS},
-    points::Point,
+    beyond::{Beyond, POINTS},
+    convolve::{fast_size, multiply_by_real, with_fft},
+    splines::{doubled, halved},
 };
 
-/// The fewest pixels about whose points stars are drawn, the brightest, and pixels of all stars together up to which there are more of them.
-const LEAST_STARS: usize = 64;
-const STAR_PIXELS: usize = 1 << 27;
 /// Directions in a half turn in which light is counted.
 const DIRECTIONS: usize = 4096;
 /// The half-width of a slit's picture, sinc², where a slit of length s lets through light of wavelength λ to a distance f: so many λ f / s.
@@ -79,24 +73,105 @@ impl Directions {
     }
 }
 
-/// The star of a point of light 1 in a band, of sum 1 but for what lies beyond it.
-pub(crate) struct Star {
-    /// The lower half, rows from the middle down and columns from the left, as many on both sides of the middle one. The upper one is this one turned.
-    half: Array2<f32>,
+/// The star of a point of light 1 in a band.
+pub(crate) struct Star<'a> {
+    directions: &'a Directions,
+    beyond: &'a Beyond,
 }
 
-impl Star {
-    /// Returns the star that reaches so many rows and columns from its middle.
-    pub(crate) fn new(directions: &Directions, beyond: &Beyond, (rows, columns): (usize, usize)) -> Self {
+/// Pixels of a picture beyond which stars are drawn on pixels twice as wide, or four times, …
+const MOST_PIXELS: usize = 1 << 21;
+
+/// Returns how many values stars about a picture of so many pixels take: its transform on four times as many, before and after, and half as many
+/// of the star and of its transform.
+pub(crate) fn values(n_pixels: usize) -> usize {
+    4 * (2 * 2 + 1 + 1) * n_pixels.min(MOST_PIXELS)
+}
+
+impl<'a> Star<'a> {
+    pub(crate) fn new(directions: &'a Directions, beyond: &'a Beyond) -> Self {
+        Self { directions, beyond }
+    }
+
+    /// Returns what stars about the pixels of a picture bring to each, and what of those of a picture of ones lands there: right where pixels lie
+    /// `beside` its edges or more.
+    pub(crate) fn about(&self, picture: &Array2<f32>, beside: usize) -> [Array2<f32>; 2] {
+        self.on_pixels([picture.clone(), Array2::ones(picture.dim())], beside, 0)
+    }
+
+    /// Returns pictures convolved with the star, on pixels that are doubled so many times.
+    fn on_pixels(&self, pictures: [Array2<f32>; 2], beside: usize, doublings: i32) -> [Array2<f32>; 2] {
+        let (rows, columns) = pictures[0].dim();
+        if rows * columns > MOST_PIXELS {
+            let wide = pictures.map(|picture| halved(&picture));
+            return self.on_pixels(wide, beside / 2, doublings + 1).map(|wide| doubled(&wide, (rows, columns)));
+        }
+        // From one pixel that is wanted to the farthest other; what lies farther comes around.
+        let reach = (rows - beside, columns - beside);
+        let size = (fast_size(2 * reach.0), fast_size(2 * reach.1));
+        let star = self.rectangle(reach, size, f64::from(doublings).exp2());
+        with_fft(size, |fft| {
+            let mut factors = Vec::new();
+            fft.forward(&star, size.1, &mut factors);
+            let mut lines = vec![Complex::new(0.0, 0.0); rows * size.1];
+            for (line, both) in
+                lines.chunks_exact_mut(size.1).zip(pictures[0].rows().into_iter().zip(pictures[1].rows()))
+            {
+                let both = both.0.into_iter().zip(both.1);
+                line.iter_mut().zip(both).for_each(|(value, (one, other))| *value = Complex::new(*one, *other));
+            }
+            let mut spectrum = vec![Complex::new(0.0, 0.0); fft.len()];
+            fft.forward_pair(&mut lines, &mut spectrum);
+            multiply_by_real(&mut spectrum, &factors, fft.rows());
+            fft.inverse_pair(&mut spectrum, &mut lines);
+            let scale = (fft.len() as f32).recip();
+            let at = |(row, column): (usize, usize)| lines[row * size.1 + column] * scale;
+            [
+                Array2::from_shape_fn((rows, columns), |place| at(place).re),
+                Array2::from_shape_fn((rows, columns), |place| at(place).im),
+            ]
+        })
+    }
+
+    /// Returns the star about the first value of a rectangle of so many rows and columns that goes on around its edges, on pixels so many times as wide
+    /// as the film's.
+    fn rectangle(&self, reach: (usize, usize), size: (usize, usize), wide: f64) -> Vec<f32> {
+        let mut values = vec![0.0; size.0 * size.1];
+        let pixel = self.pixel(reach.0.max(reach.1), wide);
+        let (lower, upper) = values.split_at_mut(reach.0 * size.1);
+        lower.par_chunks_mut(size.1).enumerate().for_each(|(down, line)| {
+            line[0] = pixel(down as f64, 0.0) as f32;
+            for right in 1..reach.1 {
+                line[right] = pixel(down as f64, right as f64) as f32;
+                line[size.1 - right] = pixel(down as f64, -(right as f64)) as f32;
+            }
+        });
+        // The upper half is the lower one turned.
+        let n = upper.len() / size.1;
+        upper.par_chunks_mut(size.1).enumerate().for_each(|(row, line)| {
+            let down = n - row;
+            if let Some(turned) = lower.chunks_exact(size.1).nth(down).filter(|_| down < reach.0) {
+                line[0] = turned[0];
+                line[1..].iter_mut().zip(turned[1..].iter().rev()).for_each(|(value, turned)| *value = *turned);
+            }
+        });
+        values
+    }
+
+    /// Returns what gives the part of a star on a pixel, so many below and to the right of its middle, up to a distance; pixels are so many times as wide
+    /// as the film's.
+    fn pixel(&self, reach: usize, wide: f64) -> impl Fn(f64, f64) -> f64 + Sync {
         // No spike is narrower than a pixel.
-        let width_px = (directions.width_lambda_n * beyond.lambda_n_px).max(1.0);
-        let n_levels = (rows.max(columns) as f64).hypot(1.0).log2().ceil() as usize + 2;
-        let levels: Vec<Vec<f32>> =
-            (0..n_levels).into_par_iter().map(|level| directions.widened(width_px / (level as f64).exp2())).collect();
-        let density = beyond.density();
-        let at = |down: f64, right: f64| {
+        let width_px = (self.directions.width_lambda_n * self.beyond.lambda_n_px / wide).max(1.0);
+        let n_levels = (reach as f64 * 2_f64.sqrt()).log2().ceil().max(0.0) as usize + 2;
+        let levels: Vec<Vec<f32>> = (0..n_levels)
+            .into_par_iter()
+            .map(|level| self.directions.widened(width_px / (level as f64).exp2()))
+            .collect();
+        let density = self.beyond.density();
+        let at = move |down: f64, right: f64| {
             let r = down.hypot(right);
-            let round = density(r);
+            let round = wide * wide * density(wide * r);
             if round == 0.0 {
                 return 0.0;
             }
@@ -107,81 +182,15 @@ impl Star {
             let [near, far] = [finer, finer + 1].map(|level| f64::from(levels[level][direction]));
             2.0 * PI * round * (near + part * (far - near))
         };
-        let pixel = |down: f64, right: f64| {
+        move |down: f64, right: f64| {
             if down.hypot(right) > POINTS as f64 {
                 return at(down, right);
             }
             let point = |i: usize| (i as f64 + 0.5) / POINTS as f64 - 0.5;
             let points = (0..POINTS * POINTS).map(|i| at(down + point(i / POINTS), right + point(i % POINTS)));
             points.sum::<f64>() / (POINTS * POINTS) as f64
-        };
-        let mut half = Array2::zeros((rows + 1, 2 * columns + 1));
-        let lines: Vec<_> = half.rows_mut().into_iter().enumerate().collect();
-        lines.into_par_iter().for_each(|(down, mut line)| {
-            for (column, value) in line.iter_mut().enumerate() {
-                *value = pixel(down as f64, column as f64 - columns as f64) as f32;
-            }
-        });
-        Self { half }
-    }
-
-    /// Returns a row of so many pixels of a star, the first of them so far to the right of the middle: turned in the upper half.
-    fn row(&self, down: i64, first: i64, n: usize) -> Option<(ndarray::ArrayView1<'_, f32>, usize)> {
-        let columns = (self.half.ncols() / 2) as i64;
-        let at = down.unsigned_abs() as usize;
-        let line = (at < self.half.nrows()).then(|| self.half.row(at))?;
-        // Pixels beyond its ends get nothing.
-        let skipped = (-columns - first).clamp(0, n as i64);
-        let end = (columns + 1 - first).clamp(skipped, n as i64);
-        let [from, to] = [skipped, end].map(|at| (first + at + columns) as usize);
-        let n = self.half.ncols();
-        let part = match down < 0 {
-            false => line.slice_move(s![from..to]),
-            true => line.slice_move(s![n - to..n - from; -1]),
-        };
-        Some((part, skipped as usize))
-    }
-
-    /// Adds the stars of points to a picture: each so far below and to the right of its first pixel, of so much light.
-    pub(crate) fn add(&self, picture: &mut Array2<f32>, points: impl IntoIterator<Item = ([f64; 2], f64)>) {
-        // Between pixels light is linear; points share pixels.
-        let mut of_pixels: BTreeMap<[i64; 2], f64> = BTreeMap::new();
-        for ([below, right], light) in points {
-            let [row, column] = [below, right].map(|place| (place.floor() as i64, place.rem_euclid(1.0)));
-            for (down, of_row) in [(0, 1.0 - row.1), (1, row.1)] {
-                for (across, of_column) in [(0, 1.0 - column.1), (1, column.1)] {
-                    *of_pixels.entry([row.0 + down, column.0 + across]).or_default() += light * of_row * of_column;
-                }
-            }
         }
-        let columns = picture.ncols();
-        let lines: Vec<_> = picture.rows_mut().into_iter().enumerate().collect();
-        lines.into_par_iter().for_each(|(row, mut line)| {
-            for (&[below, right], &light) in of_pixels.iter().filter(|(_, light)| **light > 0.0) {
-                let Some((part, skipped)) = self.row(row as i64 - below, -right, columns) else { continue };
-                let sums = line.iter_mut().skip(skipped);
-                sums.zip(part).for_each(|(sum, value)| *sum += light as f32 * value);
-            }
-        });
     }
-}
-
-/// Parts the brightest points, which get stars, from the others; both in their order, by which they share kernels.
-pub(crate) fn brightest(points: &[Point], film: &Film) -> [Vec<Point>; 2] {
-    let mut by_light: Vec<usize> = (0..points.len()).collect();
-    by_light.sort_by(|&a, &b| points[b].light().total_cmp(&points[a].light()));
-    let most = (STAR_PIXELS / (film.rows * film.columns)).max(LEAST_STARS);
-    let mut pixels = BTreeSet::new();
-    let is_one = |number: &&usize| {
-        pixels.insert(points[**number].place_px(1e-3 * film.pitch_um).map(|px| px.round() as i64));
-        pixels.len() <= most
-    };
-    let bright: BTreeSet<usize> = by_light.iter().take_while(is_one).copied().collect();
-    let of = |is_bright: bool| {
-        let numbers = (0..points.len()).filter(|number| bright.contains(number) == is_bright);
-        numbers.map(|number| points[number]).collect()
-    };
-    [of(true), of(false)]
 }
 
 #[cfg(test)]
@@ -245,13 +254,10 @@ mod tests {
         let share = 6.0 / (1.5 * 3_f64.sqrt()) * edges(1.0).diameter_mm / (2.0 * PI * PI * start);
         let beyond = Beyond::from_step(share, start / pixel, 1.0 / pixel);
         let reach = 130;
-        let star = Star::new(&Directions::of(&edges(5.0)), &beyond, (reach, reach));
-        let drawn = |place: DVec2| {
-            let (down, right) = ((-place.y / pixel).round() as i64, (place.x / pixel).round() as i64);
-            let (line, skipped) = star.row(down, right, 1).unwrap();
-            assert_eq!(skipped, 0);
-            share * f64::from(line[0]) / (pixel * pixel)
-        };
+        let directions = Directions::of(&edges(5.0));
+        let star = Star::new(&directions, &beyond);
+        let of_pixel = star.pixel(reach, 1.0);
+        let drawn = |place: DVec2| share * of_pixel(-place.y / pixel, place.x / pixel) / (pixel * pixel);
         for between in [[14.0, 30.0], [30.0, 60.0]] {
             let (exact, drawn) = (exact(between), ring(&drawn, between, pixel));
             let sum = |parts: &[f64]| parts.iter().sum::<f64>();
@@ -267,7 +273,7 @@ mod tests {
         }
     }
 
-    /// Of a round edge a star is a round halo, wherever it lies among the pixels.
+    /// Of a round edge a star is a round halo.
     #[test]
     fn stars_of_round_edges_are_round() {
         let piece = |i: i32| {
@@ -276,16 +282,24 @@ mod tests {
         };
         let edges = PupilEdges { pieces: (0..360).map(piece).collect(), diameter_mm: 360.0 / PI };
         let beyond = Beyond::from_step(0.01, 5.0, 0.5);
-        let star = Star::new(&Directions::of(&edges), &beyond, (60, 60));
-        let (density, at) = (beyond.density(), DVec2::new(31.3, 28.6));
-        let mut picture = Array2::zeros((60, 60));
-        star.add(&mut picture, [([at.y, at.x], 2.0)]);
-        for ((row, column), light) in picture.indexed_iter() {
+        let directions = Directions::of(&edges);
+        let (density, at) = (beyond.density(), DVec2::new(31.0, 28.0));
+        let mut picture = Array2::zeros((60, 70));
+        picture[(28, 31)] = 2.0;
+        let [brought, _] = Star::new(&directions, &beyond).about(&picture, 0);
+        for ((row, column), light) in brought.indexed_iter() {
             let r = DVec2::new(column as f64, row as f64).distance(at);
             if r > 8.0 {
                 let ratio = f64::from(*light) / (2.0 * density(r));
-                // Lines between pixels lie above r⁻³: by 12 / 8 r² in the middle, along each axis.
-                assert!((ratio - 1.0).abs() < 3.0 / (r * r) + 2e-3, "{row} {column}: {ratio}");
+                assert!((ratio - 1.0).abs() < 0.01, "{row} {column}: {ratio}");
+            }
+        }
+        // What an even picture brings is what lands of it, also on wider pixels.
+        for size in [(60, 70), (1500, 1430)] {
+            let [brought, landing] = Star::new(&directions, &beyond).about(&Array2::from_elem(size, 3.0), 8);
+            let inner = ndarray::s![8..size.0 - 8, 8..size.1 - 8];
+            for (brought, landing) in brought.slice(inner).iter().zip(landing.slice(inner)) {
+                assert!((brought - 3.0 * landing).abs() < 1e-5 && (0.3..1.01).contains(landing), "{brought} {landing}");
             }
         }
     }
