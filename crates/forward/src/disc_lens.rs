@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use dioptric_psf::{FilmMap, FilmQuery, Kernel, LensImage, PsfError, PupilDivision};
+use dioptric_psf::{FilmMap, FilmQuery, Kernel, LensImage, PsfError, PupilDivision, PupilEdges};
 use glam::DVec2;
 use ndarray::Array2;
 
@@ -68,6 +68,10 @@ impl LensImage for DiscLens {
         Ok((0..division.n_parts()).map(|i| part(i) as Arc<dyn LensImage + Send>).collect())
     }
 
+    fn pupil_edges(&self) -> Option<PupilEdges> {
+        None
+    }
+
     fn blur_radius_mm(&self, place_mm: DVec2, dioptres: f64, wavelength_nm: f64) -> f64 {
         let focus_dioptres = self.focus_dioptres + self.axial_per_nm * (wavelength_nm - 550.0);
         let field_tan = self.field_tan(wavelength_nm, place_mm.length());
@@ -115,6 +119,10 @@ impl LensImage for PartOfDisc {
         // In the picture, which is the film turned by 180°, light of near points lies on the other side of the pupil.
         let radius_px = -1e3 * self.lens.blur_radius_mm(place_mm, dioptres, wavelength_nm) / pitch_um;
         Kernel::centered(part_of_disc(radius_px, |at| self.division.share(self.part, at)), pitch_um)
+    }
+
+    fn pupil_edges(&self) -> Option<PupilEdges> {
+        None
     }
 
     fn blur_radius_mm(&self, place_mm: DVec2, dioptres: f64, wavelength_nm: f64) -> f64 {

@@ -10,7 +10,7 @@ use std::{
     time::Duration,
 };
 
-use dioptric_psf::{FilmMap, FilmQuery, Kernel, LensImage};
+use dioptric_psf::{FilmMap, FilmQuery, Kernel, LensImage, PupilEdges};
 use dioptric_scene::View;
 use dioptric_spectrum::{Bands, Cancel, DepthMap, Quantity, SpectralImage, SpectrumError, WavelengthGrid};
 use glam::DVec2;
@@ -161,6 +161,10 @@ impl LensImage for Cancelling {
         }
         self.lens.kernel(query)
     }
+    fn pupil_edges(&self) -> Option<PupilEdges> {
+        None
+    }
+
     fn blur_radius_mm(&self, place_mm: DVec2, dioptres: f64, wavelength_nm: f64) -> f64 {
         self.lens.blur_radius_mm(place_mm, dioptres, wavelength_nm)
     }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use dioptric_psf::{FilmMap, FilmQuery, Kernel, LensImage, PsfError};
+use dioptric_psf::{FilmMap, FilmQuery, Kernel, LensImage, PsfError, PupilEdges};
 use dioptric_spectrum::{Cancel, Cancelled};
 use glam::DVec2;
 use ndarray::Array2;
@@ -162,6 +162,10 @@ where
 
     fn spread_mm(&self, place_mm: DVec2, dioptres: f64, wavelength_nm: f64) -> f64 {
         self.lens.spread_mm(place_mm + self.center_mm, dioptres, wavelength_nm)
+    }
+
+    fn pupil_edges(&self) -> Option<PupilEdges> {
+        self.lens.pupil_edges()
     }
 
     fn through_parts(&self, n_parts: usize) -> Result<Vec<Arc<dyn LensImage + Send>>, PsfError> {

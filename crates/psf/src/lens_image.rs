@@ -60,9 +60,7 @@ pub trait LensImage: Sync {
     }
 
     /// Returns the edges that diffraction bends light about, along the axes of the picture; `None` where they are one circle, or nothing is bent.
-    fn pupil_edges(&self) -> Option<PupilEdges> {
-        None
-    }
+    fn pupil_edges(&self) -> Option<PupilEdges>;
 
     /// Returns the images through so many parts of the pupil: their irradiances add up to that of the whole, and each has kernels of sum 1 about the
     /// same film points (`film_map` has the same directions).

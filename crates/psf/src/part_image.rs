@@ -5,8 +5,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 use glam::DVec2;
 
 use crate::{
-    Diffraction, FilmMap, FilmQuery, Kernel, LensImage, PsfError, pupil_division::PupilDivision, survey::Survey,
-    traced::Shared,
+    Diffraction, FilmMap, FilmQuery, Kernel, LensImage, PsfError, PupilEdges, pupil_division::PupilDivision,
+    survey::Survey, traced::Shared,
 };
 
 /// The image that a lens forms through a part of its pupil: a view from that part, blurred by what is left of its width.
@@ -56,6 +56,11 @@ impl LensImage for PartImage {
 
     fn kernel(&self, query: FilmQuery) -> Kernel {
         self.shared.kernel(query, Some((&self.division, self.part)))
+    }
+
+    /// Those of a part are not those of the whole.
+    fn pupil_edges(&self) -> Option<PupilEdges> {
+        None
     }
 
     fn blur_radius_mm(&self, place_mm: DVec2, dioptres: f64, wavelength_nm: f64) -> f64 {

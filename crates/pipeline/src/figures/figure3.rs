@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use dioptric_forward::{Film, Settings, Source, render};
-use dioptric_psf::{FilmMap, FilmQuery, Kernel, LensImage};
+use dioptric_psf::{FilmMap, FilmQuery, Kernel, LensImage, PupilEdges};
 use dioptric_scene::{Target, View};
 use dioptric_spectrum::{Quantity, SpectralImage, WavelengthGrid};
 use glam::DVec2;
@@ -104,6 +104,10 @@ impl LensImage for CountedPsfs {
         let samples = on_pixels(&self.psfs[self.nearest(wavelength_nm)], COUNTING_PITCH_UM, pitch_um);
         Kernel::centered(samples, pitch_um)
     }
+    fn pupil_edges(&self) -> Option<PupilEdges> {
+        None
+    }
+
     fn blur_radius_mm(&self, _place_mm: DVec2, _dioptres: f64, wavelength_nm: f64) -> f64 {
         self.radii_mm[self.nearest(wavelength_nm)]
     }
