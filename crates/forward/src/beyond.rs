@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use dioptric_psf::{FilmQuery, LensImage};
 use glam::DVec2;
 
-use crate::layers::Layers;
+use crate::points::LEAST_CELL_PX;
 
 /// Points along each side of a pixel at which the halo is looked up.
 pub(crate) const POINTS: usize = 8;
@@ -24,49 +24,40 @@ pub(crate) struct Beyond {
 }
 
 impl Beyond {
-    /// Of the sharpest layer, on the axis. Where windows are wider, off the axis or out of focus, halos are the same from some distance on.
+    /// Of the sharpest of some depths, on the axis. Where windows are wider, off the axis or out of focus, halos are the same from some distance on, and what
+    /// is spread within those is less than a hundredth of a blur.
     pub(crate) fn of(
-        lens: &dyn LensImage,
-        layers: &Layers,
-        (wavelength_nm, pitch_um): (f64, f64),
-        widest_px: f64,
+        (lens, wavelength_nm): (&dyn LensImage, f64),
+        depths_dioptres: &[f64],
+        (pitch_um, widest_px): (f64, f64),
     ) -> Self {
-        let radius_px = |layer: &usize| layers.radius_px_at(*layer as f32);
-        let sharpest = (0..layers.len()).min_by(|a, b| radius_px(a).total_cmp(&radius_px(b))).unwrap_or(0);
-        let factor = (radius_px(&sharpest) / widest_px).log2().ceil().max(0.0).exp2();
-        let dioptres = layers.dioptres()[sharpest];
-        let query = FilmQuery { place_mm: DVec2::ZERO, dioptres, wavelength_nm, pitch_um: factor * pitch_um };
+        let radius_px =
+            |dioptres: f64| 1e3 * lens.blur_radius_mm(DVec2::ZERO, dioptres, wavelength_nm).abs() / pitch_um;
+        let depths = depths_dioptres.iter().map(|dioptres| (radius_px(*dioptres), *dioptres));
+        let Some((radius_px, dioptres)) = depths.min_by(|a, b| a.0.total_cmp(&b.0)) else { return Self::default() };
+        // On cells as narrow as those of points that shine, whose windows it goes on from.
+        let cell_px = LEAST_CELL_PX * (radius_px / widest_px).log2().ceil().max(0.0).exp2();
+        let query = FilmQuery { place_mm: DVec2::ZERO, dioptres, wavelength_nm, pitch_um: cell_px * pitch_um };
         let kernel = lens.kernel(query);
         if kernel.lambda_n_px == 0.0 {
             // It holds all that there is, whatever it is scaled by.
-            return Self { fade_px: [factor; 2], ..Self::default() };
+            return Self { fade_px: [1.0; 2], ..Self::default() };
         }
-        let fade_px = kernel.fade_px().map(|px| px.max(LEAST_RADIUS));
-        let share = 1.0 - kernel.kept_share;
+        let lambda_n_px = cell_px * kernel.lambda_n_px;
+        let [start_px, edge_px] = kernel.fade_px().map(|cells| cell_px * cells);
+        let fade_px = [start_px, edge_px].map(|px| px.max(LEAST_RADIUS));
         // An edge bends 2 / π² λN over its radius beyond a circle.
-        let bent = 2.0 / (PI * PI) * kernel.lambda_n_px * Fade(fade_px).inverse();
-        Self {
-            share,
-            fade_px: fade_px.map(|px| factor * px),
-            steep: (1.0 - bent / share).clamp(0.0, 1.0),
-            lambda_n_px: factor * kernel.lambda_n_px,
-        }
+        let bent = 2.0 / (PI * PI) * lambda_n_px * Fade(fade_px).inverse();
+        let beyond = 1.0 - kernel.kept_share;
+        // What lies between a window within a pixel and the pixel's rim stays there.
+        let share = if edge_px < LEAST_RADIUS { beyond.min(bent) } else { beyond };
+        Self { share, fade_px, steep: (1.0 - bent / share).clamp(0.0, 1.0), lambda_n_px }
     }
 
     /// Returns a share of the light that begins at a distance, pixels, all of it bent by edges.
     #[cfg(test)]
     pub(crate) fn from_step(share: f64, start_px: f64, lambda_n_px: f64) -> Self {
         Self { share, fade_px: [start_px; 2], steep: 0.0, lambda_n_px }
-    }
-
-    /// Returns what lies beyond between two bands: share times distance, which stands for the halo far out, and the window are linear there.
-    pub(crate) fn between(below: Self, above: Self, fraction: f64) -> Self {
-        let mix = |below: f64, above: f64| below + fraction * (above - below);
-        let fade_px = [0, 1].map(|end| mix(below.fade_px[end], above.fade_px[end]));
-        let far = |beyond: &Self| beyond.share / Fade(beyond.fade_px).inverse();
-        let share = mix(far(&below), far(&above)) * Fade(fade_px).inverse();
-        let (steep, lambda_n_px) = (mix(below.steep, above.steep), mix(below.lambda_n_px, above.lambda_n_px));
-        Self { share, fade_px, steep, lambda_n_px }
     }
 
     /// Returns the light of a point of light 1 that lies at a distance from it, for a pixel of the film, were the pupil round and nothing else seen.

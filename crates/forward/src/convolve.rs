@@ -2,7 +2,7 @@
 
 use std::{cell::RefCell, collections::HashMap, rc::Rc, sync::Arc};
 
-use dioptric_fft::{Complex, Fft, Planner, RealToComplex};
+use dioptric_fft::{Complex, ComplexToReal, Fft, Planner, RealToComplex};
 use multiversion::multiversion;
 
 /// Rows transformed or turned together, so that the transpose writes whole cache lines.
@@ -29,6 +29,7 @@ pub(crate) fn fast_size(n: usize) -> usize {
 struct Plans {
     size: usize,
     real_forward: Arc<dyn RealToComplex<f32>>,
+    real_inverse: Arc<dyn ComplexToReal<f32>>,
     forward: Arc<dyn Fft<f32>>,
     inverse: Arc<dyn Fft<f32>>,
 }
@@ -38,6 +39,7 @@ impl Plans {
         Self {
             size,
             real_forward: planner.real_forward(size),
+            real_inverse: planner.real_inverse(size),
             forward: planner.forward(size),
             inverse: planner.inverse(size),
         }
@@ -46,6 +48,7 @@ impl Plans {
     fn scratch_len(&self) -> usize {
         self.real_forward
             .get_scratch_len()
+            .max(self.real_inverse.get_scratch_len())
             .max(self.forward.get_inplace_scratch_len())
             .max(self.inverse.get_inplace_scratch_len())
     }
@@ -168,6 +171,32 @@ impl Fft2 {
             }
         }
         self.down.forward.process_with_scratch(spectrum, scratch);
+    }
+
+    /// Returns the first rows and columns of the rectangle of a spectrum as [`Fft2::forward`] gives it, times the number of its samples, and leaves the spectrum
+    /// in disorder.
+    pub(crate) fn inverse(&mut self, spectrum: &mut [Complex<f32>], (rows, columns): (usize, usize)) -> Vec<f32> {
+        let (size, n_half) = (self.down.size, self.across.size / 2 + 1);
+        let Work { row, half, scratch } = &mut self.work;
+        self.down.inverse.process_with_scratch(spectrum, scratch);
+        let mut block = Vec::with_capacity(rows * columns);
+        for first in (0..rows).step_by(BATCH) {
+            let n_rows = BATCH.min(rows - first);
+            for (k, column) in spectrum.chunks_exact(size).enumerate() {
+                for (i, value) in column[first..][..n_rows].iter().enumerate() {
+                    half[i * n_half + k] = *value;
+                }
+            }
+            for half in half.chunks_exact_mut(n_half).take(n_rows) {
+                // Real but for rounding: the mean, and the highest frequency of an even number.
+                half[0].im = 0.0;
+                half[n_half - 1].im = 0.0;
+                let transform = &self.across.real_inverse;
+                transform.process_with_scratch(half, row, scratch).expect("lengths are those of the plan");
+                block.extend_from_slice(&row[..columns]);
+            }
+        }
+        block
     }
 }
 

@@ -108,8 +108,10 @@ impl Imaging {
         let through = |sight| Visible::through(sight, (&tiling.layers, &kernels.by_layer), film, work.cancel());
         let visible = sight.map(through).transpose()?;
         let looked_up = few_of(&scene.kernel_bands).map(|band| (band, grid.centers_nm()[band]));
-        let halos =
-            Halos::of((lens, layers), (film, settings.widest_blur_px), &looked_up.collect::<Vec<_>>(), grid.len());
+        let of_points = points.iter().flatten().map(|point| point.seen_at().1);
+        let depths_dioptres: Vec<f64> = layers.dioptres().iter().copied().chain(of_points).collect();
+        let on_film = (film, settings.widest_blur_px);
+        let halos = Halos::of(lens, &depths_dioptres, on_film, &looked_up.collect::<Vec<_>>());
         let mut kept = Kept { budget_bytes: USUAL_BYTES, ..Kept::default() };
         kept.keep(middle, &kernels);
         Ok(Self {
@@ -137,6 +139,7 @@ impl Imaging {
         self.blocks.size_bytes()
             + self.visible.as_ref().map_or(0, Visible::size_bytes)
             + self.tiling.size_bytes()
+            + self.halos.size_bytes()
             + self.kept().size_bytes
     }
 
@@ -252,7 +255,7 @@ impl Imaging {
         const HALO_PLANES: usize = 4;
         let m = beside(&self.spec.film);
         let wide = (rows + 2 * m) * (columns + 2 * m);
-        let halos = if self.halos.are_any() { HALO_PLANES * wide + self.halos.star_values(wide) } else { 0 };
+        let halos = if self.halos.are_any() { HALO_PLANES * wide + Halos::values(wide) } else { 0 };
         let planes = PLANES * (rows * columns).max(scene_rows * scene_columns) + halos;
         size_of::<f32>() * planes + self.kernel_bytes
     }

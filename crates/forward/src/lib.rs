@@ -47,7 +47,6 @@ mod sight;
 mod source;
 mod spec;
 mod splines;
-mod stars;
 mod stopwatch;
 mod surface;
 mod surroundings;
@@ -56,6 +55,7 @@ mod tile;
 mod tiling;
 mod views;
 mod visible;
+mod wing;
 mod work;
 
 #[cfg(test)]

@@ -172,7 +172,7 @@ const MOST_KERNELS: usize = 256;
 /// Change of blur radius between points that share a kernel, pixels.
 const BLUR_STEP_PX: f64 = 0.5;
 /// Cells of a kernel: an eighth of a pixel, or more where there would be more of them along its spread.
-const LEAST_CELL_PX: f64 = 0.125;
+pub(crate) const LEAST_CELL_PX: f64 = 0.125;
 const CELLS: f64 = 32.0;
 
 impl Drawing<'_> {

@@ -33,15 +33,6 @@ pub(crate) fn halved(picture: &Array2<f32>) -> Array2<f32> {
     means
 }
 
-/// Returns the means of a line, as [`halved`] has them.
-pub(crate) fn halved_line(line: &[f32]) -> Vec<f32> {
-    let mean = |i: usize| {
-        let pixels = WEIGHTS.iter().enumerate();
-        pixels.filter_map(|(k, weight)| Some(weight * line.get((2 * i + k).checked_sub(3)?)?)).sum()
-    };
-    (0..n_halved(line.len())).map(mean).collect()
-}
-
 const WEIGHTS: [f32; 4] = [0.125, 0.375, 0.375, 0.125];
 
 /// Returns a plane on pixels half as wide, by quadratic splines: ¾ of the wider pixel and ¼ of the next, each way.
@@ -50,7 +41,7 @@ pub(crate) fn doubled(plane: &Array2<f32>, (rows, columns): (usize, usize)) -> A
     Array2::from_shape_vec((rows, columns), values).expect("it has a value for each pixel")
 }
 
-pub(crate) fn doubled_row(plane: &Array2<f32>, row: usize, columns: usize) -> Vec<f32> {
+fn doubled_row(plane: &Array2<f32>, row: usize, columns: usize) -> Vec<f32> {
     let own = row / 2 + MARGIN;
     let next = if row.is_multiple_of(2) { own - 1 } else { own + 1 };
     let mut line = Vec::with_capacity(plane.ncols());

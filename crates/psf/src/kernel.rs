@@ -49,23 +49,21 @@ impl Kernel {
         [(self.edge_px - FADE * self.lambda_n_px).max(0.0), self.edge_px]
     }
 
-    /// Returns the kernel of light with this λN, faded out for it along circles that hold what rays make of it, which reach so far.
-    pub(crate) fn faded_out(mut self, lambda_n_px: f64, reach_px: f64) -> Self {
-        self.lambda_n_px = lambda_n_px;
-        if lambda_n_px <= 0.0 {
-            return self;
-        }
-        let side = self.samples.nrows();
-        self.edge_px = (0.5 * side as f64).max(reach_px + FADE * lambda_n_px);
-        let [start, end] = self.fade_px();
-        let from_middle = |i: usize| i as f64 - 0.5 * (side as f64 - 1.0);
-        for ((row, column), sample) in self.samples.indexed_iter_mut() {
-            let radius = from_middle(row).hypot(from_middle(column));
+    /// Returns the kernel of light with this λN, faded out for it up to a circle about the middle, or the pixels on that, in the square about it.
+    pub(crate) fn faded_out(self, lambda_n_px: f64, edge_px: f64) -> Self {
+        let mut kernel = Self { lambda_n_px, edge_px: edge_px + std::f64::consts::FRAC_1_SQRT_2, ..self };
+        let beside = kernel.samples.nrows() / 2;
+        let kept = beside.min((kernel.edge_px - 0.5).ceil() as usize);
+        let within = beside - kept..=beside + kept;
+        kernel.samples = kernel.samples.slice_move(s![within.clone(), within]);
+        let [start, end] = kernel.fade_px();
+        for ((row, column), sample) in kernel.samples.indexed_iter_mut() {
+            let radius = (row as f64 - kept as f64).hypot(column as f64 - kept as f64);
             if radius > start {
                 *sample *= ((end - radius) / (end - start)).max(0.0) as f32;
             }
         }
-        self
+        kernel
     }
 
     /// The share of the energy that the window holds.

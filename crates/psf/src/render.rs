@@ -17,10 +17,8 @@ use crate::{
 
 /// Half the side of the largest window, pixels.
 const MOST_PIXELS: f64 = 600.0;
-/// Of what the window of a diffracted picture holds, the share that is kept when the window is trimmed; of one without tails, all but what is negligible.
-const KEPT_OF_TAILS: f64 = 0.999;
 /// How far diffraction's tails are followed beyond the geometric picture, in units of λN.
-const TAILS: f64 = 12.0;
+const TAILS: f64 = 11.0;
 /// Parts of a pixel, each way, on which light is drawn that hardly reaches beyond it: an odd number, so that one lies in the middle.
 pub(crate) const PARTS: usize = 3;
 /// How far from the middle light and λN together may reach to be drawn so, pixels.
@@ -170,10 +168,14 @@ impl<'a> Layout<'a> {
         }
     }
 
-    /// Returns drawn energies of the window as a kernel, trimmed to what matters.
+    /// Returns drawn energies of the window as a kernel: as far as tails are followed, or without those trimmed to what matters.
     pub(crate) fn kernel(&self, energies: &Array2<f64>, pitch_um: f64) -> Kernel {
-        let kept = if self.lambda_n_px > 0.0 { KEPT_OF_TAILS } else { 1.0 - Kernel::NEGLIGIBLE };
-        let kernel = Kernel::centered(trim(energies, kept), pitch_um).faded_out(self.lambda_n_px, self.radius);
+        let kernel = if self.lambda_n_px > 0.0 {
+            let edge_px = self.radius + TAILS * self.lambda_n_px;
+            Kernel::centered(energies.mapv(|e| e as f32), pitch_um).faded_out(self.lambda_n_px, edge_px)
+        } else {
+            Kernel::centered(trim(energies, 1.0 - Kernel::NEGLIGIBLE), pitch_um)
+        };
         Kernel { middle_px: self.middle_px, ..kernel }
     }
 }

@@ -1,20 +1,14 @@
-//! Stars: what diffraction takes beyond the windows of kernels, where the pupil is not round.
+//! Wings: what diffraction takes beyond the window of the kernel of a point.
 //!
-//! Each piece of an edge bends light across itself, as much as it is long, and as far as a round edge does (`docs/forward.md`, 2). Straight edges
-//! make spikes, as wide as light from a slit of their length; round ones fans. A picture is convolved with the star of a point, by transforms.
+//! Each piece of an edge of the pupil bends light across itself, as much as it is long (`docs/forward.md`, 2). Straight edges make spikes, as wide as light
+//! from a slit of their length; round ones fans, a circle a round wing.
 
 use std::f64::consts::PI;
 
-use dioptric_fft::Complex;
 use dioptric_psf::PupilEdges;
-use ndarray::Array2;
 use rayon::prelude::*;
 
-use crate::{
-    beyond::{Beyond, POINTS},
-    convolve::{fast_size, multiply_by_real, with_fft},
-    splines::{doubled, halved},
-};
+use crate::beyond::{Beyond, POINTS};
 
 /// Directions in a half turn in which light is counted.
 const DIRECTIONS: usize = 4096;
@@ -31,6 +25,11 @@ pub(crate) struct Directions {
 }
 
 impl Directions {
+    /// Of a round pupil: all alike.
+    pub(crate) fn round() -> Self {
+        Self { per_rad: vec![0.5 / PI; DIRECTIONS], width_lambda_n: 0.0 }
+    }
+
     pub(crate) fn of(edges: &PupilEdges) -> Self {
         let mut lengths = vec![0.0; DIRECTIONS];
         let per_rad = DIRECTIONS as f64 / PI;
@@ -73,69 +72,20 @@ impl Directions {
     }
 }
 
-/// The star of a point of light 1 in a band.
-pub(crate) struct Star<'a> {
+/// The wing of a point of light 1 in a band, of sum 1.
+pub(crate) struct Wing<'a> {
     directions: &'a Directions,
     beyond: &'a Beyond,
 }
 
-/// Pixels of a picture beyond which stars are drawn on pixels twice as wide, or four times, …
-const MOST_PIXELS: usize = 1 << 21;
-
-/// Returns how many values stars about a picture of so many pixels take: its transform on four times as many, before and after, and half as many
-/// of the star and of its transform.
-pub(crate) fn values(n_pixels: usize) -> usize {
-    4 * (2 * 2 + 1 + 1) * n_pixels.min(MOST_PIXELS)
-}
-
-impl<'a> Star<'a> {
+impl<'a> Wing<'a> {
     pub(crate) fn new(directions: &'a Directions, beyond: &'a Beyond) -> Self {
         Self { directions, beyond }
     }
 
-    /// Returns what stars about the pixels of a picture bring to each, and what of those of a picture of ones lands there: right where pixels lie
-    /// `beside` its edges or more.
-    pub(crate) fn about(&self, picture: &Array2<f32>, beside: usize) -> [Array2<f32>; 2] {
-        self.on_pixels([picture.clone(), Array2::ones(picture.dim())], beside, 0)
-    }
-
-    /// Returns pictures convolved with the star, on pixels that are doubled so many times.
-    fn on_pixels(&self, pictures: [Array2<f32>; 2], beside: usize, doublings: i32) -> [Array2<f32>; 2] {
-        let (rows, columns) = pictures[0].dim();
-        if rows * columns > MOST_PIXELS {
-            let wide = pictures.map(|picture| halved(&picture));
-            return self.on_pixels(wide, beside / 2, doublings + 1).map(|wide| doubled(&wide, (rows, columns)));
-        }
-        // From one pixel that is wanted to the farthest other; what lies farther comes around.
-        let reach = (rows - beside, columns - beside);
-        let size = (fast_size(2 * reach.0), fast_size(2 * reach.1));
-        let star = self.rectangle(reach, size, f64::from(doublings).exp2());
-        with_fft(size, |fft| {
-            let mut factors = Vec::new();
-            fft.forward(&star, size.1, &mut factors);
-            let mut lines = vec![Complex::new(0.0, 0.0); rows * size.1];
-            for (line, both) in
-                lines.chunks_exact_mut(size.1).zip(pictures[0].rows().into_iter().zip(pictures[1].rows()))
-            {
-                let both = both.0.into_iter().zip(both.1);
-                line.iter_mut().zip(both).for_each(|(value, (one, other))| *value = Complex::new(*one, *other));
-            }
-            let mut spectrum = vec![Complex::new(0.0, 0.0); fft.len()];
-            fft.forward_pair(&mut lines, &mut spectrum);
-            multiply_by_real(&mut spectrum, &factors, fft.rows());
-            fft.inverse_pair(&mut spectrum, &mut lines);
-            let scale = (fft.len() as f32).recip();
-            let at = |(row, column): (usize, usize)| lines[row * size.1 + column] * scale;
-            [
-                Array2::from_shape_fn((rows, columns), |place| at(place).re),
-                Array2::from_shape_fn((rows, columns), |place| at(place).im),
-            ]
-        })
-    }
-
-    /// Returns the star about the first value of a rectangle of so many rows and columns that goes on around its edges, on pixels so many times as wide
+    /// Returns the wing about the first value of a rectangle of so many rows and columns that goes on around its edges, on pixels so many times as wide
     /// as the film's.
-    fn rectangle(&self, reach: (usize, usize), size: (usize, usize), wide: f64) -> Vec<f32> {
+    pub(crate) fn rectangle(&self, reach: (usize, usize), size: (usize, usize), wide: f64) -> Vec<f32> {
         let mut values = vec![0.0; size.0 * size.1];
         let pixel = self.pixel(reach.0.max(reach.1), wide);
         let (lower, upper) = values.split_at_mut(reach.0 * size.1);
@@ -158,9 +108,9 @@ impl<'a> Star<'a> {
         values
     }
 
-    /// Returns what gives the part of a star on a pixel, so many below and to the right of its middle, up to a distance; pixels are so many times as wide
+    /// Returns what gives the part of a wing on a pixel, so many below and to the right of its middle, up to a distance; pixels are so many times as wide
     /// as the film's.
-    fn pixel(&self, reach: usize, wide: f64) -> impl Fn(f64, f64) -> f64 + Sync {
+    fn pixel(&self, reach: usize, wide: f64) -> impl Fn(f64, f64) -> f64 + Sync + use<'a> {
         // No spike is narrower than a pixel.
         let width_px = (self.directions.width_lambda_n * self.beyond.lambda_n_px / wide).max(1.0);
         let n_levels = (reach as f64 * 2_f64.sqrt()).log2().ceil().max(0.0) as usize + 2;
@@ -255,8 +205,8 @@ mod tests {
         let beyond = Beyond::from_step(share, start / pixel, 1.0 / pixel);
         let reach = 130;
         let directions = Directions::of(&edges(5.0));
-        let star = Star::new(&directions, &beyond);
-        let of_pixel = star.pixel(reach, 1.0);
+        let wing = Wing::new(&directions, &beyond);
+        let of_pixel = wing.pixel(reach, 1.0);
         let drawn = |place: DVec2| share * of_pixel(-place.y / pixel, place.x / pixel) / (pixel * pixel);
         for between in [[14.0, 30.0], [30.0, 60.0]] {
             let (exact, drawn) = (exact(between), ring(&drawn, between, pixel));
@@ -273,7 +223,7 @@ mod tests {
         }
     }
 
-    /// Of a round edge a star is a round halo.
+    /// Of a round edge a star is a round wing.
     #[test]
     fn stars_of_round_edges_are_round() {
         let piece = |i: i32| {
@@ -282,25 +232,11 @@ mod tests {
         };
         let edges = PupilEdges { pieces: (0..360).map(piece).collect(), diameter_mm: 360.0 / PI };
         let beyond = Beyond::from_step(0.01, 5.0, 0.5);
-        let directions = Directions::of(&edges);
-        let (density, at) = (beyond.density(), DVec2::new(31.0, 28.0));
-        let mut picture = Array2::zeros((60, 70));
-        picture[(28, 31)] = 2.0;
-        let [brought, _] = Star::new(&directions, &beyond).about(&picture, 0);
-        for ((row, column), light) in brought.indexed_iter() {
-            let r = DVec2::new(column as f64, row as f64).distance(at);
-            if r > 8.0 {
-                let ratio = f64::from(*light) / (2.0 * density(r));
-                assert!((ratio - 1.0).abs() < 0.01, "{row} {column}: {ratio}");
-            }
-        }
-        // What an even picture brings is what lands of it, also on wider pixels.
-        for size in [(60, 70), (1500, 1430)] {
-            let [brought, landing] = Star::new(&directions, &beyond).about(&Array2::from_elem(size, 3.0), 8);
-            let inner = ndarray::s![8..size.0 - 8, 8..size.1 - 8];
-            for (brought, landing) in brought.slice(inner).iter().zip(landing.slice(inner)) {
-                assert!((brought - 3.0 * landing).abs() < 1e-5 && (0.3..1.01).contains(landing), "{brought} {landing}");
-            }
+        let (pieces, round) = (Directions::of(&edges), Directions::round());
+        let [of_pieces, of_round] = [&pieces, &round].map(|directions| Wing::new(directions, &beyond).pixel(80, 1.0));
+        for place in (0..900).map(|i| DVec2::from_angle(0.1 * f64::from(i)) * (6.0 + 0.08 * f64::from(i))) {
+            let ratio = of_pieces(place.y, place.x) / of_round(place.y, place.x);
+            assert!((ratio - 1.0).abs() < 1e-3, "{place}: {ratio}");
         }
     }
 }
