@@ -2,7 +2,7 @@
 
 use std::{io::Read, path::Path};
 
-use dioptric_pictures::{Curve, DynamicImage, ImageError, StatedColors, read_reduced, size_of};
+use dioptric_pictures::{Curve, DynamicImage, ImageError, StatedColors, orientation_of, read_reduced, size_of};
 use dioptric_spectrum::{Display, Quantity, SpectralImage, WavelengthGrid, srgb_decode, srgb_encode};
 use image::metadata::Orientation;
 use ndarray::Array2;
@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use super::{
     contents::is_of,
-    picture_parts::{note_on_exif, note_on_exif_colors, orientation_of, unknown_parts},
+    picture_parts::{note_on_exif, note_on_exif_colors, unknown_parts},
     primaries::into_srgb,
     spectral_exr::{NamedPlanes, notes_on_planes_exr, read_planes_and_primaries_exr},
     stated::{Noted, name_of, note_of},
