@@ -293,6 +293,11 @@ mod tests {
             let found = read(name, words);
             assert!(found.as_ref().is_ok_and(|depth| depth.kind == kind), "{name}, {words}: {:?}", found.err());
         }
+        let millimetres = read("depth", "depth in mm").unwrap();
+        assert_eq!(millimetres.unit, DepthUnit::Metres(1e-3));
+        assert!(!millimetres.notes.iter().any(|note| note.contains("long_name")), "{:?}", millimetres.notes);
+        let notes = read("depth", "depth in mm or km").unwrap().notes;
+        assert!(notes.iter().any(|note| note.contains("long_name")), "{notes:?}");
         for (name, words) in [("depth", "inverse depth"), ("disparity", "")] {
             let message = read(name, words).err().unwrap().to_string();
             assert!(message.contains("--depth-kind"), "{message}");
