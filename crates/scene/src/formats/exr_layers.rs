@@ -169,10 +169,11 @@ pub(super) fn read_layers(path: &Path) -> Result<(Head, Vec<RawLayer>), SceneErr
         .from_buffered(BufReader::new(open()?))
         .map_err(|error| unreadable(path, explain(&error)))?;
     let layers: Result<Vec<_>, _> = image.layer_data.into_iter().map(|layer| raw_layer(path, layer)).collect();
-    let layers = layers?;
-    if layers.is_empty() {
-        return Err(unreadable(path, "it has no layer"));
-    }
+    let mut layers = layers?;
+    let Some(first) = layers.first_mut() else { return Err(unreadable(path, "it has no layer")) };
+    // What the crate takes for an attribute of all layers by its type.
+    let of_all = image.attributes.other.keys().map(|name| (words_of(name), ())).collect();
+    first.attributes.others.merge(Stated::new("attribute", of_all));
     let window = image.attributes.display_window;
     let aspect = f64::from(image.attributes.pixel_aspect);
     if !(aspect.is_finite() && aspect > 0.0) {
@@ -261,6 +262,11 @@ fn explain(error: &exr::error::Error) -> String {
     // The crate turns the end of a file into these words.
     if text.contains("reference to missing bytes") {
         return "the file ends too early (truncated)".to_owned();
+    }
+    if text.contains("channel names are not sorted") {
+        return "its channels do not stand in the order of their names, as OpenEXR has them, so that whose samples are whose is not known: \
+                expected it written anew"
+            .to_owned();
     }
     format!("no OpenEXR file that can be read ({text})")
 }
