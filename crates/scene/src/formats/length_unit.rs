@@ -6,6 +6,7 @@ pub(super) fn length_m(unit: &str) -> Option<f64> {
         "m" | "meter" | "meters" | "metre" | "metres" => 1.0,
         "cm" | "centimeter" | "centimeters" | "centimetre" | "centimetres" => 1e-2,
         "mm" | "millimeter" | "millimeters" | "millimetre" | "millimetres" => 1e-3,
+        "um" | "µm" | "micrometer" | "micrometers" | "micrometre" | "micrometres" => 1e-6,
         "km" | "kilometer" | "kilometers" | "kilometre" | "kilometres" => 1e3,
         "ft" | "foot" | "feet" => 0.3048,
         _ => return None,
