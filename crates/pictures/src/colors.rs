@@ -43,6 +43,18 @@ impl StatedColors {
     /// # Errors
     /// When the colors cannot be converted to linear light: the reason, which a sentence can go on with after the file's name.
     pub fn of(path: &Path) -> Result<Option<Self>, String> {
+        Ok(Self::stated(path)?.filter(|own| !own.are_srgb()))
+    }
+
+    /// Returns what a file of floats states, be it sRGB: `None` where it says nothing, and its numbers go with light.
+    ///
+    /// # Errors
+    /// As [`of`](Self::of).
+    pub fn of_floats(path: &Path) -> Result<Option<Self>, String> {
+        Self::stated(path)
+    }
+
+    fn stated(path: &Path) -> Result<Option<Self>, String> {
         let Ok(reader) = open(path) else { return Ok(None) };
         let format = reader.format();
         if format == Some(ImageFormat::Png) {
@@ -95,6 +107,22 @@ impl StatedColors {
         self.curves.as_ref().map_or(f64::from(code) / TOP, |curves| curves[channel][usize::from(code)])
     }
 
+    /// Makes samples of a channel, 0 to 1 or beyond, light: below 0 as above it, above 1 by the power that the curve ends with.
+    pub fn make_light(&self, channel: usize, samples: &mut [f32]) {
+        let Some(curve) = self.curves.as_ref().map(|curves| &curves[channel]) else { return };
+        const LAST: usize = 65_535;
+        /// What the power is taken over, codes.
+        const STEP: usize = 655;
+        let power = (curve[LAST] / curve[LAST - STEP]).ln() / (TOP / (LAST - STEP) as f64).ln();
+        for sample in samples.iter_mut().filter(|sample| sample.is_finite()) {
+            let size = f64::from(sample.abs());
+            let at = TOP * size.min(1.0);
+            let below = (at as usize).min(LAST - 1);
+            let within = curve[below] + (at - below as f64) * (curve[below + 1] - curve[below]);
+            *sample = (within * size.max(1.0).powf(power)).copysign(f64::from(*sample)) as f32;
+        }
+    }
+
     /// Returns the code whose light in the green channel is nearest.
     pub fn code(&self, light: f64) -> u16 {
         let Some(curves) = &self.curves else { return (TOP * light.clamp(0.0, 1.0)).round() as u16 };
@@ -140,21 +168,24 @@ impl StatedColors {
         Self::made(name, [r, g, b], matrix)
     }
 
-    /// Returns colors of these curves, unless they are those of sRGB.
+    /// Returns colors of these curves.
     fn made(name: String, curves: [Vec<f64>; 3], matrix: Matrix3d) -> Result<Option<Self>, String> {
         let is_finite = matrix.v.iter().flatten().chain(curves.iter().flatten()).all(|v| v.is_finite());
         if !is_finite {
             return Err(format!("has {name} that leads to no colors"));
         }
-        let is_unit = (0..3).all(|i| (0..3).all(|j| (matrix.v[i][j] - f64::from(u8::from(i == j))).abs() < SAME));
-        let is_srgb = curves.iter().all(|curve| {
-            curve
-                .iter()
-                .enumerate()
-                .step_by(257)
-                .all(|(code, light)| (light - srgb_light(code as f64 / TOP)).abs() < SAME)
-        });
-        Ok((!(is_unit && is_srgb)).then(|| Self { name, curves: Some(Box::new(curves)), to_srgb: matrix.v }))
+        Ok(Some(Self { name, curves: Some(Box::new(curves)), to_srgb: matrix.v }))
+    }
+
+    /// Whether they are those of sRGB, as far as a profile's fractions tell.
+    fn are_srgb(&self) -> bool {
+        let m = &self.to_srgb;
+        let is_unit = (0..3).all(|i| (0..3).all(|j| (m[i][j] - f64::from(u8::from(i == j))).abs() < SAME));
+        let is_curve = |curve: &Vec<f64>| {
+            let mut lights = curve.iter().enumerate().step_by(257);
+            lights.all(|(code, light)| (light - srgb_light(code as f64 / TOP)).abs() < SAME)
+        };
+        is_unit && self.curves.as_ref().is_some_and(|curves| curves.iter().all(is_curve))
     }
 }
 

@@ -28,6 +28,8 @@ const DESCRIPTION: u16 = 270;
 const PHOTOMETRIC: u16 = 262;
 /// What of it is decoded, and a depth map.
 const KNOWN_MARKS: [u64; 11] = [0, 1, 2, 3, 4, 5, 6, 8, 9, 10, 51_177];
+/// The tag of an ICC profile.
+const PROFILE: u16 = 34_675;
 /// Pages of a file.
 const LIMIT_PAGES: usize = 10_000;
 
@@ -249,6 +251,9 @@ fn pages_of(path: &Path, wanted: TiffAs) -> Result<Pages, SceneError> {
             let reason = format!("it holds {what}, expected gray or red, green and blue: convert it to sRGB");
             return Err(unreadable(path, reason));
         }
+        // A picture is in the colors of its profile; bands and depths are numbers.
+        let is_picture = !page.is_stack() && matches!(wanted, TiffAs::Marked | TiffAs::Planes(None));
+        page.unknown.retain(|tag| *tag != PROFILE || !is_picture);
         unknown.extend(page.unknown.iter().map(ToString::to_string));
         let first = pages.first().map(|(first, _)| first);
         let is_like = first.is_none_or(|first| first.size == page.size && first.n_samples == page.n_samples);
