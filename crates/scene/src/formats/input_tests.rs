@@ -10,7 +10,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::{FileQuantity, FileReading, NoData, ReadOptions, read_scene};
-use crate::{Scene, SceneError};
+use crate::Scene;
 
 /// What the finding's command line says of each file.
 fn usual() -> ReadOptions {
