@@ -24,6 +24,8 @@ const USED_CHUNKS: [&[u8; 4]; 16] = [
     b"IHDR", b"PLTE", b"IDAT", b"IEND", b"tRNS", b"gAMA", b"cHRM", b"sRGB", b"iCCP", b"cICP", b"sBIT", b"bKGD",
     b"hIST", b"tIME", b"eXIf", b"sPLT",
 ];
+/// Those of them that say what the codes are.
+const COLOR_CHUNKS: [&[u8; 4]; 5] = [b"gAMA", b"cHRM", b"sRGB", b"iCCP", b"cICP"];
 /// Words of text chunks that change nothing (PNG, third edition, 11.3.3.1), and those of common programs.
 const USUAL_WORDS: [&str; 14] = [
     "Title",
@@ -304,7 +306,7 @@ fn of_webp(file: &mut (impl Read + Seek)) -> std::io::Result<Vec<String>> {
 }
 
 fn of_png(file: &mut (impl Read + Seek)) -> std::io::Result<Vec<String>> {
-    let (mut names, mut n_bits, mut n_opaque) = (vec![], 0, 0);
+    let (mut names, mut n_bits, mut n_opaque, mut known) = (vec![], 0, 0, vec![]);
     for _ in 0..MOST_PARTS {
         let mut head = [0; 8];
         if file.read_exact(&mut head).is_err() {
@@ -342,9 +344,17 @@ fn of_png(file: &mut (impl Read + Seek)) -> std::io::Result<Vec<String>> {
             b"pHYs" if content.get(..4) != content.get(4..8) => names.push(format!("pHYs ({NOT_SQUARE})")),
             b"pHYs" => {}
             b"IEND" => break,
+            // The first counts, before the pixels.
+            kind if COLOR_CHUNKS.contains(&kind) && known.contains(kind) => {
+                names.push(format!("{} (twice, or behind the pixels)", String::from_utf8_lossy(kind)));
+            }
             kind if USED_CHUNKS.contains(&kind) => {}
             kind => names.push(kind.iter().map(|byte| char::from(*byte)).collect()),
         }
+        if kind == *b"IDAT" {
+            known.extend(COLOR_CHUNKS.map(|own| *own));
+        }
+        known.push(kind);
     }
     Ok(names)
 }
@@ -512,10 +522,13 @@ mod tests {
             chunk(b"tEXt", b"exposure\0 2 s"),
             chunk(b"pHYs", &[0, 0, 0, 9, 0, 0, 0, 9, 1]),
             chunk(b"zoRp", b"xx"),
+            chunk(b"sRGB", b"\0"),
+            chunk(b"IDAT", b""),
+            chunk(b"gAMA", &[0, 0, 0, 1]),
             chunk(b"acTL", &[0; 8]),
             chunk(b"IEND", b""),
         ];
-        assert_eq!(named(&png.concat()), ["acTL", "text 'exposure'", "zoRp"]);
+        assert_eq!(named(&png.concat()), ["acTL", "gAMA (twice, or behind the pixels)", "text 'exposure'", "zoRp"]);
         let telling = [
             b"\x89PNG\r\n\x1a\n".to_vec(),
             chunk(b"tEXt", b"Comment\0depth in mm, 1000 a metre"),
