@@ -10,7 +10,7 @@ use exr::prelude::f16;
 use hdf5_pure::{AttrValue, DType, Dataset, Datatype, DatatypeByteOrder, File, FloatingPointLayout, Group};
 
 use super::{
-    super::{stated::tells, unusable::said},
+    super::unusable::said,
     dimensions::Dimensions,
     elements::{self, LIMIT_ARRAYS, LIMIT_DEPTH, Listed},
     links::take_links,
@@ -245,7 +245,7 @@ fn telling(
     ];
     let is_telling = |name: &str, value: &Value| {
         let is_harmless = HARMLESS.contains(&name) || name.starts_with("MATLAB_") || name.starts_with("_Net");
-        !is_harmless || matches!(value, Value::Text(text) if tells(text))
+        !is_harmless || matches!(value, Value::Text(text) if super::super::stated::tells(text))
     };
     let value_of = |value: AttrValue| match (value.to_f64s(), value.to_i64s(), value.as_str()) {
         (Some(numbers), ..) => Value::Numbers(numbers),
