@@ -43,6 +43,18 @@ impl StatedColors {
     /// # Errors
     /// When the colors cannot be converted to linear light: the reason, which a sentence can go on with after the file's name.
     pub fn of(path: &Path) -> Result<Option<Self>, String> {
+        Ok(Self::stated(path)?.filter(|own| !own.are_srgb()))
+    }
+
+    /// Returns what a file of floats states, be it sRGB: `None` where it says nothing, and its numbers go with light.
+    ///
+    /// # Errors
+    /// As [`of`](Self::of).
+    pub fn of_floats(path: &Path) -> Result<Option<Self>, String> {
+        Self::stated(path)
+    }
+
+    fn stated(path: &Path) -> Result<Option<Self>, String> {
         let Ok(reader) = open(path) else { return Ok(None) };
         let format = reader.format();
         if format == Some(ImageFormat::Png) {
@@ -51,16 +63,18 @@ impl StatedColors {
         if format == Some(ImageFormat::Bmp) {
             return of_bmp(path);
         }
-        if format == Some(ImageFormat::Jpeg) && colors_of_jpeg(path) == Some(4) {
+        let jpeg = if format == Some(ImageFormat::Jpeg) { JpegHead::of(path) } else { JpegHead::default() };
+        if jpeg.n_colors == Some(4) {
             return Err("holds inks (CMYK), expected gray or red, green and blue; convert it to sRGB".to_owned());
         }
         // Whoever reads the picture says what is wrong with it.
         let Ok(mut decoder) = reader.into_decoder() else { return Ok(None) };
         let own = decoder.icc_profile().ok().flatten();
-        let own = if format == Some(ImageFormat::Tiff) { own.or_else(|| profile_of_tiff(path)) } else { own };
+        let own = if own.is_none() && format == Some(ImageFormat::Tiff) { profile_of_tiff(path)? } else { own };
         let profile = own.filter(|profile| !profile.is_empty());
         match profile {
             Some(profile) => Self::of_icc(&profile),
+            None if jpeg.states_profile => Err(damaged("an ICC profile")),
             None => {
                 let exif = decoder.exif_metadata().ok().flatten();
                 let is_adobe = exif.as_deref().is_some_and(|bytes| Exif::of_bytes(bytes).is_adobe_rgb());
@@ -93,6 +107,22 @@ impl StatedColors {
         self.curves.as_ref().map_or(f64::from(code) / TOP, |curves| curves[channel][usize::from(code)])
     }
 
+    /// Makes samples of a channel, 0 to 1 or beyond, light: below 0 as above it, above 1 by the power that the curve ends with.
+    pub fn make_light(&self, channel: usize, samples: &mut [f32]) {
+        let Some(curve) = self.curves.as_ref().map(|curves| &curves[channel]) else { return };
+        const LAST: usize = 65_535;
+        /// What the power is taken over, codes.
+        const STEP: usize = 655;
+        let power = (curve[LAST] / curve[LAST - STEP]).ln() / (TOP / (LAST - STEP) as f64).ln();
+        for sample in samples.iter_mut().filter(|sample| sample.is_finite()) {
+            let size = f64::from(sample.abs());
+            let at = TOP * size.min(1.0);
+            let below = (at as usize).min(LAST - 1);
+            let within = curve[below] + (at - below as f64) * (curve[below + 1] - curve[below]);
+            *sample = (within * size.max(1.0).powf(power)).copysign(f64::from(*sample)) as f32;
+        }
+    }
+
     /// Returns the code whose light in the green channel is nearest.
     pub fn code(&self, light: f64) -> u16 {
         let Some(curves) = &self.curves else { return (TOP * light.clamp(0.0, 1.0)).round() as u16 };
@@ -102,8 +132,7 @@ impl StatedColors {
     }
 
     fn of_icc(bytes: &[u8]) -> Result<Option<Self>, String> {
-        let profile = ColorProfile::new_from_slice(bytes)
-            .map_err(|error| format!("has an ICC profile that cannot be read: {error}"))?;
+        let profile = ColorProfile::new_from_slice(bytes).map_err(|_| damaged("an ICC profile"))?;
         let name = profile.description.as_ref().and_then(text_of).filter(|name| !name.trim().is_empty());
         let name = name.map_or_else(
             || "an ICC profile without a name".to_owned(),
@@ -139,27 +168,35 @@ impl StatedColors {
         Self::made(name, [r, g, b], matrix)
     }
 
-    /// Returns colors of these curves, unless they are those of sRGB.
+    /// Returns colors of these curves.
     fn made(name: String, curves: [Vec<f64>; 3], matrix: Matrix3d) -> Result<Option<Self>, String> {
         let is_finite = matrix.v.iter().flatten().chain(curves.iter().flatten()).all(|v| v.is_finite());
         if !is_finite {
             return Err(format!("has {name} that leads to no colors"));
         }
-        let is_unit = (0..3).all(|i| (0..3).all(|j| (matrix.v[i][j] - f64::from(u8::from(i == j))).abs() < SAME));
-        let is_srgb = curves.iter().all(|curve| {
-            curve
-                .iter()
-                .enumerate()
-                .step_by(257)
-                .all(|(code, light)| (light - srgb_light(code as f64 / TOP)).abs() < SAME)
-        });
-        Ok((!(is_unit && is_srgb)).then(|| Self { name, curves: Some(Box::new(curves)), to_srgb: matrix.v }))
+        Ok(Some(Self { name, curves: Some(Box::new(curves)), to_srgb: matrix.v }))
+    }
+
+    /// Whether they are those of sRGB, as far as a profile's fractions tell.
+    fn are_srgb(&self) -> bool {
+        let m = &self.to_srgb;
+        let is_unit = (0..3).all(|i| (0..3).all(|j| (m[i][j] - f64::from(u8::from(i == j))).abs() < SAME));
+        let is_curve = |curve: &Vec<f64>| {
+            let mut lights = curve.iter().enumerate().step_by(257);
+            lights.all(|(code, light)| (light - srgb_light(code as f64 / TOP)).abs() < SAME)
+        };
+        is_unit && self.curves.as_ref().is_some_and(|curves| curves.iter().all(is_curve))
     }
 }
 
 /// Returns the light of a code of 0–1 (IEC 61966-2-1).
 fn srgb_light(code: f64) -> f64 {
     if code <= 0.04045 { code / 12.92 } else { ((code + 0.055) / 1.055).powf(2.4) }
+}
+
+/// Returns what is said of colors that a file states but nobody can read there.
+fn damaged(what: &str) -> String {
+    format!("has {what} that is damaged, or of which parts are missing: save it anew, or as sRGB without")
 }
 
 fn hdr(name: &str) -> String {
@@ -207,6 +244,25 @@ fn of_png(path: &Path) -> Result<Option<StatedColors>, String> {
     let Ok(file) = File::open(path) else { return Ok(None) };
     let Ok(reader) = png::Decoder::new(BufReader::new(file)).read_info() else { return Ok(None) };
     let info = reader.info();
+    // What reads the file leaves out what it cannot read of its chunks.
+    let kinds = chunks_of_png(path);
+    let has_icc = info.icc_profile.is_some();
+    let whole = [
+        (b"cICP", info.coding_independent_code_points.is_some()),
+        (b"iCCP", has_icc),
+        // A profile counts before it, and what reads the file knows so.
+        (b"sRGB", info.srgb.is_some() || has_icc),
+        (b"gAMA", info.gama_chunk.is_some()),
+        (b"cHRM", info.chrm_chunk.is_some()),
+    ];
+    for (kind, is_read) in whole {
+        if !is_read && kinds.contains(kind) {
+            return Err(damaged(&format!("a chunk {} of its colors", String::from_utf8_lossy(kind))));
+        }
+        if is_read && kind != b"gAMA" {
+            break;
+        }
+    }
     if let Some(points) = &info.coding_independent_code_points {
         return of_code_points(points);
     }
@@ -249,6 +305,30 @@ fn of_png(path: &Path) -> Result<Option<StatedColors>, String> {
     StatedColors::made(name, [curve.clone(), curve.clone(), curve], matrix)
 }
 
+/// Returns the kinds of the chunks of a PNG file before its pixels.
+fn chunks_of_png(path: &Path) -> Vec<[u8; 4]> {
+    const SIGNATURE: u64 = 8;
+    const MOST: usize = 10_000;
+    let mut kinds = vec![];
+    let Ok(file) = File::open(path) else { return kinds };
+    let mut file = BufReader::new(file);
+    let mut next = SIGNATURE as i64;
+    while file.seek_relative(next).is_ok() && kinds.len() < MOST {
+        let mut head = [0; 8];
+        if file.read_exact(&mut head).is_err() {
+            break;
+        }
+        let [a, b, c, d, kind @ ..] = head;
+        if kind == *b"IDAT" {
+            break;
+        }
+        kinds.push(kind);
+        // Behind the content stands its checksum.
+        next = i64::from(u32::from_be_bytes([a, b, c, d])) + 4;
+    }
+    kinds
+}
+
 /// Returns the matrix from linear light of primaries and a white to linear sRGB.
 fn matrix_of(white: XyY, primaries: ColorPrimaries) -> Matrix3d {
     let mut profile = ColorProfile::new_srgb();
@@ -288,26 +368,43 @@ fn of_code_points(points: &png::CodingIndependentCodePoints) -> Result<Option<St
 }
 
 /// Returns the profile of a TIFF file, whose field is of bytes, or of bytes of no kind.
-fn profile_of_tiff(path: &Path) -> Option<Vec<u8>> {
+fn profile_of_tiff(path: &Path) -> Result<Option<Vec<u8>>, String> {
     const ICC_PROFILE: usize = 34_675;
     let mut bytes = vec![];
-    PictureFile::open(path).ok()?.read_to_end(&mut bytes).ok()?;
-    let fields = TiffFields::new(&bytes)?;
-    let count = fields.field(fields.first_directory()?, ICC_PROFILE)?;
-    let (n, place) = (fields.number(count, 4)?, fields.number(count + 4, 4)?);
-    bytes.get(place..place.checked_add(n)?).map(<[u8]>::to_vec)
+    let read = PictureFile::open(path).and_then(|mut file| file.read_to_end(&mut bytes));
+    let Some(fields) = TiffFields::new(&bytes).filter(|_| read.is_ok()) else { return Ok(None) };
+    let Some(count) = fields.first_directory().and_then(|first| fields.field(first, ICC_PROFILE)) else {
+        return Ok(None);
+    };
+    let place = fields.number(count, 4).zip(fields.number(count + 4, 4));
+    let profile = place.and_then(|(n, place)| bytes.get(place..place.checked_add(n)?));
+    profile.map(|own| Some(own.to_vec())).ok_or_else(|| damaged("an ICC profile"))
 }
 
-/// Returns how many colors a JPEG file has, by the head of its frame (ITU-T T.81, B.2.2).
-fn colors_of_jpeg(path: &Path) -> Option<usize> {
-    let bytes = std::fs::read(path).ok()?;
-    let mut at = 2;
-    loop {
-        let [0xFF, marker, high, low] = *bytes.get(at..at + 4)? else { return None };
-        // Heads of frames are C0 to CF but for tables of codes and arithmetic (C4, C8, CC).
-        if (0xC0..=0xCF).contains(&marker) && ![0xC4, 0xC8, 0xCC].contains(&marker) {
-            return bytes.get(at + 9).map(|n| usize::from(*n));
+/// What stands in a JPEG file before its pixels.
+#[derive(Default)]
+struct JpegHead {
+    /// How many colors it has, by the head of its frame (ITU-T T.81, B.2.2).
+    n_colors: Option<usize>,
+    /// Whether a segment is a part of a profile (ICC.1:2022, B.4).
+    states_profile: bool,
+}
+
+impl JpegHead {
+    fn of(path: &Path) -> Self {
+        let (bytes, mut head, mut at) = (std::fs::read(path).unwrap_or_default(), Self::default(), 2);
+        while let Some(&[0xFF, marker, high, low]) = bytes.get(at..at + 4) {
+            let content = bytes.get(at + 4..).unwrap_or_default();
+            head.states_profile |= marker == 0xE2 && content.starts_with(b"ICC_PROFILE\0");
+            // Heads of frames are C0 to CF but for tables of codes and arithmetic (C4, C8, CC).
+            if (0xC0..=0xCF).contains(&marker) && ![0xC4, 0xC8, 0xCC].contains(&marker) {
+                head.n_colors = head.n_colors.or(content.get(5).map(|n| usize::from(*n)));
+            }
+            if marker == 0xDA {
+                break;
+            }
+            at += 2 + (usize::from(high) << 8 | usize::from(low));
         }
-        at += 2 + (usize::from(high) << 8 | usize::from(low));
+        head
     }
 }

@@ -4,7 +4,10 @@ use std::path::Path;
 
 use image::ImageDecoder;
 
-use crate::open::open;
+use crate::{
+    open::open,
+    xmp::{number_of, xmp_properties},
+};
 
 /// The fields of a TIFF file or of Exif data, which are one.
 pub(crate) struct TiffFields<'a> {
@@ -82,13 +85,15 @@ pub struct Exif {
 const FILM_DIAGONAL_MM: f64 = 43.266_615;
 
 impl Exif {
-    /// Returns what the Exif data of a PNG, JPEG or WebP file state; nothing of other files.
+    /// Returns what the Exif data of a PNG, JPEG or WebP file state, or else its XMP data, as those of a TIFF; nothing of other files.
     pub fn of(path: &Path) -> Self {
         let decoder = open(path).ok().and_then(|reader| reader.into_decoder().ok());
         let Some(mut decoder) = decoder else { return Self::default() };
         let has_profile = decoder.icc_profile().ok().flatten().is_some_and(|profile| !profile.is_empty());
         let bytes = decoder.exif_metadata().ok().flatten();
         let own = bytes.map_or_else(Self::default, |bytes| Self::of_bytes(&bytes));
+        let xmp = decoder.xmp_metadata().ok().flatten();
+        let own = own.or(&xmp.map_or_else(Self::default, |bytes| Self::of_xmp(&bytes)));
         Self { other_colors: own.other_colors.filter(|_| !has_profile), ..own }
     }
 
@@ -114,6 +119,36 @@ impl Exif {
             gamma: above_0(0xA500),
             other_colors: color_space.filter(|own| *own != 1.0).map(|own| own as u16),
             is_adobe_rgb: color_space == Some(2.0) || color_space == Some(65_535.0) && is_r03,
+        }
+    }
+
+    /// Returns what XMP data state in the words of Exif ("XMP Specification Part 2", 2016, 3.2).
+    fn of_xmp(bytes: &[u8]) -> Self {
+        let all = xmp_properties(bytes);
+        let number = |name: &str| {
+            let own =
+                all.iter().find(|(own, _)| own.strip_prefix("exif:").or(own.strip_prefix("exifEX:")) == Some(name));
+            own.and_then(|(_, text)| number_of(text)).filter(|v| *v > 0.0)
+        };
+        Self {
+            focal_mm: number("FocalLength"),
+            focal_on_film_mm: number("FocalLengthIn35mmFilm"),
+            subject_distance_m: number("SubjectDistance"),
+            gamma: number("Gamma"),
+            other_colors: number("ColorSpace").filter(|own| *own != 1.0).map(|own| own as u16),
+            is_adobe_rgb: false,
+        }
+    }
+
+    /// Takes from another what it does not state itself.
+    fn or(self, other: &Self) -> Self {
+        Self {
+            focal_mm: self.focal_mm.or(other.focal_mm),
+            focal_on_film_mm: self.focal_on_film_mm.or(other.focal_on_film_mm),
+            subject_distance_m: self.subject_distance_m.or(other.subject_distance_m),
+            gamma: self.gamma.or(other.gamma),
+            other_colors: self.other_colors.or(other.other_colors),
+            is_adobe_rgb: self.is_adobe_rgb,
         }
     }
 

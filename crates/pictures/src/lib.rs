@@ -7,6 +7,7 @@ mod exif;
 mod open;
 mod reduced;
 mod tagged;
+mod xmp;
 
 use std::{
     fs,
@@ -20,9 +21,10 @@ use image::{ExtendedColorType, ImageDecoder, ImageReader};
 pub use colors::StatedColors;
 pub use exif::Exif;
 pub use image::{DynamicImage, ImageError, ImageFormat, Limits};
-pub use open::{PictureFile, open};
+pub use open::{PictureFile, open, orientation_of};
 pub use reduced::{Curve, read_reduced};
 pub use tagged::{CodeSpace, encode_in};
+pub use xmp::xmp_properties;
 
 /// Returns the format of a file by its first bytes, or by the extension of its name where they say nothing.
 ///

@@ -1,4 +1,5 @@
-//! Files of pictures as decoders see them: a TIFF file that begins with a thumbnail begins with its first page of full size.
+//! Files of pictures as decoders see them: a TIFF file that begins with a thumbnail begins with its first page of full size, a Radiance
+//! picture whose rows do not run from the top, each from the left, does.
 
 use std::{
     fs::File,
@@ -6,7 +7,7 @@ use std::{
     path::Path,
 };
 
-use image::{ImageFormat, ImageReader};
+use image::{ImageDecoder, ImageFormat, ImageReader, metadata::Orientation};
 
 /// Pages that are looked at.
 const MOST_PAGES: usize = 10_000;
@@ -15,7 +16,7 @@ const MOST_PAGES: usize = 10_000;
 pub struct PictureFile {
     file: File,
     at: u64,
-    /// Where the place of the first page stands, and that of the first of full size.
+    /// Where the place of the first page stands, and that of the first of full size; or the signs of sides that are others.
     start: Option<(u64, Vec<u8>)>,
 }
 
@@ -45,6 +46,64 @@ pub fn open(path: &Path) -> Result<ImageReader<BufReader<PictureFile>>> {
     reader.with_guessed_format()
 }
 
+/// The line of a Radiance picture that has its sides, as `-Y 2 +X 3`: that which its scan lines are counted by first ("Radiance file
+/// formats", Ward 2004).
+struct Sides {
+    /// Where it stands.
+    at: u64,
+    line: String,
+}
+
+impl Sides {
+    fn of(file: &mut File) -> Result<Option<Self>> {
+        const LIMIT_BYTES: u64 = 1 << 20;
+        let (mut bytes, mut at) = (vec![], 0);
+        file.rewind()?;
+        file.take(LIMIT_BYTES).read_to_end(&mut bytes)?;
+        let mut lines = bytes.split(|byte| *byte == b'\n').map(|line| {
+            at += line.len() as u64 + 1;
+            (at - line.len() as u64 - 1, line)
+        });
+        // An empty line ends what stands before.
+        let line = lines.find(|(_, line)| line.trim_ascii().is_empty()).and_then(|_| lines.next());
+        Ok(line.and_then(|(at, line)| Some(Self { at, line: str::from_utf8(line).ok()?.to_owned() })))
+    }
+
+    /// Returns the line with the signs and letters of a picture that lies upright.
+    fn upright(&self) -> Vec<u8> {
+        let mut axes = ["-Y", "+X"].into_iter();
+        let word = |word: &str| {
+            if word.starts_with(['+', '-']) { axes.next().unwrap_or(word).to_owned() } else { word.to_owned() }
+        };
+        self.line.split(' ').map(word).collect::<Vec<_>>().join(" ").into_bytes()
+    }
+
+    /// Returns how a picture lies that is read as one that lies upright.
+    fn orientation(&self) -> Option<Orientation> {
+        let axes: Vec<&str> = self.line.split_whitespace().filter(|word| word.starts_with(['+', '-'])).collect();
+        Some(match axes[..] {
+            ["+Y", "+X"] => Orientation::FlipVertical,
+            ["-Y", "-X"] => Orientation::FlipHorizontal,
+            ["+Y", "-X"] => Orientation::Rotate180,
+            ["+X", "-Y"] => Orientation::Rotate90FlipH,
+            ["-X", "-Y"] => Orientation::Rotate90,
+            ["+X", "+Y"] => Orientation::Rotate270,
+            ["-X", "+Y"] => Orientation::Rotate270FlipH,
+            _ => return None,
+        })
+    }
+}
+
+/// Returns how a picture lies in its file, as that states it; upright where it states nothing.
+pub fn orientation_of(path: &Path) -> Orientation {
+    let reader = open(path).ok();
+    let stated = reader.and_then(|reader| match reader.format()? {
+        ImageFormat::Hdr => Sides::of(&mut File::open(path).ok()?).ok()??.orientation(),
+        _ => reader.into_decoder().ok()?.orientation().ok(),
+    });
+    stated.unwrap_or(Orientation::NoTransforms)
+}
+
 /// Returns what the header of a TIFF file says in place of its first page, where that is a reduced one and another is not.
 fn start_of(file: &mut File) -> Result<Option<(u64, Vec<u8>)>> {
     let mut head = [0; 4];
@@ -54,6 +113,10 @@ fn start_of(file: &mut File) -> Result<Option<(u64, Vec<u8>)>> {
         b"MM\0*" => (true, false),
         b"II+\0" => (false, true),
         b"MM\0+" => (true, true),
+        b"#?RA" => {
+            let turned = Sides::of(file)?.filter(|sides| sides.orientation().is_some());
+            return Ok(turned.map(|sides| (sides.at, sides.upright())));
+        }
         _ => return Ok(None),
     };
     let mut number = |at: u64, n_bytes: usize| -> Result<u64> {

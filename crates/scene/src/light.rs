@@ -78,6 +78,8 @@ impl Scene {
                 }
             }
         }
+        let note = new.illuminant.note_beyond_table(&grid).filter(|note| !self.notes.contains(note));
+        self.notes.extend(note);
         self.light = Some(new);
         Ok(())
     }

@@ -217,6 +217,14 @@ impl Illuminant {
         };
         samples.iter().map(|v| v * scale).collect()
     }
+
+    /// Returns what is said of bands beyond a light's table, where there are any.
+    pub fn note_beyond_table(&self, grid: &WavelengthGrid) -> Option<String> {
+        let Self::Spectrum(spectrum) = self else { return None };
+        let ((first, last), (from, to)) = (grid.range_nm(), spectrum.range_nm());
+        let is_beyond = first < from || last > to;
+        is_beyond.then(|| format!("the light is known from {from} to {to} nm; beyond, its end values are held"))
+    }
 }
 
 /// Where the tables of lights end, and up to where they are continued, nm.

@@ -433,7 +433,11 @@ impl SceneSpec {
         if let (Some(_), Some(fov_deg), Some(depth_m)) = (self.flat, self.field_of_view_deg, self.depth_m) {
             let (rows, columns) = (scene.rows(), scene.columns());
             scene.view = Some(View::from_horizontal_fov_deg(fov_deg, columns, rows)?);
-            scene.depth = Some(DepthMap::flat(rows, columns, depth_m).map_err(dioptric_scene::SceneError::from)?);
+            let flat = DepthMap::flat(rows, columns, depth_m).map_err(dioptric_scene::SceneError::from)?;
+            if scene.depth.as_ref().is_some_and(|own| *own != flat) {
+                scene.notes.push(format!("{}: its depth is not used, since it is laid flat by its size", scene.name));
+            }
+            scene.depth = Some(flat);
         }
         Ok(scene)
     }

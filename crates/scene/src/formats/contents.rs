@@ -143,6 +143,11 @@ impl Contents {
             ("a factor on its numbers (--scale)", reading.scale.is_some(), self.heeds == Heeds::Nothing),
             ("a unit (--unit)", reading.unit.is_some(), !matches!(self.heeds, Heeds::Unit | Heeds::Cube)),
             ("a quantity (--quantity)", reading.quantity.is_some(), !self.heeds_quantity(reading.quantity)),
+            (
+                "what becomes of samples without data (--no-data)",
+                reading.no_data.is_some(),
+                matches!(self.image, Image::Codes(..)),
+            ),
             ("a white level (--white-level)", options.white_level.is_some(), self.heeds != Heeds::Cube),
             ("wavelengths (--scene-wavelengths-nm)", reading.wavelengths_nm.is_some(), self.heeds != Heeds::Cube),
             (

@@ -132,6 +132,9 @@ pub(super) fn read_depth(path: &Path, words: DepthWords<'_>) -> Result<RawDepth,
 fn unit_m_of(path: &Path, numbers: &DepthNumbers, words: DepthWords<'_>) -> Result<f64, SceneError> {
     let wrong = |reason: &str| Err(unreadable(path, reason));
     let of_other_kind = words.kind.is_some_and(|kind| kind != DepthKind::Axial && kind != DepthKind::Radial);
+    if let (Some(lacks), None, None) = (numbers.lacks, words.kind, words.unit) {
+        return wrong(lacks);
+    }
     if let Some(own_m) = numbers.unit_m {
         let told = words.unit.map(DepthUnit::parse).transpose()?;
         if of_other_kind || told.is_some_and(|told| told != DepthUnit::Metres(own_m)) {
@@ -141,9 +144,6 @@ fn unit_m_of(path: &Path, numbers: &DepthNumbers, words: DepthWords<'_>) -> Resu
     }
     if words.unit.is_some() || of_other_kind {
         return Ok(1.0);
-    }
-    if let (Some(lacks), None) = (numbers.lacks, words.kind) {
-        return wrong(lacks);
     }
     if let Some(unit_m) = words.unit_m {
         return Ok(unit_m);
@@ -256,8 +256,16 @@ mod tests {
             assert!(z_m[(1, 0)] == f32::INFINITY && z_m[(1, 1)].is_nan() && z_m[(1, 2)] == 0.0, "{name}: {z_m}");
         }
         assert!(read_depth(&at("a.pfm"), DepthWords::default()).is_err_and(|e| e.to_string().contains("disparity")));
-        for name in ["left_inverse_depth.npy", "disp.npy"] {
-            fs::copy(at("a.npy"), at(name)).unwrap();
+        for name in [
+            "left_inverse_depth.npy",
+            "disp.npy",
+            "a_inv.npy",
+            "invDepth_mm.npy",
+            "disparity.tif",
+            "inverse_depth.exr",
+            "room.Mist.exr",
+        ] {
+            fs::copy(at("a").with_extension(name.rsplit('.').next().unwrap()), at(name)).unwrap();
             assert!(
                 read_depth(&at(name), DepthWords::default()).is_err_and(|e| e.to_string().contains("--depth-kind"))
             );
@@ -280,7 +288,11 @@ mod tests {
             let array = file.create_dataset("other").with_data(&[1.0_f32; 4]).with_shape(&[2, 2]);
             array.set_attr("long_name", hdf5_pure::AttrValue::String("distance from the camera".to_owned()));
             fs::write(&path, file.finish().unwrap()).unwrap();
-            read_depth(&path, DepthWords { variable: Some("other").filter(|_| name == "x"), ..DepthWords::default() })
+            let variable = match name {
+                "x" => Some("other"),
+                own => Some(own).filter(|own| !["depth", "distance", "disparity"].contains(own)),
+            };
+            read_depth(&path, DepthWords { variable, ..DepthWords::default() })
         };
         for (name, words, kind) in [
             ("depth", "distance along the ray", DepthKind::Radial),
@@ -289,10 +301,21 @@ mod tests {
             ("distance", "distance along the optical axis", DepthKind::Axial),
             ("distance", "", DepthKind::Radial),
             ("x", "", DepthKind::Radial),
+            ("radial_depth", "", DepthKind::Radial),
+            ("depthRay", "", DepthKind::Radial),
+            ("euclidean_distance_mm", "", DepthKind::Radial),
+            ("range", "", DepthKind::Radial),
+            ("distance", "planar depth", DepthKind::Axial),
+            ("array_of_depth", "", DepthKind::Axial),
         ] {
             let found = read(name, words);
             assert!(found.as_ref().is_ok_and(|depth| depth.kind == kind), "{name}, {words}: {:?}", found.err());
         }
+        let millimetres = read("depth", "depth in mm").unwrap();
+        assert_eq!(millimetres.unit, DepthUnit::Metres(1e-3));
+        assert!(!millimetres.notes.iter().any(|note| note.contains("long_name")), "{:?}", millimetres.notes);
+        let notes = read("depth", "depth in mm or km").unwrap().notes;
+        assert!(notes.iter().any(|note| note.contains("long_name")), "{notes:?}");
         for (name, words) in [("depth", "inverse depth"), ("disparity", "")] {
             let message = read(name, words).err().unwrap().to_string();
             assert!(message.contains("--depth-kind"), "{message}");

@@ -56,7 +56,9 @@ pub(super) fn depth_numbers(path: &Path, told: Option<&str>) -> Result<Noted<Dep
     if told.is_some() && ["pfm", "npy", "txt", "csv", "asc"].contains(&ending.as_str()) {
         return Err(unreadable(path, "it has one depth without a name, expected it without --depth-variable"));
     }
-    let numbers = match ending.as_str() {
+    // What the file calls its array, in a name and in words.
+    let (mut names, mut called) = (String::new(), String::new());
+    let mut numbers = match ending.as_str() {
         "pfm" => {
             let mut planes = read_pfm(path)?.told_in(&mut notes);
             if planes[1..].iter().any(|plane| *plane != planes[0]) {
@@ -66,31 +68,32 @@ pub(super) fn depth_numbers(path: &Path, told: Option<&str>) -> Result<Noted<Dep
         }
         "npy" => {
             let (values, top) = plane_of(path, read_npy(path)?.told_in(&mut notes))?;
-            DepthNumbers { lacks: lacks_length(&name_of(path)), ..of(values, top) }
+            of(values, top)
         }
         "npz" => {
             let (name, array) = read_npz_plane(path, told)?.told_in(&mut notes);
             let (values, top) = plane_of(path, array)?;
-            let (kind, unit_m, lacks) = (kind_of_array(&name, ""), length_in_name(&name), lacks_length(&name));
-            DepthNumbers { from: named(&name), kind, unit_m, lacks, ..of(values, top) }
+            names = name.clone();
+            DepthNumbers { from: named(&name), unit_m: length_in_name(&name), ..of(values, top) }
         }
         _ if is_of(path, MATLAB_OR_HDF5) => {
             let Plane { name, values, top, unit_m, words } = read_plane(path, told)?.told_in(&mut notes);
-            let (kind, named_m) = (kind_of_array(&name, &words), length_in_name(&name));
+            let named_m = length_in_name(&name);
             if let (Some(unit_m), Some(named_m)) = (unit_m, named_m)
                 && unit_m != named_m
             {
                 let reason = format!("its {} states another unit than its name: expected one of them", named(&name));
                 return Err(unreadable(path, reason));
             }
-            let unit_m = unit_m.or(named_m);
-            let lacks = lacks_length(&name).or_else(|| lacks_length(&words));
-            DepthNumbers { from: named(&name), kind, unit_m, lacks, ..of(values, top) }
+            let from = named(&name);
+            (names, called) = (name, words);
+            DepthNumbers { from, unit_m: unit_m.or(named_m), ..of(values, top) }
         }
         "exr" => {
             let DepthChannel { name, plane, kind, frame } = read_depth_exr(path, told)?.told_in(&mut notes);
-            let from = format!("channel {}", named(&name));
-            DepthNumbers { from, kind, unit_m: length_in_name(&name), frame: Some(frame), ..of(plane, None) }
+            let (from, unit_m) = (format!("channel {}", named(&name)), length_in_name(&name));
+            names = name;
+            DepthNumbers { from, kind, unit_m, frame: Some(frame), ..of(plane, None) }
         }
         "txt" | "csv" | "asc" => of(read_text_depth(path)?.told_in(&mut notes), None),
         _ if is_envi(path, &ending) => {
@@ -113,26 +116,60 @@ pub(super) fn depth_numbers(path: &Path, told: Option<&str>) -> Result<Noted<Dep
             }
         }
     };
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    if numbers.kind == DepthKind::Axial && is_radial(&stem, &names, &called) {
+        numbers.kind = DepthKind::Radial;
+    }
+    numbers.lacks = numbers.lacks.or_else(|| [&stem, &names, &called].into_iter().find_map(|own| lacks_length(own)));
     Ok(Noted::new(numbers, notes))
 }
 
-/// What an array counts by its name, or by the words that the file has for it.
-fn kind_of_array(name: &str, words: &str) -> DepthKind {
+/// Returns the words of a name, as `inv`, `depth` and `mm` of `invDepth_mm`, in small letters.
+fn words_of(name: &str) -> Vec<String> {
+    let mut apart = String::new();
+    for c in name.chars() {
+        // A capital behind a small letter begins a word.
+        if c.is_uppercase() && apart.ends_with(char::is_lowercase) {
+            apart.push(' ');
+        }
+        apart.push(c);
+    }
+    apart.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty()).map(str::to_lowercase).collect()
+}
+
+/// Whether distances are counted from the camera by the name of their file, their array or channel, or the words that the file has for it.
+fn is_radial(stem: &str, name: &str, called: &str) -> bool {
+    const RAYS: [&str; 7] = ["ray", "rays", "radial", "euclidean", "slant", "sight", "range"];
+    const DISTANCES: [&str; 3] = ["distance", "distances", "dist"];
     let last = name.rsplit('/').next().unwrap_or(name);
-    let lower = words.to_lowercase();
-    let has = |word: &&str| lower.split(|c: char| !c.is_alphanumeric()).any(|own| own == *word);
-    let says_axis = ["axis", "axial", "planar", "perpendicular"].iter().any(has);
-    let says_ray = ["ray", "rays", "radial", "euclidean", "slant", "sight"].iter().any(has)
-        || ["distance from ", "distance to "].iter().any(|start| lower.contains(start));
-    if !says_axis && (says_ray || last.eq_ignore_ascii_case("distance")) { DepthKind::Radial } else { DepthKind::Axial }
+    let ([stem, name], lower) = ([stem, last].map(words_of), called.to_lowercase());
+    let called = words_of(called);
+    let is_in = |words: &[String], known: &[&str]| words.iter().any(|own| known.contains(&own.as_str()));
+    let is_last = |words: &[String], known: &[&str]| words.last().is_some_and(|own| known.contains(&own.as_str()));
+    if is_in(&called, &["axis", "axial", "planar", "perpendicular"]) || is_in(&name, &["axial", "planar"]) {
+        return false;
+    }
+    is_in(&name, &RAYS)
+        || is_in(&name, &DISTANCES)
+        || is_in(&called, &RAYS)
+        || ["distance from ", "distance to "].iter().any(|start| lower.contains(start))
+        // Files may be called after what they show.
+        || is_in(&stem, &["radial", "euclidean"])
+        || is_last(&stem, &DISTANCES)
+        || is_last(&stem, &["range"])
 }
 
 /// Returns what is asked for where words speak of what is no length.
 fn lacks_length(words: &str) -> Option<&'static str> {
-    let lower = words.to_lowercase();
-    let is_disparity =
-        lower.contains("disparit") || lower.split(|c: char| !c.is_alphanumeric()).any(|word| word == "disp");
-    (is_disparity || lower.contains("inverse")).then_some(
+    let (lower, own) = (words.to_lowercase(), words_of(words));
+    let has = |word: &str| own.iter().any(|own| own == word);
+    if has("mist") {
+        return Some(
+            "its name says that it is a mist, whose numbers are no lengths: expected the pass of depth (Z), or --depth-unit or --depth-kind",
+        );
+    }
+    let is_inverse = lower.contains("inverse") || ["inv", "idepth", "invdepth", "reciprocal"].into_iter().any(has);
+    (lower.contains("disparit") || has("disp") || is_inverse).then_some(
         "its name or words say that it holds disparities or inverse distances: expected --depth-kind, as disparity:BASELINE_M or inverse",
     )
 }

@@ -153,7 +153,7 @@ fn archives_and_packed_arrays_hold_depths() {
     let packed: Vec<i16> =
         z.iter().enumerate().map(|(i, v)| if i == 5 { -1 } else { (v * 100.0).round() as i16 }).collect();
     let mut builder = hdf5_pure::FileBuilder::new();
-    let mut dataset = builder.create_dataset("range").with_data(&packed).with_shape(&[4, 6]);
+    let mut dataset = builder.create_dataset("array").with_data(&packed).with_shape(&[4, 6]);
     dataset = dataset.set_attr("scale_factor", hdf5_pure::AttrValue::F64(10.0));
     dataset = dataset.set_attr("_FillValue", hdf5_pure::AttrValue::I16(-1));
     dataset.set_attr("units", hdf5_pure::AttrValue::String("mm".to_owned()));

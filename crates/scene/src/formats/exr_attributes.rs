@@ -10,7 +10,7 @@ use exr::{
 use super::{
     camera::SAME_FOCAL,
     light_unit::LightUnit,
-    stated::{Stated, name_of, short},
+    stated::{Stated, name_of, short, tells},
 };
 use crate::{SceneError, SceneLight, View};
 
@@ -23,6 +23,8 @@ const CENTER_Y: &str = "viewCenterYPx";
 const FOV: &str = "viewHorizontalFovDeg";
 /// The light on a scene, as JSON.
 const LIGHT: &str = "sceneLight";
+/// The luminance of a white of 1.
+pub(super) const WHITE: &str = "whiteLuminance";
 
 /// What the header of a layer states.
 #[derive(Clone, Debug)]
@@ -79,9 +81,12 @@ pub(super) fn is_harmless(name: &str) -> bool {
         "scanlineimage",
         "dwaCompressionLevel",
     ];
+    // What Exif says of the view and the colors.
+    const VIEW: [&str; 5] = ["FocalLength", "FocalLengthIn35mmFilm", "SubjectDistance", "Gamma", "ColorSpace"];
     const STARTS: [&str; 8] = ["oiio:", "nuke/", "cycles.", "Exif", "exif", "IPTC:", "input/", "cryptomatte/"];
     let is_usual = NAMES.contains(&name) || STARTS.iter().any(|start| name.starts_with(start));
-    is_usual && !COLOR_SPACES.iter().any(|own| name.starts_with(own))
+    let is_of_view = name.split_once([':', '.', '_']).is_some_and(|(_, own)| VIEW.contains(&own));
+    is_usual && !is_of_view && !COLOR_SPACES.iter().any(|own| name.starts_with(own))
 }
 
 /// What says of the colors which they are: `OpenImageIO`'s attribute, and that of the Color Interop Forum.
@@ -162,7 +167,7 @@ impl Attributes {
             (CENTER_X, self.center_x_px, part.center_x_px),
             (CENTER_Y, self.center_y_px, part.center_y_px),
             (FOV, self.fov_deg, part.fov_deg),
-            ("whiteLuminance", self.white_cd_m2, part.white_cd_m2),
+            (WHITE, self.white_cd_m2, part.white_cd_m2),
         ];
         let is_other = |own: Option<f64>, theirs: Option<f64>| theirs.is_some() && theirs != own;
         let numbers = numbers.into_iter().filter(|(_, own, theirs)| is_other(*own, *theirs)).map(|(name, ..)| name);
@@ -215,7 +220,12 @@ pub(crate) fn from_layer(layer: &LayerAttributes) -> Attributes {
     let own = own.filter_map(|name| match get(&name).filter(|_| COLOR_SPACES.contains(&name.as_str())) {
         Some(AttributeValue::Text(text)) if is_linear_srgb(&words_of(text)) => None,
         Some(AttributeValue::Text(text)) => Some(format!("{name} ({})", words_of(text))),
-        _ => Some(name),
+        _ => match get(&name) {
+            Some(AttributeValue::Text(text)) if is_harmless(&name) && tells(&words_of(text)) => {
+                Some(format!("{name} '{}'", short(&words_of(text))))
+            }
+            _ => Some(name),
+        },
     });
     // Attributes of the standard that would change where or how bright things are.
     let standard = [
@@ -228,13 +238,18 @@ pub(crate) fn from_layer(layer: &LayerAttributes) -> Attributes {
         ("screenWindowWidth", layer.screen_window_width != 1.0),
         ("screenWindowCenter", layer.screen_window_center.0 != 0.0 || layer.screen_window_center.1 != 0.0),
     ];
+    let comments = layer.comments.as_ref().map(words_of).filter(|text| tells(text));
+    let comments = comments.map(|text| format!("comments '{}'", short(&text)));
     let standard = standard.into_iter().filter(|(_, is_there)| *is_there).map(|(name, _)| name.to_owned());
     let is_text = |name: &str| matches!(get(name), Some(AttributeValue::Text(_)));
     // Ours whose values are none that can stand there.
     let unfit = [PITCH, FOCAL, CENTER_X, CENTER_Y, FOV].into_iter().filter(|name| number(name).is_none());
     let unfit = unfit.chain([UNITS, LIGHT].into_iter().filter(|name| !is_text(name)));
-    let unfit = unfit.filter(|name| get(name).is_some()).map(|name| format!("{name}, which is no likely value"));
-    let mut others: Vec<String> = own.chain(standard).chain(unfit).collect();
+    let white = layer.white_luminance.map(f64::from);
+    let is_white = |white: &f64| white.is_finite() && *white > 0.0;
+    let unfit = unfit.filter(|name| get(name).is_some()).chain(white.filter(|own| !is_white(own)).map(|_| WHITE));
+    let unfit = unfit.map(|name| format!("{name}, which is no likely value"));
+    let mut others: Vec<String> = own.chain(standard).chain(comments).chain(unfit).collect();
     others.sort();
     let light = match get(LIGHT) {
         Some(AttributeValue::Text(text)) => {
@@ -249,7 +264,7 @@ pub(crate) fn from_layer(layer: &LayerAttributes) -> Attributes {
         light,
         unit_words,
         is_in_layout: get(LAYOUT_VERSION).is_some(),
-        white_cd_m2: layer.white_luminance.map(f64::from),
+        white_cd_m2: white.filter(is_white),
         environment: layer.environment_map,
         others: Stated::new("attribute", others.into_iter().map(|name| (name, ())).collect()),
         unit,

@@ -169,10 +169,11 @@ pub(super) fn read_layers(path: &Path) -> Result<(Head, Vec<RawLayer>), SceneErr
         .from_buffered(BufReader::new(open()?))
         .map_err(|error| unreadable(path, explain(&error)))?;
     let layers: Result<Vec<_>, _> = image.layer_data.into_iter().map(|layer| raw_layer(path, layer)).collect();
-    let layers = layers?;
-    if layers.is_empty() {
-        return Err(unreadable(path, "it has no layer"));
-    }
+    let mut layers = layers?;
+    let Some(first) = layers.first_mut() else { return Err(unreadable(path, "it has no layer")) };
+    // What the crate takes for an attribute of all layers by its type.
+    let of_all = image.attributes.other.keys().map(|name| (words_of(name), ())).collect();
+    first.attributes.others.merge(Stated::new("attribute", of_all));
     let window = image.attributes.display_window;
     let aspect = f64::from(image.attributes.pixel_aspect);
     if !(aspect.is_finite() && aspect > 0.0) {
@@ -238,11 +239,21 @@ pub(super) fn read_headers(path: &Path) -> Result<Vec<(String, Attributes)>, Sce
     Ok(meta.headers.iter().map(of).collect())
 }
 
+/// Returns what is wrong with a file whose channels do not stand in their order.
+fn unsorted(error: &exr::error::Error) -> Option<String> {
+    let is_unsorted = error.to_string().contains("channel names are not sorted");
+    is_unsorted.then(|| {
+        "its channels do not stand in the order of their names, as OpenEXR has them, so that whose samples are whose is not known: \
+         expected it written anew"
+            .to_owned()
+    })
+}
+
 /// Refuses a file whose samples take more memory than they may: as they stand in the file, and as single floats where they are none.
 fn guard(path: &Path, file: File) -> Result<(), SceneError> {
     let length = file.metadata().map_err(|error| unreadable(path, error))?.len();
-    let meta =
-        MetaData::read_from_buffered(BufReader::new(file), false).map_err(|error| unreadable(path, explain(&error)))?;
+    let meta = MetaData::read_from_buffered(BufReader::new(file), false)
+        .map_err(|error| unreadable(path, unsorted(&error).unwrap_or_else(|| explain(&error))))?;
     let bytes = meta.headers.iter().fold(0_u64, |sum, header| {
         let samples = (header.layer_size.0 as u64).saturating_mul(header.layer_size.1 as u64);
         let sample_bytes = header.channels.list.iter().map(|channel| match channel.sample_type {

@@ -128,6 +128,12 @@ fn attributes_of_ours_that_cannot_be_are_named() {
         let notes = read_scene(&file.path, &ReadOptions::default()).unwrap().notes.join("\n");
         assert!(notes.contains(&format!("'{name}, which is no likely value'")), "{notes}");
     }
+    let colors = || vec![("R", flat(1.0)), ("G", flat(1.0)), ("B", flat(1.0))];
+    for (name, value) in [("Note", "depth in mm"), ("Exif:FocalLengthIn35mmFilm", "28")] {
+        write_raw(&file.path, colors(), &[(name, value)]);
+        let notes = read_scene(&file.path, &ReadOptions::default()).unwrap().notes.join("\n");
+        assert!(notes.contains(name), "{notes}");
+    }
     write_raw(&file.path, bands(), &[("samplePitchUm", "3")]);
     let notes = read_scene(&file.path, &ReadOptions::default()).unwrap().notes.join("\n");
     assert!(notes.contains("its attribute 'samplePitchUm' is not used"), "{notes}");
@@ -149,7 +155,7 @@ fn parts_of_bands_are_one_picture() {
     };
     // A band a part, by the name of its channel or of the part; the depth in a part of its own.
     let scene = write(vec![
-        part("first", vec![("S0.500nm", flat(1.0))]),
+        part("image", vec![("S0.500nm", flat(1.0))]),
         part("S0.600nm", vec![("Y", flat(2.0))]),
         part("depth", vec![("Z", flat(3.0))]),
         part("left", vec![("S0.500nm", flat(9.0))]),
@@ -535,7 +541,9 @@ fn layers_of_bands_are_asked_for_by_name() {
         let reading = FileReading { variable: variable.map(str::to_owned), ..FileReading::default() };
         read_scene(&file.path, &ReadOptions { reading, ..ReadOptions::default() })
     };
-    let first = read(None).unwrap();
+    let message = read(None).unwrap_err().to_string();
+    assert!(message.contains("several layers of bands, 'a', 'b': expected --variable"), "{message}");
+    let first = read(Some("a")).unwrap();
     assert_eq!(first.radiance.planes()[0][(0, 0)], 1.0);
     assert!(first.notes.iter().any(|note| note.contains("part 'b'")), "{:?}", first.notes);
     let second = read(Some("b")).unwrap();

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use dioptric_pictures::orientation_of;
 use image::metadata::Orientation;
 
 use super::{
@@ -9,7 +10,6 @@ use super::{
     depth::files_beside,
     envi::{envi_size, header_of},
     picture::picture_size_of,
-    picture_parts::orientation_of,
     reading::FileReading,
 };
 

@@ -6,7 +6,7 @@ use dioptric_spectrum::{DepthMap, WavelengthGrid};
 
 use super::{
     camera::CameraFile,
-    contents::{Contents, Hidden},
+    contents::{Contents, Hidden, Image},
     depth::depth_beside,
     lighting::{lit, under},
     raw_depth::DepthWords,
@@ -62,7 +62,10 @@ pub(super) fn read_hidden(
 fn contents_behind(file: &Path, options: &ReadOptions) -> Result<Contents, SceneError> {
     let of = |options: &ReadOptions| {
         let contents = contents_of(file, options)?;
-        contents.check_heeds(file, options)?;
+        // Codes have no samples without data; those of the first surface may.
+        let no_data = options.reading.no_data.filter(|_| !matches!(contents.image, Image::Codes(..)));
+        let reading = FileReading { no_data, ..options.reading.clone() };
+        contents.check_heeds(file, &ReadOptions { reading, ..options.clone() })?;
         Ok(contents)
     };
     let Some(told) = told_words(options) else { return of(options) };

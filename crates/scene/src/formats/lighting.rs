@@ -39,6 +39,7 @@ pub(super) fn lit(
     options: &ReadOptions,
     notes: &mut Vec<String>,
 ) -> Result<(SpectralImage, Option<SceneLight>), SceneError> {
+    notes.extend(replaced(path, &contents, options));
     let lux = |own: Option<f64>| options.illuminance_lux.or(own).unwrap_or(USUAL_LUX);
     let image = match contents.image {
         Image::Spectral(image) => image,
@@ -51,8 +52,8 @@ pub(super) fn lit(
                 Image::Linear { white_cd_m2: Some(white), .. } => Some(std::f64::consts::PI * white),
                 _ => None,
             };
-            let lux = lux(own_lux);
-            let (basis, light) = white_basis(&grid, options.light.as_ref(), lux)?;
+            let (basis, light) = white_basis(&grid, options.light.as_ref(), lux(own_lux))?;
+            notes.extend(options.light.as_ref().and_then(|light| light.note_beyond_table(&grid)));
             let n_dark = (0..grid.len()).filter(|&band| basis.iter().all(|color| color[band].max(0.0) == 0.0)).count();
             if n_dark == grid.len() {
                 let reason = format!(
@@ -95,15 +96,36 @@ pub(super) fn lit(
     if image.quantity() != Quantity::Reflectance {
         return Ok((image, contents.light));
     }
-    let light = SceneLight::new(options.light.clone().unwrap_or(Illuminant::D65), lux(None));
-    notes.extend(beyond_table(&light.illuminant, image.grid()));
-    let white = light.illuminant.white_radiance(image.grid(), lux(None));
+    let (own, own_lux) = contents.light.map(|own| (own.illuminant, own.illuminance_lux)).unzip();
+    let light = SceneLight::new(options.light.clone().or(own).unwrap_or(Illuminant::D65), lux(own_lux.flatten()));
+    notes.extend(light.illuminant.note_beyond_table(image.grid()));
+    let white = light.illuminant.white_radiance(image.grid(), light.illuminance_lux.unwrap_or(USUAL_LUX));
     let grid = image.grid().clone();
     let mut planes = image.into_planes();
     for (plane, white) in planes.iter_mut().zip(white) {
         plane.mapv_inplace(|v| (f64::from(v) * white) as f32);
     }
     Ok((SpectralImage::new(Quantity::Radiance, grid, planes)?, Some(light)))
+}
+
+/// Returns what is said of what a file states of its light and the options put another in the place of.
+fn replaced(path: &Path, contents: &Contents, options: &ReadOptions) -> Option<String> {
+    let is_lit = contents.is_reflectance(options);
+    let white = match contents.image {
+        Image::Linear { white_cd_m2, .. } => white_cd_m2,
+        Image::Spectral(_) | Image::Codes(..) => None,
+    };
+    let own = contents.light.as_ref().filter(|_| is_lit);
+    let lux = options.illuminance_lux.is_some().then_some("--illuminance-lux");
+    let by_light = options.light.is_some().then_some("--illuminant");
+    let stated = [
+        ("white luminance", white.and(lux.or(is_lit.then_some("--quantity reflectance")))),
+        ("illuminance", own.and_then(|own| own.illuminance_lux).and(lux)),
+        ("light", own.and(by_light)),
+    ];
+    let replaced = stated.into_iter().filter_map(|(what, by)| Some(format!("its {what} by {}", by?)));
+    let replaced: Vec<String> = replaced.collect();
+    (!replaced.is_empty()).then(|| format!("{}: what it states is replaced, {}", name_of(path), replaced.join(", ")))
 }
 
 /// Returns the radiance of a picture whose colors are those of things that reflect light, and the light that is on them.
@@ -119,7 +141,7 @@ fn reflecting(
         checked_lux(options.illuminance_lux.unwrap_or(USUAL_LUX))?,
     );
     light.illuminant.check()?;
-    notes.extend(beyond_table(&light.illuminant, &grid));
+    notes.extend(light.illuminant.note_beyond_table(&grid));
     let (first, last) = grid.range_nm();
     if first < SmoothReflectance::FITTED_NM[0] || last > SmoothReflectance::FITTED_NM[1] {
         let name = name_of(path);
@@ -168,22 +190,37 @@ fn prepare_colors(
     Ok(())
 }
 
-/// Mends colors, of which negative ones are beyond the gamut and stay.
+/// Mends colors, of which negative ones are beyond the gamut and stay where there is light; where its luminance is below 0 there is none.
 fn mend_colors(
     path: &Path,
     bands: &WavelengthGrid,
     planes: &mut [Array2<f32>; 3],
     choice: super::reading::NoData,
 ) -> Result<super::no_data::Mended, SceneError> {
-    let kept: Vec<Array2<bool>> = planes.iter().map(|plane| plane.mapv(|v| v.is_finite() && v < 0.0)).collect();
+    // Y of linear sRGB (IEC 61966-2-1).
+    const LUMINANCES: [f32; 3] = [0.2126, 0.7152, 0.0722];
+    let mut is_light = Array2::from_elem(planes[0].dim(), 0.0_f32);
+    for (plane, weight) in planes.iter().zip(LUMINANCES) {
+        is_light.scaled_add(weight, plane);
+    }
+    let is_light = is_light.mapv(|luminance| luminance >= 0.0);
+    let has_numbers = |at: &(usize, usize)| planes.iter().all(|plane| plane[*at].is_finite());
+    let mut wrong = is_light.indexed_iter().filter(|(at, is_light)| !(**is_light && has_numbers(at)));
+    if let (super::reading::NoData::Refuse, Some(((row, column), _))) = (choice, wrong.next()) {
+        let [r, g, b] = [0, 1, 2].map(|color| planes[color][(row, column)]);
+        let reason = format!(
+            "its color at row {row}, column {column} is {r}, {g}, {b}, expected numbers, and light that is not below 0 (--no-data refuse)"
+        );
+        return Err(unreadable(path, reason));
+    }
     let colors = planes.clone();
-    let finite = planes.iter_mut().zip(&kept);
-    finite.for_each(|(plane, kept)| {
-        ndarray::Zip::from(plane).and(kept).for_each(|v, kept| *v = if *kept { 0.0 } else { *v })
-    });
+    for plane in planes.iter_mut() {
+        ndarray::Zip::from(plane).and(&is_light).for_each(|v, is_light| *v = if *is_light { v.max(0.0) } else { *v });
+    }
     let mended = mend(path, bands, planes, choice)?;
-    for ((plane, kept), own) in planes.iter_mut().zip(&kept).zip(&colors) {
-        ndarray::Zip::from(plane).and(kept).and(own).for_each(|v, kept, own| *v = if *kept { *own } else { *v });
+    for (plane, own) in planes.iter_mut().zip(&colors) {
+        let beyond = ndarray::Zip::from(plane).and(own).and(&is_light);
+        beyond.for_each(|v, own, is_light| *v = if *is_light && *own < 0.0 { *own } else { *v });
     }
     Ok(mended)
 }
@@ -237,12 +274,4 @@ fn white_basis(
         }
     }
     Ok((basis, SceneLight::new(wanted.clone(), lux)))
-}
-
-/// Returns what is said of bands beyond a light's table.
-fn beyond_table(light: &Illuminant, grid: &WavelengthGrid) -> Option<String> {
-    let Illuminant::Spectrum(spectrum) = light else { return None };
-    let ((first, last), (from, to)) = (grid.range_nm(), spectrum.range_nm());
-    let is_beyond = first < from || last > to;
-    is_beyond.then(|| format!("the light is known from {from} to {to} nm; beyond, its end values are held"))
 }

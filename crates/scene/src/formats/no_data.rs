@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use dioptric_spectrum::{SpectrumError, WavelengthGrid};
+use dioptric_spectrum::WavelengthGrid;
 use ndarray::Array2;
 
-use super::{reading::NoData, stated::name_of};
+use super::{reading::NoData, stated::name_of, unusable::unreadable};
 use crate::SceneError;
 
 /// Counts of what was mended.
@@ -27,8 +27,7 @@ impl Mended {
     /// Checks that some sample has a number.
     pub(super) fn checked(self, file: &Path) -> Result<Self, SceneError> {
         if self.n_missing == self.n_samples {
-            let reason = "none of its samples has a number".to_owned();
-            return Err(SceneError::Unreadable { file: file.to_owned(), reason });
+            return Err(unreadable(file, "none of its samples has a number"));
         }
         Ok(self)
     }
@@ -82,8 +81,16 @@ pub(super) fn mend_rows(
         if choice == NoData::Refuse
             && let Some(((row, column), &value)) = plane.indexed_iter().find(|(_, value)| !is_light(**value))
         {
-            let reason = SpectrumError::Sample { wavelength_nm, row: first_row + row, column, value };
-            return Err(SceneError::Values { file: file.to_owned(), reason });
+            let row = first_row + row;
+            let value = match value.is_nan() {
+                true => "no number (NaN, or what the file says to ignore)".to_owned(),
+                false => value.to_string(),
+            };
+            let reason = format!(
+                "its {wavelength_nm} nm band holds {value} at row {row}, column {column}, which --no-data refuse does not take: expected a \
+                 finite number, 0 or more"
+            );
+            return Err(unreadable(file, reason));
         }
         let negative = plane.iter_mut().filter(|value| value.is_finite() && **value < 0.0);
         mended.n_negative += negative.map(|value| *value = 0.0).count();

@@ -14,6 +14,7 @@ use super::{
     picture::linear_srgb,
     read_options::ReadOptions,
     reading::{DepthKind, Frame, Panorama},
+    stated::{name_of, note_of},
     unusable::{check_made, unreadable},
 };
 use crate::{SceneError, View};
@@ -46,14 +47,23 @@ pub(super) fn look(
         return Err(unreadable(path, "a panorama has neither camera data nor a hidden layer: expected it without"));
     }
     let (rows, columns) = contents.size();
-    let sphere = Sphere::new(path, kind, rows, columns)?;
+    let stated = contents.panorama;
+    let sphere = Sphere::new(path, kind, (rows, columns), stated)?;
+    if sphere.layout == Layout::Column {
+        let order = "right, left, up, down, front, back: OpenEXR's order is that of files that state it (envmap)";
+        contents.notes.push(format!("{}: its six faces below each other are taken for {order}", name_of(path)));
+    }
+    let is_other = stated.is_some_and(|own| std::mem::discriminant(&own) != std::mem::discriminant(&kind));
+    let unused = [is_other.then_some("envmap"), contents.view.take().map(|_| "camera data")];
+    let unused: Vec<String> = unused.into_iter().flatten().map(str::to_owned).collect();
+    contents.notes.extend(note_of(path, "statement", &unused).map(|note| note + ", as of a panorama that is told"));
     // A film that needs less gets means over blocks; depths stay as they are.
     let coarser = options.finest_tangent.map_or(1, |finest| (finest / sphere.step()) as usize);
     let divides = |bin: &usize| {
         sphere.may_be_binned() && rows.is_multiple_of(*bin) && columns.is_multiple_of(*bin) && contents.depth.is_none()
     };
     let bin = (1..=coarser.clamp(1, 64)).rev().find(divides).unwrap_or(1);
-    let sphere = Sphere::new(path, kind, rows / bin, columns / bin)?;
+    let sphere = Sphere::new(path, kind, (rows / bin, columns / bin), stated)?;
     let half = (0.5 * fov_deg.to_radians()).tan();
     let side = (2.0 * half / sphere.step()).ceil();
     if !(side >= 1.0 && side <= MOST_COLUMNS as f64) {
@@ -109,7 +119,6 @@ pub(super) fn look(
         ", {side} × {side} samples seen {yaw_deg}° right and {pitch_deg}° up of a panorama of {columns} × {rows}"
     );
     contents.frame = Some(Frame::whole(side, side));
-    contents.view = None;
     Ok(())
 }
 
@@ -129,6 +138,8 @@ enum Layout {
     Cross,
     /// Side by side: right, left, up, down, front, back.
     Strip,
+    /// Below each other in the same order.
+    Column,
     /// Below each other as `OpenEXR` has them (`ImfEnvmap.h`): +X, −X, +Y, −Y, +Z, −Z, the outermost samples on the edges of the cube; +Z lies
     /// straight ahead and +X to the left.
     OpenExr,
@@ -151,10 +162,18 @@ struct Sphere {
 const IN_CROSS: [(usize, usize); 6] = [(2, 1), (0, 1), (1, 0), (1, 2), (1, 1), (3, 1)];
 
 impl Sphere {
-    fn new(path: &Path, kind: Panorama, rows: usize, columns: usize) -> Result<Self, SceneError> {
+    /// `stated` is what the file says of itself.
+    fn new(
+        path: &Path,
+        kind: Panorama,
+        (rows, columns): (usize, usize),
+        stated: Option<Panorama>,
+    ) -> Result<Self, SceneError> {
+        let is_of_exr = matches!(stated, Some(Panorama::Cube { .. }));
         let layout = match (3 * columns == 4 * rows, columns == 6 * rows, rows == 6 * columns) {
             (true, ..) if rows >= 3 => Some(Layout::Cross),
             (_, true, _) => Some(Layout::Strip),
+            (.., true) if !is_of_exr => Some(Layout::Column),
             (.., true) if columns >= 2 => Some(Layout::OpenExr),
             _ => None,
         };
@@ -166,7 +185,7 @@ impl Sphere {
             }
             Panorama::Cube { .. } if layout.is_none() => {
                 return wrong(
-                    "the six faces of a cube as a cross, 4 × 3, side by side, 6 × 1, or 1 × 6 as OpenEXR has them",
+                    "the six faces of a cube as a cross, 4 × 3, side by side, 6 × 1, or below each other, 1 × 6",
                 );
             }
             _ => {}
@@ -176,7 +195,7 @@ impl Sphere {
         let side = match layout {
             Layout::Cross => columns / 4,
             Layout::Strip => rows,
-            Layout::OpenExr => columns,
+            Layout::Column | Layout::OpenExr => columns,
         };
         Ok(Self { kind, rows, columns, side, layout, yaw, pitch })
     }
@@ -219,7 +238,11 @@ impl Sphere {
                 } else {
                     (3, x / ay, -z / ay)
                 };
-                let (left, top) = if self.layout == Layout::Cross { IN_CROSS[face] } else { (face, 0) };
+                let (left, top) = match self.layout {
+                    Layout::Cross => IN_CROSS[face],
+                    Layout::Column => (0, face),
+                    Layout::Strip | Layout::OpenExr => (face, 0),
+                };
                 // Within the samples of its face: beside it in the picture lies another direction.
                 let n = self.side as f64;
                 let within = |at: f64| (0.5 * (at + 1.0) * n - 0.5).clamp(0.0, n - 1.0);
@@ -324,7 +347,7 @@ mod tests {
                 let kind: Panorama = format!("{word}:{yaw_deg},{pitch_deg}").parse().unwrap();
                 let plane = panorama(kind, columns);
                 let (rows, columns) = plane.dim();
-                let sphere = Sphere::new(Path::new("a"), kind, rows, columns).unwrap();
+                let sphere = Sphere::new(Path::new("a"), kind, (rows, columns), None).unwrap();
                 let (yaw, pitch) = (yaw_deg.to_radians(), pitch_deg.to_radians());
                 for (tan_x, tan_y) in [(0.0, 0.0), (1.5, 0.3), (-2.0, 1.0), (0.2, -3.0), (5.0, 5.0)] {
                     // To the right, up and ahead of the camera in the directions of the panorama.
@@ -360,7 +383,8 @@ mod tests {
         });
         let kind = |yaw_deg, pitch_deg| Panorama::Cube { yaw_deg, pitch_deg };
         for (yaw_deg, pitch_deg) in [(0.0_f64, 0.0_f64), (90.0, 0.0), (-100.0, 30.0), (180.0, -80.0)] {
-            let sphere = Sphere::new(Path::new("a"), kind(yaw_deg, pitch_deg), 6 * n, n).unwrap();
+            let kind = kind(yaw_deg, pitch_deg);
+            let sphere = Sphere::new(Path::new("a"), kind, (6 * n, n), Some(kind)).unwrap();
             let (yaw, pitch) = (yaw_deg.to_radians(), pitch_deg.to_radians());
             for (tan_x, tan_y) in [(0.0, 0.0), (0.9, -0.3), (-3.0, 2.0), (0.1, 4.0)] {
                 let right = [yaw.cos(), 0.0, -yaw.sin()];
@@ -371,6 +395,20 @@ mod tests {
                 // Straight lines between samples 1.4° apart.
                 assert_abs_diff_eq!(f64::from(found), light(direction), epsilon = 1e-3);
             }
+        }
+    }
+
+    /// Faces below each other are those side by side, in files that do not say that they are OpenEXR's.
+    #[test]
+    fn faces_below_each_other_are_those_side_by_side() {
+        let kind: Panorama = "cube:100,20".parse().unwrap();
+        let sphere = |sides| Sphere::new(Path::new("a"), kind, sides, None).unwrap();
+        for at in [(0.0, 0.0), (2.0, 0.5), (-0.5, 3.0)] {
+            let ((row, column), (below, left)) = (sphere((8, 48)).place_of(at), sphere((48, 8)).place_of(at));
+            let face = (column / 8.0).floor();
+            // Single floats.
+            assert_abs_diff_eq!(below, row + 8.0 * face, epsilon = 1e-4);
+            assert_abs_diff_eq!(left, column - 8.0 * face, epsilon = 1e-4);
         }
     }
 

@@ -2,7 +2,7 @@
 
 use std::{io::Read, path::Path};
 
-use dioptric_pictures::{Curve, DynamicImage, ImageError, StatedColors, read_reduced, size_of};
+use dioptric_pictures::{Curve, DynamicImage, ImageError, StatedColors, orientation_of, read_reduced, size_of};
 use dioptric_spectrum::{Display, Quantity, SpectralImage, WavelengthGrid, srgb_decode, srgb_encode};
 use image::metadata::Orientation;
 use ndarray::Array2;
@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use super::{
     contents::is_of,
-    picture_parts::{note_on_exif, note_on_exif_colors, orientation_of, unknown_parts},
+    picture_parts::{note_on_exif, note_on_exif_colors, unknown_parts},
     primaries::into_srgb,
     spectral_exr::{NamedPlanes, notes_on_planes_exr, read_planes_and_primaries_exr},
     stated::{Noted, name_of, note_of},
@@ -443,6 +443,37 @@ mod tests {
         let grid = WavelengthGrid::uniform(400.0, 700.0, 50.0).unwrap();
         let lifted = read_picture(&path, &Display::apple_studio(), &grid, 100.0).unwrap();
         assert!(lifted.spectrum_at(0, 1)[3] > lifted.spectrum_at(0, 0)[3]);
+    }
+
+    /// Floats of a profile are what codes of it are: editors write both by its curve.
+    #[test]
+    fn floats_are_in_the_colors_of_their_profile() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.tif");
+        for profile in [dioptric_pictures::CodeSpace::DisplayP3, dioptric_pictures::CodeSpace::Srgb] {
+            let profile = profile.icc_profile();
+            let scene = |write: &dyn Fn(&mut tiff::encoder::TiffEncoder<std::fs::File>)| {
+                write(&mut tiff::encoder::TiffEncoder::new(std::fs::File::create(&path).unwrap()).unwrap());
+                let scene = crate::read_scene(&path, &crate::ReadOptions::default()).unwrap();
+                assert!(!scene.notes.iter().any(|note| note.contains("34675")), "{:?}", scene.notes);
+                scene.radiance.spectrum_at(0, 0)
+            };
+            let tag = tiff::tags::Tag::Unknown(34_675);
+            let codes = scene(&|encoder| {
+                let mut page = encoder.new_image::<tiff::encoder::colortype::RGB16>(1, 1).unwrap();
+                page.encoder().write_tag(tag, &profile[..]).unwrap();
+                page.write_data(&[40_000, 30_000, 20_000]).unwrap();
+            });
+            let floats = scene(&|encoder| {
+                let mut page = encoder.new_image::<tiff::encoder::colortype::RGB32Float>(1, 1).unwrap();
+                page.encoder().write_tag(tag, &profile[..]).unwrap();
+                page.write_data(&[40_000.0, 30_000.0, 20_000.0].map(|code: f32| code / 65_535.0)).unwrap();
+            });
+            for (a, b) in codes.iter().zip(&floats) {
+                // A profile's fractions.
+                assert_abs_diff_eq!(*a, *b, epsilon = 2e-3 * codes.iter().copied().fold(0.0, f64::max));
+            }
+        }
     }
 
     #[test]

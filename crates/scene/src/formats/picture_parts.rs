@@ -6,16 +6,15 @@ use std::{
     path::Path,
 };
 
-use dioptric_pictures::{Exif, StatedColors, size_of};
+use dioptric_pictures::{Exif, StatedColors, orientation_of, size_of, xmp_properties};
 use flate2::read::ZlibDecoder;
 use image::{
-    ImageDecoder,
     codecs::pnm::{PnmSubtype, SampleEncoding},
     metadata::Orientation,
 };
 
 use super::{
-    stated::{name_of, note_of, short},
+    stated::{name_of, note_of, short, tells},
     unusable::unreadable,
 };
 use crate::SceneError;
@@ -25,6 +24,8 @@ const USED_CHUNKS: [&[u8; 4]; 16] = [
     b"IHDR", b"PLTE", b"IDAT", b"IEND", b"tRNS", b"gAMA", b"cHRM", b"sRGB", b"iCCP", b"cICP", b"sBIT", b"bKGD",
     b"hIST", b"tIME", b"eXIf", b"sPLT",
 ];
+/// Those of them that say what the codes are.
+const COLOR_CHUNKS: [&[u8; 4]; 5] = [b"gAMA", b"cHRM", b"sRGB", b"iCCP", b"cICP"];
 /// Words of text chunks that change nothing (PNG, third edition, 11.3.3.1), and those of common programs.
 const USUAL_WORDS: [&str; 14] = [
     "Title",
@@ -76,12 +77,6 @@ pub(super) fn note_of_orientation(path: &Path) -> Option<String> {
     (own != Orientation::NoTransforms).then(words)
 }
 
-/// Returns the orientation that a picture states.
-pub(super) fn orientation_of(path: &Path) -> Orientation {
-    let decoder = dioptric_pictures::open(path).ok().and_then(|reader| reader.into_decoder().ok());
-    decoder.and_then(|mut decoder| decoder.orientation().ok()).unwrap_or(Orientation::NoTransforms)
-}
-
 /// Returns what the Exif data state of light, and of geometry where that counts, that is not used.
 pub(super) fn note_on_exif(path: &Path, of_scene: bool) -> Option<String> {
     let exif = Exif::of(path);
@@ -131,6 +126,8 @@ pub(super) fn unknown_parts(path: &Path) -> Result<Vec<String>, SceneError> {
         _ => Ok(vec![]),
     };
     let mut names = names.unwrap_or_default();
+    // The name of a profile that is within.
+    names.retain(|name| !name.starts_with("photoshop:ICCProfile") || !matches!(StatedColors::of(path), Ok(Some(_))));
     names.sort();
     names.dedup();
     Ok(names)
@@ -141,58 +138,83 @@ const NOT_SQUARE: &str = "pixels that are not square";
 
 /// Returns the name of a comment that says something of the numbers, and not who made them when.
 pub(super) fn comment(text: &[u8]) -> Option<String> {
-    const WORDS: [&str; 15] = [
-        "depth",
-        "scale",
-        "unit",
-        "metre",
-        "meter",
-        "mm",
-        "focal",
-        "fov",
-        "wavelength",
-        "nm",
-        "gain",
-        "offset",
-        "baseline",
-        "exposure",
-        "gamma",
-    ];
     let text = String::from_utf8_lossy(text).trim().to_owned();
-    let lower = text.to_lowercase();
-    let mut words = lower.split(|c: char| !c.is_ascii_alphabetic()).filter(|word| !word.is_empty());
-    let is_telling =
-        words.any(|word| WORDS.iter().any(|known| word == *known || (known.len() > 3 && word.contains(known))));
-    (is_telling && lower.contains(|c: char| c.is_ascii_digit())).then(|| format!("comment '{}'", short(&text)))
+    tells(&text).then(|| format!("comment '{}'", short(&text)))
 }
 
-/// Returns the names of what phones and renderers put into XMP data.
+/// Prefixes of XMP data that say who made a picture when, with what and for whom, and how it was developed.
+const HARMLESS_XMP: [&str; 40] = [
+    "dc",
+    "xmp",
+    "xap",
+    "xmpMM",
+    "xapMM",
+    "xmpRights",
+    "xapRights",
+    "xmpBJ",
+    "xmpTPg",
+    "xmpDM",
+    "xmpG",
+    "xmpNote",
+    "stEvt",
+    "stRef",
+    "stFnt",
+    "stDim",
+    "stArea",
+    "photoshop",
+    "pdf",
+    "pdfx",
+    "illustrator",
+    "Iptc4xmpCore",
+    "Iptc4xmpExt",
+    "plus",
+    "lr",
+    "aux",
+    "exif",
+    "exifEX",
+    "tiff",
+    "crs",
+    "crd",
+    "crss",
+    "MicrosoftPhoto",
+    "mwg-rs",
+    "mwg-kw",
+    "digiKam",
+    "acdsee",
+    "cc",
+    "Container",
+    "GCamera",
+];
+
+/// Returns the names of what phones, cameras and renderers put into XMP data.
 fn of_xmp(content: &[u8]) -> Vec<String> {
-    let has = |word: &[u8]| content.windows(word.len()).any(|own| own == word);
-    let mut names = vec![];
-    // Containers of pictures and what belongs to them say what each is for.
-    let contains = |what: &[u8]| has(b"Item:Semantic") && has(what);
-    if has(b"GDepth:") || has(b"GCamera:Depth") || has(b"Device:Camera") || contains(b"Depth") {
-        names.push("depth (XMP)".to_owned());
-    }
-    if has(b"hdrgm:") {
-        names.push("gain map (hdrgm)".to_owned());
-    } else if has(b"HDRGainMap") || contains(b"GainMap") {
-        names.push("gain map (XMP)".to_owned());
-    }
-    if has(b"GPano:") {
-        names.push("panorama (XMP)".to_owned());
-    }
-    // What cameras of bands state of them, of their light and of their lens.
-    const CALIBRATION: [&str; 5] = ["Camera:", "DLS:", "MicaSense:", "Sentera:", "FLIR:"];
-    let text = String::from_utf8_lossy(content);
-    // Programs turn a picture by Exif; 1 is upright.
-    let turned = text.split_once("tiff:Orientation").and_then(|(_, rest)| rest.chars().find(char::is_ascii_digit));
-    names.extend(turned.filter(|turned| *turned != '1').map(|turned| format!("orientation {turned} (XMP)")));
-    let words = text.split(|c: char| c.is_whitespace() || "<>=/".contains(c));
-    let is_stated = |word: &&str| CALIBRATION.iter().any(|start| word.starts_with(start) && word.len() > start.len());
-    names.extend(words.filter(is_stated).map(|word| format!("{} (XMP)", short(word))));
-    names
+    let of_property = |(name, value): (String, String)| {
+        let value = value.as_str();
+        // Exif's words for the view and the colors are used with Exif's own.
+        let (prefix, own) = name.split_once(':')?;
+        let what = match (prefix, own) {
+            ("GDepth", _) | ("Device", "Camera") => "depth".to_owned(),
+            ("GCamera", own) if own.starts_with("Depth") => "depth".to_owned(),
+            ("hdrgm", _) => return Some("gain map (hdrgm)".to_owned()),
+            ("HDRGainMap", _) => "gain map".to_owned(),
+            ("GPano", _) => "panorama".to_owned(),
+            // Containers of pictures say what each is for.
+            ("Item", "Semantic") => match value {
+                "Primary" | "MotionPhoto" => return None,
+                "GainMap" => "gain map".to_owned(),
+                own => own.to_lowercase(),
+            },
+            ("Item", _) => return None,
+            // Programs turn a picture by Exif; 1 is upright.
+            ("tiff", "Orientation") if value != "1" => format!("orientation {}", short(value)),
+            ("photoshop", "ICCProfile") if !value.contains("sRGB") => format!("{name} '{}'", short(value)),
+            (_, "ApproximateFocusDistance") => short(&name),
+            (prefix, _) if HARMLESS_XMP.contains(&prefix) => return None,
+            _ => short(&name),
+        };
+        Some(format!("{what} (XMP)"))
+    };
+    xmp_properties(content).into_iter().filter_map(of_property).collect()
 }
 
 /// Names what the header of a BMP file says of the shape of its pixels.
@@ -284,7 +306,7 @@ fn of_webp(file: &mut (impl Read + Seek)) -> std::io::Result<Vec<String>> {
 }
 
 fn of_png(file: &mut (impl Read + Seek)) -> std::io::Result<Vec<String>> {
-    let (mut names, mut n_bits) = (vec![], 0);
+    let (mut names, mut n_bits, mut n_opaque, mut known) = (vec![], 0, 0, vec![]);
     for _ in 0..MOST_PARTS {
         let mut head = [0; 8];
         if file.read_exact(&mut head).is_err() {
@@ -293,8 +315,16 @@ fn of_png(file: &mut (impl Read + Seek)) -> std::io::Result<Vec<String>> {
         let [a, b, c, d, kind @ ..] = head;
         let n_bytes = u64::from(u32::from_be_bytes([a, b, c, d]));
         let mut content = part(file, n_bytes + 4)?;
-        // Without its checksum.
+        // What reads the picture leaves out what its checksum does not fit; colors are refused then.
+        let sum = content.get(n_bytes as usize..).and_then(|sum| sum.try_into().ok()).map(u32::from_be_bytes);
         content.truncate(n_bytes.min(MOST_BYTES) as usize);
+        let mut own = flate2::Crc::new();
+        own.update(&kind);
+        own.update(&content);
+        let is_short = kind == *b"tRNS" && content.len() < n_opaque;
+        if [*b"tRNS", *b"eXIf"].contains(&kind) && (is_short || sum.is_some_and(|sum| sum != own.sum())) {
+            names.push(format!("{} (damaged)", String::from_utf8_lossy(&kind)));
+        }
         match &kind {
             b"tEXt" | b"zTXt" | b"iTXt" => {
                 let (word, text) = text_of(kind, &content);
@@ -304,15 +334,27 @@ fn of_png(file: &mut (impl Read + Seek)) -> std::io::Result<Vec<String>> {
                     _ => names.push(format!("text '{word}'")),
                 }
             }
-            b"IHDR" => n_bits = content.get(8).copied().unwrap_or_default(),
+            b"IHDR" => {
+                n_bits = content.get(8).copied().unwrap_or_default();
+                // Bytes of the color that is no part of the picture: of gray, of red, green and blue, of a palette.
+                n_opaque = [2, 1, 6, 1][usize::from(content.get(9).copied().unwrap_or_default() % 4)];
+            }
             // Samples of fewer bits that were shifted up to those of the file.
             b"sBIT" if content.iter().any(|own| *own < n_bits) => names.push("sBIT (bits that tell)".to_owned()),
             b"pHYs" if content.get(..4) != content.get(4..8) => names.push(format!("pHYs ({NOT_SQUARE})")),
             b"pHYs" => {}
             b"IEND" => break,
+            // The first counts, before the pixels.
+            kind if COLOR_CHUNKS.contains(&kind) && known.contains(kind) => {
+                names.push(format!("{} (twice, or behind the pixels)", String::from_utf8_lossy(kind)));
+            }
             kind if USED_CHUNKS.contains(&kind) => {}
             kind => names.push(kind.iter().map(|byte| char::from(*byte)).collect()),
         }
+        if kind == *b"IDAT" {
+            known.extend(COLOR_CHUNKS.map(|own| *own));
+        }
+        known.push(kind);
     }
     Ok(names)
 }
@@ -350,19 +392,28 @@ fn of_jpeg(file: &mut (impl Read + Seek)) -> std::io::Result<Option<Vec<String>>
         let [0xff, kind, high, low] = head else { break };
         // Pixels follow the start of a scan.
         if kind == 0xda {
-            return Ok(has_end(file)?.then_some(names));
+            let Some(behind) = behind_end(file)? else { return Ok(None) };
+            let has_picture = behind.windows(3).any(|three| three == [0xff, 0xd8, 0xff]);
+            names.extend(
+                match behind.iter().any(|byte| *byte != 0) {
+                    true if has_picture => Some("further pictures (behind its end)"),
+                    true => Some("bytes behind its end"),
+                    false => None,
+                }
+                .map(str::to_owned),
+            );
+            return Ok(Some(names));
         }
         let n_bytes = u64::from(u16::from_be_bytes([high, low])).saturating_sub(2);
         let content = part(file, n_bytes)?;
         match (kind, &content[..]) {
-            (0xe2, content) if content.starts_with(b"MPF\0") => names.push("further pictures (MPF)".to_owned()),
-            (0xe1, content) => names.extend(of_xmp(content)),
             (0xe0, &[b'J', b'F', b'I', b'F', 0, _, _, _, a, b, c, d, ..]) => {
                 let [across, down] = [[a, b], [c, d]].map(|two| f64::from(u16::from_be_bytes(two)));
                 if across > 0.0 && down > 0.0 && differ(across, down) {
                     names.push(format!("JFIF ({NOT_SQUARE})"));
                 }
             }
+            (0xe0..=0xef, content) => names.extend(of_segment(kind - 0xe0, content)),
             (0xfe, content) => names.extend(comment(content)),
             _ => {}
         }
@@ -370,16 +421,51 @@ fn of_jpeg(file: &mut (impl Read + Seek)) -> std::io::Result<Option<Vec<String>>
     Ok(Some(names))
 }
 
-/// Whether the end of the picture is marked behind its pixels, within which the mark cannot stand.
-fn has_end(file: &mut impl Read) -> std::io::Result<bool> {
+/// Names a segment of an application in a JPEG file, by the word at its start.
+fn of_segment(number: u8, content: &[u8]) -> Vec<String> {
+    // Thumbnails, Exif data and profiles, which are used elsewhere, and what editors write for themselves.
+    const KNOWN: [(u8, &[u8]); 9] = [
+        (0, b"JFIF\0"),
+        (0, b"JFXX\0"),
+        (1, b"Exif\0"),
+        (2, b"ICC_PROFILE\0"),
+        (12, b"Ducky"),
+        (12, b"Picture Info"),
+        (13, b"Photoshop "),
+        (13, b"Adobe_"),
+        (14, b"Adobe"),
+    ];
+    let starts = |start: &[u8]| content.starts_with(start);
+    if KNOWN.iter().any(|(own, start)| *own == number && starts(start)) {
+        return vec![];
+    }
+    if number == 1 && starts(b"http://ns.adobe.com/") {
+        return of_xmp(content);
+    }
+    vec![match number {
+        2 if starts(b"MPF\0") => "further pictures (MPF)".to_owned(),
+        2 if starts(b"urn:iso:std:iso:ts:21496:-1") => "gain map (ISO 21496-1)".to_owned(),
+        _ => {
+            let word = content.iter().take_while(|byte| byte.is_ascii_graphic() || **byte == b' ');
+            format!("APP{number} '{}'", short(&word.map(|byte| char::from(*byte)).collect::<String>()))
+        }
+    }]
+}
+
+/// Returns what stands behind the mark of the picture's end, which cannot stand within its pixels; none where there is no mark.
+fn behind_end(file: &mut impl Read) -> std::io::Result<Option<Vec<u8>>> {
     let (mut block, mut last) = (vec![0; MOST_BYTES as usize], 0);
     loop {
         let n = file.read(&mut block)?;
         if n == 0 {
-            return Ok(false);
+            return Ok(None);
         }
-        if last == 0xff && block[0] == 0xd9 || block[..n].windows(2).any(|two| two == [0xff, 0xd9]) {
-            return Ok(true);
+        let within = || block[..n].windows(2).position(|two| two == [0xff, 0xd9]).map(|at| at + 2);
+        let end = if last == 0xff && block[0] == 0xd9 { Some(1) } else { within() };
+        if let Some(end) = end {
+            let mut behind = block[end..n].to_vec();
+            file.take(MOST_BYTES).read_to_end(&mut behind)?;
+            return Ok(Some(behind));
         }
         last = block[n - 1];
     }
@@ -421,7 +507,7 @@ mod tests {
     #[test]
     fn what_cameras_of_bands_state_is_named() {
         let xmp = b"<x Camera:CentralWavelength=\"560\" GCamera:Other='1'><Camera:BandName>a</Camera:BandName>";
-        assert_eq!(of_xmp(xmp), ["Camera:CentralWavelength (XMP)", "Camera:BandName (XMP)", "Camera:BandName (XMP)"]);
+        assert_eq!(of_xmp(xmp), ["Camera:CentralWavelength (XMP)", "Camera:BandName (XMP)"]);
         assert!(of_xmp(b"<x Device:Camera: Camera: a>").iter().all(|name| !name.starts_with("Camera:")));
     }
 
@@ -436,10 +522,13 @@ mod tests {
             chunk(b"tEXt", b"exposure\0 2 s"),
             chunk(b"pHYs", &[0, 0, 0, 9, 0, 0, 0, 9, 1]),
             chunk(b"zoRp", b"xx"),
+            chunk(b"sRGB", b"\0"),
+            chunk(b"IDAT", b""),
+            chunk(b"gAMA", &[0, 0, 0, 1]),
             chunk(b"acTL", &[0; 8]),
             chunk(b"IEND", b""),
         ];
-        assert_eq!(named(&png.concat()), ["acTL", "text 'exposure'", "zoRp"]);
+        assert_eq!(named(&png.concat()), ["acTL", "gAMA (twice, or behind the pixels)", "text 'exposure'", "zoRp"]);
         let telling = [
             b"\x89PNG\r\n\x1a\n".to_vec(),
             chunk(b"tEXt", b"Comment\0depth in mm, 1000 a metre"),
@@ -459,17 +548,23 @@ mod tests {
             segment(0xfe, b"focal 50, made by hand"),
             segment(0xe1, b"http://ns.adobe.com/xap/1.0/\0 <x GDepth:Near='1'>"),
             segment(0xe1, b"http://ns.adobe.com/xap/1.0/\0 <x Item:Semantic='GainMap' tiff:Orientation='6'>"),
+            segment(0xe1, b"Exif\0\0II*\0"),
             segment(0xe2, b"MPF\0 more"),
+            segment(0xe2, b"urn:iso:std:iso:ts:21496:-1\0\0"),
+            segment(0xe4, b"QQQ \x07"),
             segment(0xda, b""),
-            vec![1, 2, 0xff, 0xd9],
+            vec![1, 2, 0xff, 0xd9, 0, 7],
         ];
         assert_eq!(
             named(&jpeg.concat()),
             [
+                "APP4 'QQQ '",
                 "JFIF (pixels that are not square)",
+                "bytes behind its end",
                 "comment 'focal 50, made by hand'",
                 "depth (XMP)",
                 "further pictures (MPF)",
+                "gain map (ISO 21496-1)",
                 "gain map (XMP)",
                 "orientation 6 (XMP)"
             ]

@@ -12,7 +12,7 @@ use ndarray::Array2;
 use super::{
     exr_colors::srgb_from,
     primaries::into_srgb,
-    stated::{name_of, note_of},
+    stated::{name_of, note_of, tells},
     unusable::unreadable,
 };
 use crate::SceneError;
@@ -50,9 +50,11 @@ impl RadianceHeader {
             if line.is_empty() {
                 break;
             }
-            // Comments, and the commands that made the picture.
+            // Comments, and the commands that made the picture, some of which say how it is seen or was fitted to a display.
             let Some((key, value)) = line.split_once('=').filter(|(key, _)| !key.trim().contains([' ', '\t', '#']))
             else {
+                let is_of_view = line.contains(" -v") || line.contains("pcond");
+                unused.extend((is_of_view || tells(&line)).then(|| line.clone()));
                 continue;
             };
             let numbers = |n: usize| -> Result<Vec<f64>, SceneError> {

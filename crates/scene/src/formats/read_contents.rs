@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use dioptric_pictures::StatedColors;
 use dioptric_spectrum::{Quantity, SpectralImage, SpectrumError, WavelengthGrid};
 use ndarray::Array2;
 
@@ -157,6 +158,14 @@ fn pages_of_tiff(path: &Path, options: &ReadOptions) -> Result<Contents, SceneEr
             for plane in &mut planes {
                 page.ignore(plane);
                 page.count_from_black(plane, None);
+            }
+            if let Some(colors) = StatedColors::of_floats(path).map_err(|reason| unreadable(path, reason))? {
+                for (channel, plane) in planes.iter_mut().enumerate() {
+                    plane.as_slice_mut().into_iter().for_each(|samples| colors.make_light(channel, samples));
+                }
+                into_srgb(&mut planes, &colors.to_srgb);
+                let what = "its numbers are converted to light of sRGB's primaries by what it states";
+                notes.push(format!("{}: {what}, {}", name_of(path), colors.name));
             }
             Ok(linear(planes, None, notes))
         }

@@ -154,7 +154,7 @@ pub enum Panorama {
         pitch_deg: f64,
     },
     /// The six faces of a cube, seen from its middle: as a cross, 4 × 3 (left, front, right and back in a row, up and down above and below
-    /// the front), or side by side (right, left, up, down, front, back), each turned as in the cross.
+    /// the front), or side by side or below each other (right, left, up, down, front, back), each turned as in the cross.
     Cube {
         /// To the right of the front, degrees.
         #[serde(default)]

@@ -8,7 +8,7 @@ use ndarray::Array2;
 
 use super::{
     band_name::{self, BandKind},
-    exr_attributes::{Attributes, is_harmless},
+    exr_attributes::{Attributes, WHITE, is_harmless},
     exr_colors::{ColorsOf, EXPECTED, colors_of, is_called_picture, srgb_from, srgb_from_xyz},
     exr_depth,
     exr_layers::{HIDDEN_LAYER, Head, RawLayer, leave_other_views, read_headers, read_layers, split_layers},
@@ -186,6 +186,9 @@ pub(super) fn read_raw_exr(path: &Path, asked: AskedChannels<'_>) -> Result<RawF
     } else {
         let image = image_of(path, &attributes, bands)?;
         notes.extend(attributes.note_of_unit(path).filter(|_| image.quantity() != Quantity::Reflectance));
+        // Bands say themselves how bright they are.
+        let white = attributes.white_cd_m2.map(|_| WHITE.to_owned());
+        notes.extend(note_of(path, "attribute", white.as_slice()));
         let image = match attributes.pitch_um {
             Some(pitch_um) => image.with_pitch_um(pitch_um),
             None => image,
@@ -245,6 +248,9 @@ fn panorama_of(path: &Path, layers: &[RawLayer], notes: &mut Vec<String>) -> Opt
 /// Returns the layer of bands that is asked for, or else that with bands, or else that of the colors of a picture, with the channels of others of the same samples; of several the largest,
 /// of as large ones the first. The names of others are told, as are those of parts whose bands are there already, and what headers state that
 /// nobody knows.
+///
+/// # Errors
+/// When as large layers have the same bands, none of which is the picture by its name.
 fn joined(
     path: &Path,
     mut layers: Vec<RawLayer>,
@@ -256,21 +262,30 @@ fn joined(
         let is_picture = layer.name.is_empty() || is_called_picture(&layer.name);
         let has_colors = !has_bands && layer.has_colors();
         let is_told = layer.has_bands() && asked.layer == Some(layer.name.as_str());
-        (is_told, layer.has_bands(), has_colors, has_colors && is_picture, layer.size.0 * layer.size.1)
+        let is_picture = is_picture && (has_colors || layer.has_bands());
+        (is_told, layer.has_bands(), has_colors, is_picture, layer.size.0 * layer.size.1)
     };
     // Of equals the last is the greatest: the first in the order turned round.
     let index = (0..layers.len()).rev().max_by_key(|index| rank(&layers[*index]));
     let mut first = layers.remove(index.unwrap_or(0));
     let (mut unused, mut stated) = (vec![], first.attributes.others.clone());
+    let wavelengths =
+        |layer: &RawLayer| layer.planes.iter().filter_map(|(name, _)| band_name::parse(name)).collect::<Vec<_>>();
+    let repeats =
+        |layer: &RawLayer, own: &RawLayer| wavelengths(layer).iter().any(|band| wavelengths(own).contains(band));
+    let is_picture = first.name.is_empty() || is_called_picture(&first.name) || asked.layer == Some(&first.name);
+    let alike = layers.iter().filter(|layer| layer.size == first.size && repeats(layer, &first));
+    let alike: Vec<String> = std::iter::once(&first).chain(alike).map(|layer| format!("'{}'", layer.name)).collect();
+    if has_bands && !is_picture && alike.len() > 1 {
+        let reason =
+            format!("it has several layers of bands, {}: expected --variable with the name of one", alike.join(", "));
+        return Err(unreadable(path, reason));
+    }
     if !has_bands {
         first.name_channels();
     }
     for mut layer in layers {
-        let wavelengths =
-            |layer: &RawLayer| layer.planes.iter().filter_map(|(name, _)| band_name::parse(name)).collect::<Vec<_>>();
-        let own = wavelengths(&first);
-        let repeats = wavelengths(&layer).iter().any(|band| own.contains(band));
-        if repeats || (layer.size, layer.position) != (first.size, first.position) {
+        if repeats(&layer, &first) || (layer.size, layer.position) != (first.size, first.position) {
             unused.push(layer.name);
         } else {
             if layer.has_bands() && layer.attributes.unit != first.attributes.unit {
@@ -334,8 +349,7 @@ fn rgb_of(
         let note = format!("{}: its primaries become those of sRGB, its white D65", name_of(path));
         notes.extend(Some(note).filter(|note| !notes.contains(note)));
     }
-    let white_cd_m2 = attributes.white_cd_m2.filter(|white| *white > 0.0);
-    Ok((RawImage::Rgb { planes, white_cd_m2 }, prefix))
+    Ok((RawImage::Rgb { planes, white_cd_m2: attributes.white_cd_m2 }, prefix))
 }
 
 /// Returns light, or colors, and depth of the layer behind; what else it has is named.

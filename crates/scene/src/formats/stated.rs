@@ -152,6 +152,36 @@ pub(super) fn short(text: &str) -> String {
     text.chars().filter(|c| !c.is_control()).take(MOST_CHARACTERS).collect()
 }
 
+/// Whether a text says something of numbers or of a view, and not who made them when: a unit, or a quantity with a number.
+pub(super) fn tells(text: &str) -> bool {
+    const UNITS: [&str; 15] = [
+        "mm",
+        "cm",
+        "km",
+        "nm",
+        "um",
+        "µm",
+        "percent",
+        "inch",
+        "inches",
+        "feet",
+        "inverse",
+        "disparity",
+        "disparities",
+        "reciprocal",
+        "wavenumber",
+    ];
+    const PARTS: [&str; 4] = ["metre", "meter", "micron", "angstrom"];
+    const QUANTITIES: [&str; 11] =
+        ["depth", "scale", "unit", "focal", "fov", "wavelength", "gain", "offset", "baseline", "exposure", "gamma"];
+    let lower = text.to_lowercase();
+    let words: Vec<&str> = lower.split(|c: char| !c.is_alphabetic()).filter(|word| !word.is_empty()).collect();
+    let has = |known: &str| words.iter().any(|word| *word == known || (known.len() > 3 && word.contains(known)));
+    let has_digit = lower.contains(|c: char| c.is_ascii_digit());
+    words.iter().any(|word| UNITS.contains(word) || PARTS.iter().any(|part| word.contains(part)))
+        || has_digit && QUANTITIES.iter().any(|known| has(known))
+}
+
 /// Returns a number of a file for a message, however large or small.
 pub(super) fn shown(number: f64) -> String {
     let is_usual = number == 0.0 || !number.is_finite() || (1e-4..1e9).contains(&number.abs());

@@ -10,7 +10,7 @@ use exr::prelude::{
 };
 use ndarray::Array2;
 
-use super::{FileQuantity, FileReading, ReadOptions, kinds_tests::zip_of, npy::tests::npy, read_scene};
+use super::{FileQuantity, FileReading, NoData, ReadOptions, kinds_tests::zip_of, npy::tests::npy, read_scene};
 use crate::{Scene, SceneError};
 
 const ROWS: usize = 2;
@@ -301,4 +301,96 @@ fn samples_without_a_layer_behind_are_counted() {
     let scene = read_scene(&front, &ReadOptions { hidden: Some(behind), ..options(FileReading::default()) }).unwrap();
     check_noted(&scene, &["known of 5 of 6 samples"]);
     assert_eq!(scene.hidden.unwrap().depth.z_m()[(0, 0)], 2.0);
+}
+
+/// What an EXR file says of its white is used, or named where it cannot be or an option takes its place.
+#[test]
+fn whites_of_files_are_used_or_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.exr");
+    let read = |white: f32, value: f32, lux: Option<f64>, no_data: Option<NoData>| {
+        let channels = ["R", "G", "B"].map(|name| AnyChannel::new(name, FlatSamples::F32(vec![value; ROWS * COLUMNS])));
+        let attributes = LayerAttributes { white_luminance: Some(white), ..LayerAttributes::default() };
+        let channels = AnyChannels::sort(channels.into_iter().collect());
+        let layer = Layer::new((COLUMNS, ROWS), attributes, Encoding::FAST_LOSSLESS, channels);
+        Image::from_layer(layer).write().to_file(&path).unwrap();
+        read_scene(
+            &path,
+            &ReadOptions { illuminance_lux: lux, ..options(FileReading { no_data, ..FileReading::default() }) },
+        )
+    };
+    for white in [0.0, -1.0, f32::NAN, f32::INFINITY] {
+        check_noted(&read(white, 0.5, None, None).unwrap(), &["whiteLuminance, which is no likely value"]);
+    }
+    let level = |scene: Scene| scene.mean_luminance_cd_m2();
+    assert!((level(read(100.0, 0.5, None, None).unwrap()) / 50.0 - 1.0).abs() < 1e-3);
+    let told = read(100.0, 0.5, Some(std::f64::consts::PI), None).unwrap();
+    check_noted(&told, &["its white luminance by --illuminance-lux"]);
+    assert!((level(told) / 0.5 - 1.0).abs() < 1e-3);
+    // Of no color is the light below 0.
+    check_noted(&read(100.0, -0.1, None, None).unwrap(), &["of 18 samples of all bands 18 below 0 are 0"]);
+    let refused = read(100.0, -0.1, None, Some(NoData::Refuse));
+    check_refused(refused, &["row 0, column 0 is -0.1, -0.1, -0.1", "--no-data refuse"]);
+}
+
+#[test]
+fn lights_known_in_part_are_named_whatever_is_under_them() {
+    let (_folder, path) = folder_with_picture();
+    let light = dioptric_spectrum::Spectrum::new(vec![500.0, 600.0], vec![1.0, 1.0]).unwrap();
+    let light = Some(dioptric_spectrum::Illuminant::Spectrum(light));
+    for quantity in [None, Some(FileQuantity::Reflectance)] {
+        let own = options(FileReading { quantity, ..FileReading::default() });
+        let scene = read_scene(&path, &ReadOptions { light: light.clone(), ..own }).unwrap();
+        check_noted(&scene, &["known from 500 to 600 nm"]);
+    }
+    let refused = FileReading { no_data: Some(NoData::Refuse), ..FileReading::default() };
+    check_refused(read_scene(&path, &options(refused)), &["--no-data"]);
+}
+
+/// Parts of profiles, and chunks of colors that nobody can read, are not passed over.
+#[cfg(feature = "jpeg")]
+#[test]
+fn damaged_colors_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let gray: image::DynamicImage = image::RgbImage::from_pixel(3, 2, image::Rgb([99; 3])).into();
+    let encoded = |format| dioptric_pictures::encode(&gray, format).unwrap();
+    let jpeg = encoded(image::ImageFormat::Jpeg);
+    let segment = [&[0xff, 0xe2, 0, 20][..], b"ICC_PROFILE\0\x01\x02abcd"].concat();
+    let png = encoded(image::ImageFormat::Png);
+    // With a checksum that does not fit.
+    let chunk = [&[0, 0, 0, 4][..], b"gAMA", &100_000_u32.to_be_bytes(), &[9; 4]].concat();
+    for (name, bytes, word) in [
+        ("a.jpg", [&jpeg[..2], &segment, &jpeg[2..]].concat(), "an ICC profile that is damaged"),
+        ("a.png", [&png[..33], &chunk, &png[33..]].concat(), "gAMA of its colors that is damaged"),
+    ] {
+        let path = folder.path().join(name);
+        fs::write(&path, bytes).unwrap();
+        check_refused(read_scene(&path, &options(FileReading::default())), &[name, word]);
+    }
+}
+
+/// Radiance pictures lie in eight ways (Ward 2004); each is read upright.
+#[test]
+fn radiance_pictures_are_turned_upright() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.hdr");
+    // As it is seen, 3 columns and 2 rows.
+    let seen = [[10_u8, 20, 30], [40, 50, 60]];
+    let read = |axes: &str, codes: &[u8]| {
+        let pixels: Vec<u8> = codes.iter().flat_map(|&v| [v, v, v, 128]).collect();
+        fs::write(&path, [b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n", axes.as_bytes(), b"\n", &pixels].concat())
+            .unwrap();
+        let scene = read_scene(&path, &options(FileReading::default())).unwrap();
+        assert_eq!(scene.notes.iter().any(|note| note.contains("turned upright")), axes != "-Y 2 +X 3", "{axes}");
+        scene.radiance.planes()[15].clone()
+    };
+    let upright = read("-Y 2 +X 3", &seen.concat());
+    for (down, right) in [("-Y", "+X"), ("+Y", "+X"), ("-Y", "-X"), ("+Y", "-X")] {
+        let row = |i: usize| if down == "-Y" { i } else { 1 - i };
+        let column = |j: usize| if right == "+X" { j } else { 2 - j };
+        let by_rows: Vec<u8> = (0..6).map(|k| seen[row(k / 3)][column(k % 3)]).collect();
+        assert_eq!(read(&format!("{down} 2 {right} 3"), &by_rows), upright, "{down} {right}");
+        let by_columns: Vec<u8> = (0..6).map(|k| seen[row(k % 2)][column(k / 2)]).collect();
+        assert_eq!(read(&format!("{right} 3 {down} 2"), &by_columns), upright, "{right} {down}");
+    }
 }

@@ -27,8 +27,8 @@ const DEPTH_MAP_KIND: u64 = 8;
 pub(super) struct AsGray {
     file: File,
     at: u64,
-    /// Where two bytes of the file are others, in their order.
-    marks: Vec<(u64, [u8; 2])>,
+    /// Where bytes of the file are others, in their order.
+    marks: Vec<(u64, Vec<u8>)>,
 }
 
 impl AsGray {
@@ -37,43 +37,72 @@ impl AsGray {
         let mut file = File::open(path)?;
         let mut maps = vec![];
         // What is broken is named by what decodes it.
-        for (at, directory) in Directory::all(&mut file, most).unwrap_or_default() {
-            let mut number = |tag| directory.number_of(&mut file, tag);
-            if number(PHOTOMETRIC)? == Some(DEPTH_MAP) || number(KIND)?.is_some_and(|kind| kind & DEPTH_MAP_KIND != 0) {
-                maps.push(at);
+        let pages = Directory::all(&mut file, most).unwrap_or_default();
+        for (at, directory) in &pages {
+            if is_depth_map(&mut file, directory)? {
+                maps.push(*at);
             }
         }
-        let reader = Self::marked(file, maps.iter().copied())?;
+        maps.extend(maps_below(&mut file, &pages).into_iter().map(|(at, _)| at));
+        let reader = Self::marked(file, maps.iter().copied(), most)?;
         Ok((reader, maps))
     }
 
-    /// Opens the file again in which the pages were found at these places.
-    pub(super) fn open(path: &Path, pages: &[(Page, u64)]) -> std::io::Result<Decoder<BufReader<Self>>> {
+    /// Opens the file again in which the pages, up to so many, were found at these places.
+    pub(super) fn open(path: &Path, pages: &[(Page, u64)], most: usize) -> std::io::Result<Decoder<BufReader<Self>>> {
         let plain = pages.iter().filter(|(page, _)| page.has_plain_samples()).map(|(_, at)| *at);
-        let reader = Self::marked(File::open(path)?, plain)?;
+        let reader = Self::marked(File::open(path)?, plain, most)?;
         let mut limits = Limits::default();
         limits.decoding_buffer_size = 4 << 30;
         Ok(Decoder::new(reader).map_err(std::io::Error::other)?.with_limits(limits))
     }
 
-    fn marked(mut file: File, directories: impl Iterator<Item = u64>) -> std::io::Result<BufReader<Self>> {
+    /// Marks pages at these places as gray, and puts depth maps that lie below pages behind the last.
+    fn marked(mut file: File, directories: impl Iterator<Item = u64>, most: usize) -> std::io::Result<BufReader<Self>> {
         let mut marks = vec![];
         for at in directories {
             let directory = Directory::read(&mut file, at)?;
             // 1 is gray, 0 being black.
             marks.extend(directory.place_of(PHOTOMETRIC).map(|place| (place, directory.bytes_of(1))));
         }
+        let pages = Directory::all(&mut file, most).unwrap_or_default();
+        let below = maps_below(&mut file, &pages);
+        let before = pages.last().into_iter().chain(&below);
+        let after = below.iter().map(|(at, _)| *at).chain([0]);
+        marks.extend(before.zip(after).filter(|_| !below.is_empty()).map(|((_, own), next)| own.link_to(next)));
         marks.sort_unstable();
         file.rewind()?;
         Ok(BufReader::new(Self { file, at: 0, marks }))
     }
 }
 
+/// Whether a page is marked as a depth map.
+fn is_depth_map(file: &mut File, directory: &Directory) -> std::io::Result<bool> {
+    let mark = directory.number_of(file, PHOTOMETRIC)?;
+    let kind = directory.number_of(file, KIND)?.unwrap_or(0);
+    Ok(mark == Some(DEPTH_MAP) || kind & DEPTH_MAP_KIND != 0)
+}
+
+/// Returns the depth maps in directories below those of pages; what is broken is none.
+fn maps_below(file: &mut File, pages: &[(u64, Directory)]) -> Vec<(u64, Directory)> {
+    let mut maps: Vec<(u64, Directory)> = vec![];
+    for (_, page) in pages {
+        for at in page.below(file).unwrap_or_default() {
+            let is_new = pages.iter().chain(&maps).all(|(own, _)| *own != at);
+            let Some(directory) = Directory::read(file, at).ok().filter(|_| is_new) else { continue };
+            if is_depth_map(file, &directory).unwrap_or(false) {
+                maps.push((at, directory));
+            }
+        }
+    }
+    maps
+}
+
 impl Read for AsGray {
     fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
         let n = self.file.read(buffer)?;
         let (from, end) = (self.at, self.at + n as u64);
-        let first = self.marks.partition_point(|(at, _)| at + 2 <= from);
+        let first = self.marks.partition_point(|(at, bytes)| at + bytes.len() as u64 <= from);
         for (at, bytes) in self.marks[first..].iter().take_while(|(at, _)| *at < end) {
             for (place, byte) in (*at..).zip(bytes) {
                 if (from..end).contains(&place) {

@@ -167,6 +167,19 @@ mod tests {
                 assert_eq!(scene.notes.len(), 1, "{:?}", scene.notes);
             }
         }
+        // Below the page of the picture, in a directory that is no page: that of the second page, which the first calls its own.
+        write(&own, true, (51_177, 8), Some([1, METRES, 1]), [(1, 2), (5, 1)]);
+        let mut bytes = fs::read(&own).unwrap();
+        let four = |bytes: &[u8], at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()) as usize;
+        let first = four(&bytes, 4);
+        let end = first + 2 + 12 * usize::from(u16::from_le_bytes([bytes[first], bytes[first + 1]]));
+        let map_at = four(&bytes, end) as u32;
+        // Its last entry gives way to the link, and no page follows.
+        bytes[end - 12..end].copy_from_slice(&[&[0x4a, 1, 4, 0, 1, 0, 0, 0][..], &map_at.to_le_bytes()].concat());
+        bytes[end..end + 4].fill(0);
+        fs::write(&own, bytes).unwrap();
+        let scene = read(&own, FileReading::default()).unwrap();
+        assert_eq!(scene.require_depth().unwrap().range_m(), (0.5, 5.0), "{:?}", scene.notes);
         write(&own, true, (51_177, 8), Some([2, 0, 0]), [(1, 2), (4, 1)]);
         let message = read(&own, FileReading::default()).unwrap_err().to_string();
         assert!(message.contains("inverse depths") && message.contains("--depth-kind"), "{message}");

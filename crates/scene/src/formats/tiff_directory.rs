@@ -7,6 +7,8 @@ use std::{
 
 /// Bytes of a text that are read.
 const MOST_BYTES: u64 = 1 << 20;
+/// Directories below one that are looked at.
+const MOST_BELOW: u64 = 1000;
 
 /// The entries of a directory.
 pub(super) struct Directory {
@@ -16,7 +18,12 @@ pub(super) struct Directory {
     entries: Vec<(u16, u64)>,
     /// The place of the next directory; 0 behind the last.
     next: u64,
+    /// Where that stands.
+    next_at: u64,
 }
+
+/// The tag of the directories below one (TIFF technical note 1, 1995).
+pub(super) const BELOW: u16 = 330;
 
 impl Directory {
     /// Reads the directory at a place of a file.
@@ -28,8 +35,8 @@ impl Directory {
             let place = at + n_count as u64 + n_entry * index;
             this.entries.push((this.number_at(file, place, 2)? as u16, place));
         }
-        let end = at + n_count as u64 + n_entry * count;
-        this.next = this.number_at(file, end, if this.is_big_file { 8 } else { 4 }).unwrap_or(0);
+        this.next_at = at + n_count as u64 + n_entry * count;
+        this.next = this.number_at(file, this.next_at, this.side()).unwrap_or(0);
         Ok(this)
     }
 
@@ -52,7 +59,7 @@ impl Directory {
         let mut start = [0; 4];
         file.rewind()?;
         file.read_exact(&mut start)?;
-        let this = Self { is_big_endian: start[0] == b'M', is_big_file: false, entries: vec![], next: 0 };
+        let this = Self { is_big_endian: start[0] == b'M', is_big_file: false, entries: vec![], next: 0, next_at: 0 };
         Ok(Self { is_big_file: this.number(&start[2..]) == 43, ..this })
     }
 
@@ -69,14 +76,41 @@ impl Directory {
         Some(place + if self.is_big_file { 12 } else { 8 })
     }
 
+    /// Returns the places of the directories below it.
+    pub(super) fn below(&self, file: &mut File) -> Result<Vec<u64>> {
+        let Some((_, entry)) = self.entries.iter().find(|(own, _)| *own == BELOW) else { return Ok(vec![]) };
+        let n = self.number_at(file, entry + 4, self.side())?.min(MOST_BELOW);
+        let values = entry + 4 + self.side() as u64;
+        let n_bytes = if [16, 18].contains(&self.number_at(file, entry + 2, 2)?) { 8 } else { 4 };
+        let is_within = n * n_bytes as u64 <= self.side() as u64;
+        let from = if is_within { values } else { self.number_at(file, values, self.side())? };
+        (0..n).map(|i| self.number_at(file, from + i * n_bytes as u64, n_bytes)).collect()
+    }
+
+    /// Returns where the place of the next directory stands, and the bytes that would lead to another.
+    pub(super) fn link_to(&self, next: u64) -> (u64, Vec<u8>) {
+        (self.next_at, self.bytes(next, self.side()))
+    }
+
     /// Returns the two bytes of a whole number.
-    pub(super) fn bytes_of(&self, value: u16) -> [u8; 2] {
-        if self.is_big_endian { value.to_be_bytes() } else { value.to_le_bytes() }
+    pub(super) fn bytes_of(&self, value: u16) -> Vec<u8> {
+        self.bytes(value.into(), 2)
+    }
+
+    fn bytes(&self, value: u64, n_bytes: usize) -> Vec<u8> {
+        let all = value.to_be_bytes();
+        let own = all[8 - n_bytes..].iter().copied();
+        if self.is_big_endian { own.collect() } else { own.rev().collect() }
+    }
+
+    /// How many bytes a place in the file takes.
+    fn side(&self) -> usize {
+        if self.is_big_file { 8 } else { 4 }
     }
 
     /// Returns all texts of a tag, which some writers have twice.
     pub(super) fn texts(&self, file: &mut File, tag: u16) -> Result<Vec<String>> {
-        let side = if self.is_big_file { 8 } else { 4 };
+        let side = self.side();
         let mut texts = vec![];
         for (_, place) in self.entries.iter().filter(|(own, _)| *own == tag) {
             let n_bytes = self.number_at(file, place + 4, side)?;

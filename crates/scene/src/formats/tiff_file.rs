@@ -14,9 +14,9 @@ use tiff::{
 use super::{
     contents::is_of,
     picture_parts::comment,
-    stated::{Noted, note_of},
+    stated::{Noted, name_of, note_of},
     tiff_bands::{AsGray, planes_of},
-    tiff_directory::Directory,
+    tiff_directory::{BELOW, Directory},
     tiff_page::{Marked, Page, PageWords, SampleDepth, StatedBands},
     unusable::{check_memory, said, unreadable},
 };
@@ -28,6 +28,8 @@ const DESCRIPTION: u16 = 270;
 const PHOTOMETRIC: u16 = 262;
 /// What of it is decoded, and a depth map.
 const KNOWN_MARKS: [u64; 11] = [0, 1, 2, 3, 4, 5, 6, 8, 9, 10, 51_177];
+/// The tag of an ICC profile.
+const PROFILE: u16 = 34_675;
 /// Pages of a file.
 const LIMIT_PAGES: usize = 10_000;
 
@@ -169,7 +171,9 @@ pub(super) fn read_tiff(path: &Path, wanted: TiffAs) -> Result<Noted<TiffFile>, 
     let bands = StatedBands::of(&own).map_err(|reason| unreadable(path, reason))?;
     let n_stated = bands.wavelengths_nm.as_ref().map(Vec::len);
     let is_whole = wanted == TiffAs::Planes(Some(planes.len())) || n_stated == Some(planes.len());
-    if !is_whole {
+    if is_whole {
+        notes.extend(note_on_opacities(path, &own[0]));
+    } else {
         notes.extend(without_opacity(path, &own[0], &mut planes));
     }
     if let Some(n_stated) = n_stated.filter(|n| *n != planes.len()) {
@@ -220,6 +224,12 @@ fn pages_of(path: &Path, wanted: TiffAs) -> Result<Pages, SceneError> {
         }
         let at = decoder.ifd_pointer().map_or(0, |place| place.0);
         let mut page = Page::of(&mut decoder, index - 1, maps.contains(&at)).map_err(broken)?;
+        if page.unknown.contains(&BELOW) {
+            let mut file = File::open(path).map_err(|error| unreadable(path, error))?;
+            let below = Directory::read(&mut file, at).and_then(|own| own.below(&mut file)).unwrap_or_default();
+            let are_maps = below.iter().all(|own| maps.contains(own));
+            page.unknown.retain(|tag| *tag != BELOW || !are_maps);
+        }
         let is_depth = page.depth_map.is_some();
         if is_depth != (wanted == TiffAs::Depths && !maps.is_empty()) {
             unused.extend((is_depth && wanted == TiffAs::Planes(None)).then(|| format!("{index} (a depth map)")));
@@ -241,6 +251,9 @@ fn pages_of(path: &Path, wanted: TiffAs) -> Result<Pages, SceneError> {
             let reason = format!("it holds {what}, expected gray or red, green and blue: convert it to sRGB");
             return Err(unreadable(path, reason));
         }
+        // A picture is in the colors of its profile; bands and depths are numbers.
+        let is_picture = !page.is_stack() && matches!(wanted, TiffAs::Marked | TiffAs::Planes(None));
+        page.unknown.retain(|tag| *tag != PROFILE || !is_picture);
         unknown.extend(page.unknown.iter().map(ToString::to_string));
         let first = pages.first().map(|(first, _)| first);
         let is_like = first.is_none_or(|first| first.size == page.size && first.n_samples == page.n_samples);
@@ -312,7 +325,7 @@ fn notes_on_others(path: &Path, pages: &[(Page, u64)], mut unused: Vec<String>) 
 /// Returns the samples of all pages, a plane each.
 fn planes_of_pages(path: &Path, pages: &[(Page, u64)]) -> Result<Vec<Array2<f32>>, SceneError> {
     let broken = |error| broken(path, &error);
-    let mut decoder = AsGray::open(path, pages).map_err(|error| unreadable(path, error))?;
+    let mut decoder = AsGray::open(path, pages, LIMIT_PAGES).map_err(|error| unreadable(path, error))?;
     let mut planes = vec![];
     for (page, _) in pages {
         if page.has_tiles_of_planes {
@@ -345,6 +358,24 @@ fn without_opacity(path: &Path, first: &Page, planes: &mut Vec<Array2<f32>>) -> 
         !opacities.contains(&((index - 1) % first.n_samples))
     });
     (!opacities.is_empty()).then(|| note_of(path, "channel", &["opacity".to_owned()])).flatten()
+}
+
+/// Returns what is said of samples that are marked as opacities and are bands.
+fn note_on_opacities(path: &Path, first: &Page) -> Option<String> {
+    let first_extra = first.n_samples.saturating_sub(first.extra.len());
+    let marked: Vec<String> = first
+        .opacities()
+        .into_iter()
+        .filter(|sample| *sample >= first_extra)
+        .map(|own| (own + 1).to_string())
+        .collect();
+    (!marked.is_empty()).then(|| {
+        format!(
+            "{}: its sample {} of a pixel, marked as an opacity (ExtraSamples), is taken for a band: there are as many wavelengths as samples",
+            name_of(path),
+            marked.join(" and ")
+        )
+    })
 }
 
 /// Returns red, green and blue of a page of floats; a further sample is left out.

@@ -66,6 +66,9 @@ const UNREAD: [(u16, &str); 7] = [
 ];
 /// What is not read of samples whose bits are in reverse order.
 const REVERSED: &str = "samples whose bits stand in reverse order (FillOrder 2)";
+/// What is not read of numbers (TIFF 6.0, section 19, and its supplement 2).
+const UNSTATED: &str = "numbers of a kind that is not stated (SampleFormat 4)";
+const COMPLEX: &str = "complex numbers (SampleFormat 5 or 6)";
 /// The tag of the version of DNG that a file is written by.
 const DNG_VERSION: u16 = 50_706;
 
@@ -155,6 +158,8 @@ impl Page {
             bits,
             marked: match photometric {
                 _ if is_reversed => Marked::Unread(REVERSED),
+                _ if format == Some(4) => Marked::Unread(UNSTATED),
+                _ if matches!(format, Some(5 | 6)) => Marked::Unread(COMPLEX),
                 0 | 1 => Marked::Gray { is_white_zero: photometric == 0 },
                 2 => Marked::Rgb,
                 other => {

@@ -205,6 +205,12 @@ fn lines_of_radiance_pictures_are_obeyed_or_named() {
         // The numbers of a file are those of light times all exposures in its header.
         let (exposed, _) = luminance("EXPOSURE=4\nEXPOSURE= 0.5\n");
         assert!((exposed / plain * 2.0 - 1.0).abs() < 1e-4, "{exposed} {plain}");
+        // Commands that made a picture say how it is seen, or that it was fitted to a display.
+        assert_eq!(luminance("oconv room.rad\n# by hand\n").1.len(), 1);
+        for line in ["rpict -vh 45 room.oct", "pcond -h", "# lengths in mm"] {
+            let (_, notes) = luminance(&format!("{line}\n"));
+            assert!(notes.iter().any(|note| note.contains(line)), "{line}: {notes:?}");
+        }
         for _ in 0..n_cases() {
             let word = word(&mut rng).to_uppercase();
             let (_, notes) = luminance(&format!("{word}=1 2 3\n"));

@@ -309,17 +309,12 @@ impl Target {
             Pattern::ColorChart => color_checker_reflectances().first().map(|(_, patch)| patch.range_nm()),
             _ => None,
         };
-        let table = match (&self.light, light) {
-            (TargetLight::Illuminant(_), Illuminant::Spectrum(table)) => Some(table.range_nm()),
-            _ => None,
-        };
         let (first, last) = grid.range_nm();
-        let known = [("reflectances of the chart", chart), ("values of its light", table)];
-        let beyond = known.into_iter().filter_map(|(what, range)| {
-            let (from, to) = range.filter(|(from, to)| first < *from || last > *to)?;
-            Some(format!("the {what} are known from {from} to {to} nm; beyond, their end values are held"))
+        let chart = chart.filter(|(from, to)| first < *from || last > *to).map(|(from, to)| {
+            format!("the reflectances of the chart are known from {from} to {to} nm; beyond, their end values are held")
         });
-        beyond.collect()
+        let is_told = matches!(self.light, TargetLight::Illuminant(_));
+        chart.into_iter().chain(light.note_beyond_table(grid).filter(|_| is_told)).collect()
     }
 
     /// Returns what each sample of a gray pattern reflects, as a share of white.

@@ -207,14 +207,17 @@ impl Hdf5 {
     }
 }
 
+/// Attributes that call an array something.
+pub(super) const NAMING: [&str; 2] = ["long_name", "standard_name"];
+
 /// Returns what the attributes of an array call it.
 fn words_of(dataset: &Dataset) -> String {
     let Ok(attributes) = dataset.attrs() else { return String::new() };
     let text = |name: &str| attributes.get(name).and_then(AttrValue::as_str);
-    ["long_name", "standard_name"].into_iter().filter_map(text).collect::<Vec<_>>().join("; ")
+    NAMING.into_iter().filter_map(text).collect::<Vec<_>>().join("; ")
 }
 
-/// Returns the attributes that may change what numbers mean, in the order of their names; those of types that are not read, as half
+/// Returns the attributes that may change what numbers mean, in the order of their names, those of words that tell it among them; those of types that are not read, as half
 /// floats, by their names alone.
 fn telling(
     values: Result<HashMap<String, AttrValue>, hdf5_pure::Error>,
@@ -240,8 +243,10 @@ fn telling(
         "references",
         "_NCProperties",
     ];
-    let is_telling =
-        |name: &str| !(HARMLESS.contains(&name) || name.starts_with("MATLAB_") || name.starts_with("_Net"));
+    let is_telling = |name: &str, value: &Value| {
+        let is_harmless = HARMLESS.contains(&name) || name.starts_with("MATLAB_") || name.starts_with("_Net");
+        !is_harmless || matches!(value, Value::Text(text) if super::super::stated::tells(text))
+    };
     let value_of = |value: AttrValue| match (value.to_f64s(), value.to_i64s(), value.as_str()) {
         (Some(numbers), ..) => Value::Numbers(numbers),
         (None, Some(numbers), _) => Value::Numbers(numbers.into_iter().map(|v| v as f64).collect()),
@@ -252,7 +257,7 @@ fn telling(
     let unread = types.into_keys().filter(|name| !values.contains_key(name)).map(|name| (name, Value::Other));
     let unread: Vec<_> = unread.collect();
     let all = values.into_iter().map(|(name, value)| (name, value_of(value))).chain(unread);
-    let own = all.filter(|(name, _)| is_telling(name));
+    let own = all.filter(|(name, value)| is_telling(name, value));
     let mut own: Vec<Attribute> = own.map(|(name, value)| Attribute { name, value }).collect();
     own.sort_by(|a, b| a.name.cmp(&b.name));
     own

@@ -7,12 +7,13 @@ use ndarray::Array2;
 use super::{
     super::{
         axes,
-        length_unit::{length_in_name, length_m},
+        length_unit::{length_in_name, length_in_words, length_m},
         stated::{Noted, note_of},
         unusable::unreadable,
     },
     container::{MatFile, WHOLE},
     elements::Listed,
+    hdf5::NAMING,
     packing::Packing,
 };
 use crate::SceneError;
@@ -88,10 +89,13 @@ pub(in super::super) fn read_plane(path: &Path, told: Option<&str>) -> Result<No
     let others: Vec<String> =
         file.listed.iter().map(|own| own.name.clone()).filter(|own| *own != chosen.name).collect();
     let packing = Packing::of(file.attributes_of(&chosen.name));
-    let unit_m = packing.unit.as_deref().and_then(length_m);
+    // What it is called may have its unit.
+    let called_m = length_in_words(words);
+    let unit_m = packing.unit.as_deref().and_then(length_m).or(called_m);
     let mut notes: Vec<String> = note_of(path, "array", &others).into_iter().collect();
     let of_file = file.attributes_of(WHOLE).iter().map(|own| own.name.clone());
-    let left = packing.left(unit_m.is_some(), false);
+    let mut left = packing.left(unit_m.is_some(), false);
+    left.retain(|name| called_m.is_none() || called_m != unit_m || !NAMING.contains(&name.as_str()));
     notes.extend(note_of(path, "attribute", &of_file.chain(left).collect::<Vec<_>>()));
     let plane = Plane {
         name: chosen.name.clone(),
