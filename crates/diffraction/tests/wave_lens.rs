@@ -237,6 +237,20 @@ fn strehl_ratio_of_small_aberrations_is_that_of_their_rms() {
     }
 }
 
+/// A mirror of f/1 off its axis, beside Huygens' sum over the mirror itself: 250 x 800 of its points, and the exact paths from a plane wave
+/// to each and from there to the film, its highest point searched for along the picture's axis of symmetry.
+#[dioptric_golden::needs_shared]
+#[test]
+fn strehl_ratio_of_coma_is_that_of_exact_paths() {
+    let path = dioptric_golden::shared("data/lenses/more/paraboloid.seq").unwrap();
+    let lens = Lens::read(&path).unwrap().at(550.0).unwrap();
+    for (field_deg, expected) in [(0.1, 0.025_219), (0.2, 0.010_185), (0.3, 0.005_972_4)] {
+        let point = field(&lens, field_deg, 0.0);
+        let found = PupilSamples::peak_of(&lens, &point, 100.0).unwrap().strehl;
+        assert!((found / expected - 1.0).abs() < 3e-4, "{field_deg}: {found} {expected}");
+    }
+}
+
 /// Among the many summits of a large blur the peak is the highest: no pixel of a finer raster over all of it is higher.
 #[test]
 fn peak_of_a_large_blur_is_above_all_its_pixels() {

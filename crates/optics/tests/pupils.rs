@@ -258,6 +258,15 @@ fn the_last_light_of_a_tilted_lens_is_found() {
     assert!(seen_mm2(86.582_519_531_25) < 1e-6);
 }
 
+/// At 66° the first look over this lens ends where the front's rim meets the edge of all that passes the other surfaces: a single place, and
+/// dark. The light is elsewhere.
+#[dioptric_golden::needs_shared]
+#[test]
+fn light_beside_a_place_that_grazes_is_found() {
+    let lens = shared("bench/Tamron_16mm_F2.88_IF.lens");
+    check("Tamron", &lens, &[65.5, 65.9, 66.0, 66.1, 66.2], 600, 4e-3);
+}
+
 /// A stop of 5 mm and, 100 mm behind it, a window of 8 mm that is 30 mm off the axis in one of forty directions: light through both is that
 /// through two discs that overlap, by their closed form.
 #[test]

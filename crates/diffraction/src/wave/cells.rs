@@ -1,13 +1,13 @@
 //! The cells of a true pupil: vignetted, obscured, and cut where its edge has corners.
 
-use std::f64::consts::TAU;
+use std::{f64::consts::TAU, ops::Range};
 
 use dioptric_optics::{MonoLens, ObjectPoint, PupilBoundary, PupilPlane, Vignetting, quadrature::gauss_legendre_on};
 use glam::{DVec2, DVec3};
 
 use super::{
     grid::PupilGrid,
-    propagation::{FilmRays, Waves},
+    propagation::{FilmRays, Propagation, Waves},
 };
 use crate::DiffractionError;
 
@@ -78,51 +78,109 @@ impl PupilCells {
         self.targets_mm.len()
     }
 
-    /// Traces the nodes to the film, and after them their neighbors towards +x, −x, +y and −y.
-    pub(super) fn trace(
+    /// Traces the nodes to the film, and finds what waves they stand for and how much of the directions each takes: spherical waves
+    /// where that can be, and plane ones where a sphere is missed or where the pupil's own image is folded, for the rays behind it need
+    /// not be.
+    ///
+    /// # Errors
+    /// When rays are lost, or the waves fold over one another either way.
+    pub(super) fn waves(
         &self,
         lens: &MonoLens,
         point: &ObjectPoint,
         film_distance_mm: f64,
-    ) -> Result<FilmRays, DiffractionError> {
-        // One after the other: rays take more memory than what is kept of them.
-        let mut on_film: Option<FilmRays> = None;
-        let (mut n_rays, mut n_lost) = (0, 0);
-        for step in [DVec2::ZERO, DVec2::X, -DVec2::X, DVec2::Y, -DVec2::Y] {
-            let targets_mm: Vec<DVec2> = self.targets_mm.iter().map(|target| target + step * self.step_mm).collect();
-            let mut rays = self.plane.rays(lens, point, &targets_mm);
-            lens.trace(&mut rays, Vignetting::Off);
-            lens.to_film(&mut rays, film_distance_mm);
-            (n_rays, n_lost) = (n_rays + rays.len(), n_lost + rays.len() - rays.n_in_flight());
-            let more = FilmRays::new(&rays, lens, film_distance_mm);
-            match &mut on_film {
-                Some(on_film) => on_film.append(more),
-                None => on_film = Some(more),
+    ) -> Result<CellWaves, DiffractionError> {
+        let trace = |nodes, step| self.trace((lens, point, film_distance_mm), nodes, step);
+        let mut blocks = self.blocks();
+        let mut rays = trace(blocks.next().unwrap_or_default(), DVec2::ZERO)?;
+        for nodes in blocks {
+            rays.append(trace(nodes, DVec2::ZERO)?);
+        }
+        let centroid_mm = self.centroid_mm(&rays);
+        for propagation in [Propagation::Fresnel, Propagation::Debye] {
+            let Some(waves) = propagation.waves_of(&rays, centroid_mm).if_finite() else { continue };
+            let directions = |nodes, step| {
+                let waves = propagation.waves_of(&trace(nodes, step)?, centroid_mm).if_finite();
+                Ok(waves.map(|waves| waves.d))
+            };
+            if let Some(areas) = self.direction_areas(&directions)? {
+                return Ok(CellWaves { rays, centroid_mm, waves, areas });
             }
         }
-        on_film.filter(|_| n_lost == 0).ok_or(DiffractionError::LostRays {
-            wavelength_nm: lens.wavelength_nm(),
-            n_lost,
-            n_rays,
-        })
+        Err(DiffractionError::Folded { wavelength_nm: lens.wavelength_nm() })
+    }
+
+    /// The numbers of nodes that are traced at a time: rays take more memory than what is kept of them.
+    fn blocks(&self) -> impl Iterator<Item = Range<usize>> {
+        let n = self.n_nodes();
+        (0..n).step_by(AT_A_TIME).map(move |first| first..n.min(first + AT_A_TIME))
+    }
+
+    /// Traces rays so many steps beside these nodes to the film.
+    fn trace(
+        &self,
+        (lens, point, film_distance_mm): (&MonoLens, &ObjectPoint, f64),
+        nodes: Range<usize>,
+        steps: DVec2,
+    ) -> Result<FilmRays, DiffractionError> {
+        let targets_mm: Vec<DVec2> =
+            self.targets_mm[nodes].iter().map(|target| target + steps * self.step_mm).collect();
+        let mut rays = self.plane.rays(lens, point, &targets_mm);
+        lens.trace(&mut rays, Vignetting::Off);
+        lens.to_film(&mut rays, film_distance_mm);
+        match rays.len() - rays.n_in_flight() {
+            0 => Ok(FilmRays::new(&rays, lens, film_distance_mm)),
+            n_lost => {
+                Err(DiffractionError::LostRays { wavelength_nm: lens.wavelength_nm(), n_lost, n_rays: rays.len() })
+            }
+        }
     }
 
     /// Returns the mean place on the film.
-    pub(super) fn centroid_mm(&self, rays: &FilmRays) -> DVec2 {
+    fn centroid_mm(&self, rays: &FilmRays) -> DVec2 {
         self.energy.iter().enumerate().map(|(i, e)| *e * rays.place_mm(i)).sum()
     }
 
-    /// Returns the area Δ of each cell in (dx, dy) (`docs/wave.md`, eq. 5), negative in holes, or `None` if directions fold over one another.
-    pub(super) fn direction_areas(&self, waves: &Waves) -> Option<Vec<f64>> {
-        let n = self.n_nodes();
-        let slope = |plus: usize, node: usize| {
-            (waves.d[plus * n + node] - waves.d[(plus + 1) * n + node]) / (2.0 * self.step_mm)
-        };
-        let jacobians: Vec<f64> = (0..n).map(|node| slope(1, node).perp_dot(slope(3, node))).collect();
-        let is_one_to_one = jacobians.iter().all(|j| j * jacobians[0] > 0.0);
-        is_one_to_one.then(|| jacobians.iter().zip(&self.areas_mm2).map(|(j, area)| j.abs() * area).collect())
+    /// Returns the area Δ of each cell in (dx, dy) (`docs/wave.md`, eq. 5), negative in holes, or `None` if directions fold over one
+    /// another; `directions` returns those of rays so many steps beside nodes, or `None` if there are none.
+    fn direction_areas(
+        &self,
+        directions: &dyn Fn(Range<usize>, DVec2) -> Result<Option<Vec<DVec2>>, DiffractionError>,
+    ) -> Result<Option<Vec<f64>>, DiffractionError> {
+        let mut areas = Vec::with_capacity(self.n_nodes());
+        let mut first = None;
+        for nodes in self.blocks() {
+            let slopes = |axis: DVec2| -> Result<Option<Vec<DVec2>>, DiffractionError> {
+                let beside = (directions(nodes.clone(), axis)?, directions(nodes.clone(), -axis)?);
+                let (Some(after), Some(before)) = beside else { return Ok(None) };
+                Ok(Some(
+                    after.iter().zip(&before).map(|(after, before)| (after - before) / (2.0 * self.step_mm)).collect(),
+                ))
+            };
+            let (Some(along_x), Some(along_y)) = (slopes(DVec2::X)?, slopes(DVec2::Y)?) else { return Ok(None) };
+            for ((x, y), area) in along_x.iter().zip(&along_y).zip(&self.areas_mm2[nodes.clone()]) {
+                let jacobian = x.perp_dot(*y);
+                if !(jacobian * *first.get_or_insert(jacobian) > 0.0) {
+                    return Ok(None);
+                }
+                areas.push(jacobian.abs() * area);
+            }
+        }
+        Ok(Some(areas))
     }
 }
+
+/// What nodes of a pupil send to the film.
+pub(super) struct CellWaves {
+    pub(super) rays: FilmRays,
+    pub(super) centroid_mm: DVec2,
+    pub(super) waves: Waves,
+    /// The area Δ of the cell of each in (dx, dy).
+    pub(super) areas: Vec<f64>,
+}
+
+/// Nodes that are traced at a time.
+const AT_A_TIME: usize = 1 << 16;
 
 /// Energies of all cells, those of holes counted as positive, over the light that gets through, at most.
 const LARGEST_HOLE: f64 = 1e6;

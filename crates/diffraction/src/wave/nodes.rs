@@ -7,9 +7,9 @@ use glam::DVec2;
 use multiversion::multiversion;
 
 use super::{
-    cells::{PupilCells, disc},
+    cells::{CellWaves, PupilCells, disc},
     grid::{PhaseRange, PupilGrid},
-    propagation::{Propagation, Waves},
+    propagation::Propagation,
     transform::PlaneWaves,
 };
 use crate::DiffractionError;
@@ -68,16 +68,7 @@ impl PupilSamples {
     ) -> Result<Self, DiffractionError> {
         let wavelength_nm = lens.wavelength_nm();
         let cells = PupilCells::find(lens, point, grid).ok_or(DiffractionError::NoLight { wavelength_nm })?;
-        let rays = cells.trace(lens, point, film_distance_mm)?;
-        let centroid_mm = cells.centroid_mm(&rays);
-        let mut waves = Waves::of(&rays, centroid_mm);
-        let mut areas = cells.direction_areas(&waves);
-        if areas.is_none() {
-            // Where the pupil's own image is folded, the rays behind it need not be.
-            waves = Waves::along_rays(&rays, centroid_mm);
-            areas = cells.direction_areas(&waves);
-        }
-        let areas = areas.ok_or(DiffractionError::Folded { wavelength_nm })?;
+        let CellWaves { rays, centroid_mm, waves, areas } = cells.waves(lens, point, film_distance_mm)?;
         let n = cells.n_nodes();
         let per_mm = lens.image_index() / (wavelength_nm * 1e-6);
         let amplitude = |(area, e): (&f64, &f64)| (per_mm * (area * e).sqrt()).copysign(*e);
@@ -91,9 +82,9 @@ impl PupilSamples {
             collected: cells.collected,
             q_x_mm: q(|place| place.x),
             q_y_mm: q(|place| place.y),
-            d_x: waves.d[..n].iter().map(|d| d.x).collect(),
-            d_y: waves.d[..n].iter().map(|d| d.y).collect(),
-            phi_mm: waves.phi_mm[..n].to_vec(),
+            d_x: waves.d.iter().map(|d| d.x).collect(),
+            d_y: waves.d.iter().map(|d| d.y).collect(),
+            phi_mm: waves.phi_mm,
             amplitude_per_mm: areas.iter().zip(&cells.energy).map(amplitude).collect(),
             energy: cells.energy,
         };

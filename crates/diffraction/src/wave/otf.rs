@@ -19,8 +19,8 @@ use rayon::prelude::*;
 
 use super::{
     PupilGrid,
-    cells::{PupilCells, solid_angle_on_plane},
-    propagation::{FilmRays, Propagation, Waves},
+    cells::{CellWaves, PupilCells, solid_angle_on_plane},
+    propagation::{FilmRays, Waves},
 };
 use crate::{DiffractionError, airy::bessel_j, zernike::fit};
 
@@ -114,16 +114,10 @@ impl TransferFunction {
         let wavelength_nm = lens.wavelength_nm();
         let cells =
             PupilCells::find(lens, point, PupilGrid::STANDARD).ok_or(DiffractionError::NoLight { wavelength_nm })?;
-        let rays = cells.trace(lens, point, film_distance_mm)?;
-        let centroid_mm = cells.centroid_mm(&rays);
-        let mut waves = Waves::of(&rays, centroid_mm);
-        if cells.direction_areas(&waves).is_none() {
-            waves = Waves::along_rays(&rays, centroid_mm);
-            cells.direction_areas(&waves).ok_or(DiffractionError::Folded { wavelength_nm })?;
-        }
+        let CellWaves { rays, centroid_mm, waves, .. } = cells.waves(lens, point, film_distance_mm)?;
         let n = cells.n_nodes();
         let mean: DVec2 = cells.energy.iter().zip(&waves.d).map(|(e, d)| *e * *d).sum();
-        let radius = waves.d[..n].iter().map(|d| d.distance(mean)).fold(0.0, f64::max);
+        let radius = waves.d.iter().map(|d| d.distance(mean)).fold(0.0, f64::max);
         let spot_mm = (0..n).map(|i| rays.place_mm(i).distance(centroid_mm)).fold(0.0, f64::max);
         let turns = lens.image_index() * radius * spot_mm / (wavelength_nm * 1e-6);
         let needed = (SAMPLES_A_TURN * turns).ceil() as usize;
@@ -541,14 +535,4 @@ fn stretch(targets_mm: &Array2<DVec2>, row: usize, column: usize, step: f64) -> 
     let along_x = (targets_mm[(row, right)] - targets_mm[(row, left)]) / ((right - left) as f64 * step);
     let along_y = (targets_mm[(above, column)] - targets_mm[(below, column)]) / ((above - below) as f64 * step);
     along_x.perp_dot(along_y).abs()
-}
-
-impl Propagation {
-    /// Returns the waves that rays on the film stand for by this propagation.
-    fn waves_of(self, rays: &FilmRays, reference_mm: DVec2) -> Waves {
-        match self {
-            Self::Debye => Waves::along_rays(rays, reference_mm),
-            Self::Fresnel => Waves::each_from_exit_pupil(rays, reference_mm),
-        }
-    }
 }

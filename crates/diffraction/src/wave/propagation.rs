@@ -14,6 +14,16 @@ pub enum Propagation {
     Fresnel,
 }
 
+impl Propagation {
+    /// Returns the waves that rays on the film stand for by this propagation.
+    pub(super) fn waves_of(self, rays: &FilmRays, reference_mm: DVec2) -> Waves {
+        match self {
+            Self::Debye => Waves::along_rays(rays, reference_mm),
+            Self::Fresnel => Waves::each_from_exit_pupil(rays, reference_mm),
+        }
+    }
+}
+
 /// In a pupil of fewer Fresnel zones than this rays land elsewhere than the waves that they stand for.
 const FEW_FRESNEL_ZONES: f64 = 30.0;
 
@@ -94,11 +104,17 @@ pub(super) struct Waves {
 impl Waves {
     /// Returns the waves that rays on the film stand for, with paths to a film point: spherical ones where that can be.
     pub(super) fn of(rays: &FilmRays, reference_mm: DVec2) -> Self {
-        Self::from_exit_pupil(rays, reference_mm).unwrap_or_else(|| Self::along_rays(rays, reference_mm))
+        let spherical = Self::each_from_exit_pupil(rays, reference_mm).if_finite();
+        spherical.unwrap_or_else(|| Self::along_rays(rays, reference_mm))
+    }
+
+    /// Returns the waves if the paths of all are numbers.
+    pub(super) fn if_finite(self) -> Option<Self> {
+        self.phi_mm.iter().all(|phi| phi.is_finite()).then_some(self)
     }
 
     /// Each ray as a plane wave (eq. 2).
-    pub(super) fn along_rays(rays: &FilmRays, reference_mm: DVec2) -> Self {
+    fn along_rays(rays: &FilmRays, reference_mm: DVec2) -> Self {
         let center_mm = rays.film_point_mm(reference_mm);
         let wave = |i: usize| {
             let direction = rays.directions[i];
@@ -110,18 +126,11 @@ impl Waves {
     }
 
     /// Each ray as a spherical wave from where it crosses the sphere about the reference point through the middle of the
-    /// exit pupil, if all do.
+    /// exit pupil; of one that does not cross it the path is no number.
     ///
     /// To a place δ beside the reference they all go further by the same δ²/2R, which |U|² does not feel, and
     /// by d·δ: so they are summed like plane waves, and like Huygens' to the next order, δ² NA²/R.
-    fn from_exit_pupil(rays: &FilmRays, reference_mm: DVec2) -> Option<Self> {
-        rays.exit_pupil_mm?;
-        let waves = Self::each_from_exit_pupil(rays, reference_mm);
-        waves.phi_mm.iter().all(|phi| phi.is_finite()).then_some(waves)
-    }
-
-    /// The same for each ray by itself: of one that does not cross the sphere the path is no number.
-    pub(super) fn each_from_exit_pupil(rays: &FilmRays, reference_mm: DVec2) -> Self {
+    fn each_from_exit_pupil(rays: &FilmRays, reference_mm: DVec2) -> Self {
         let pupil_mm = rays.exit_pupil_mm.unwrap_or(DVec3::NAN);
         let center_mm = rays.film_point_mm(reference_mm);
         // A pupil behind the film is a virtual one: the waves run backwards to it.

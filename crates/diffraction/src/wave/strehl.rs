@@ -28,8 +28,8 @@ const BESIDE_RAYS: f64 = 1.5;
 /// much as a peak that lies between pixels loses.
 const SUMMITS: usize = 3;
 const LOWEST_SUMMIT: f64 = 0.7;
-/// The largest range of phases that is accepted: some nine hundred thousand nodes, 450 MB while they are traced.
-const LARGEST_BANDWIDTH: f64 = 2200.0;
+/// The largest range of phases that is accepted: some two million nodes, 450 MB while they are traced.
+const LARGEST_BANDWIDTH: f64 = 3400.0;
 /// Steps of the way up, at most, and the last one that is gone, in λN.
 const MOST_STEPS: usize = 12;
 const LAST_STEP: f64 = 1e-5;

@@ -5,7 +5,7 @@
 //! glass); and `[aspherical data]` (number, radius, conic constant, coefficients of r⁴, r⁶, …).
 //! `.lens` files have a line a surface: radius, distance, `n_d`, `V_d`, diameter (though they call it a semi-aperture) and whether it is coated.
 
-use crate::{Glass, ImageSurface, Shape};
+use crate::{D_LINE_NM, Glass, ImageSurface, Lens, Shape};
 
 use super::{
     glasses::{Glasses, constant, model},
@@ -24,6 +24,10 @@ pub(super) fn is_bench(text: &str) -> bool {
 /// By how much the index and the Abbe number of a glass may differ from those stated beside its name, for it to be that one.
 const SAME_INDEX: f64 = 1e-4;
 const SAME_ABBE: f64 = 0.3;
+/// By what share a focal length may differ from that which the file states: patents round theirs.
+const SAME_FOCAL_LENGTH: f64 = 2e-3;
+/// The difference of an index from a stated one that is rounding alone.
+const ROUNDING: f64 = 1e-8;
 /// Shares of half the angle of view at which fields stand.
 const FIELDS: [f64; 3] = [0.0, 0.7, 1.0];
 
@@ -101,16 +105,57 @@ impl Bench<'_> {
         let state = |column: usize| -> Result<SystemState, TextError> {
             Ok(SystemState { name: self.state_name(column)?, system: self.system(column, name, glasses) })
         };
-        let mut states = (1..=n_states).map(state).collect::<Result<Vec<_>, _>>()?;
+        let mut states =
+            (1..=n_states).map(|column| Ok((column, state(column)?))).collect::<Result<Vec<_>, TextError>>()?;
         // A column of distances that are not known is no configuration, unless there is no other.
-        let is_known = |state: &SystemState| state.system.is_ok();
+        let is_known = |(_, state): &(usize, SystemState)| state.system.is_ok();
         if states.iter().any(is_known) {
             states.retain(is_known);
         }
-        match states.len() {
-            1 => states.swap_remove(0).system?.build(),
-            _ => system_states::build(states, 1, glasses),
+        let (columns, mut states): (Vec<usize>, Vec<SystemState>) = states.into_iter().unzip();
+        let mut file = match states.len() {
+            1 => states.swap_remove(0).system?.build()?,
+            _ => system_states::build(states, 1, glasses)?,
+        };
+        let column = columns.get(file.configuration - 1).copied().unwrap_or(1);
+        file.notes.extend(note_on_focal_length(&file.lens, self.variable("Focal Length", column)?));
+        Ok(file)
+    }
+
+    /// Returns notes on the distances `d…` that stand behind no surface.
+    fn notes_on_unused(&self, column: usize) -> Result<Vec<String>, TextError> {
+        let is_distance =
+            |name: &str| name.strip_prefix('d').is_some_and(|rest| rest.starts_with(|c: char| c.is_ascii_digit()));
+        let is_used = |name: &str| {
+            name.eq_ignore_ascii_case("d0") || self.surfaces.iter().any(|row| row.cell(2).eq_ignore_ascii_case(name))
+        };
+        let mut notes = Vec::new();
+        for row in self.variables.iter().filter(|row| is_distance(row.cell(0)) && !is_used(row.cell(0))) {
+            if let Some(distance) = row.number(column, row.cell(0))? {
+                notes.push(format!("{} ({distance} mm) is the distance behind no row of [lens data]", row.cell(0)));
+            }
         }
+        Ok(notes)
+    }
+
+    /// Returns a note on the largest difference of indices where glasses of a catalogue are taken for those that rows name.
+    fn note_on_indices(&self, surfaces: &[SystemSurface]) -> Result<Option<String>, TextError> {
+        let mut largest = (0.0, 0, "");
+        for (row, surface) in self.surfaces.iter().zip(surfaces) {
+            let stated = row.number(3, "the index")?;
+            if let (Some(stated), Some((its_nd, _))) = (stated, surface.medium_after.nd_vd())
+                && (its_nd - stated).abs() > largest.0
+            {
+                largest = ((its_nd - stated).abs(), row.line, row.cell(6));
+            }
+        }
+        let (apart, line, glass) = largest;
+        Ok((apart > ROUNDING).then(|| {
+            format!(
+                "glasses that are named have the n_d of their catalogue, up to {apart:.1e} from those stated (line {line}, \
+                 '{glass}')"
+            )
+        }))
     }
 
     /// Returns the value of a variable in a column; `None` where it is not known or not stated.
@@ -150,6 +195,8 @@ impl Bench<'_> {
             notes.push("no surface is the aperture stop (AS): the first is it".to_owned());
             stop = Some(0);
         }
+        notes.extend(self.note_on_indices(&surfaces)?);
+        notes.extend(self.notes_on_unused(column)?);
         let object_distance_mm = self.variable("d0", column)?.unwrap_or(f64::INFINITY);
         let half_deg = self.variable("Angle of View", column)?.map(|angle_deg| 0.5 * angle_deg);
         let fields = half_deg.filter(|half_deg| (0.0..90.0).contains(half_deg) && object_distance_mm.is_infinite());
@@ -242,6 +289,13 @@ impl Bench<'_> {
     }
 }
 
+/// Returns a note where the focal length that a file states is not that of its surfaces.
+fn note_on_focal_length(lens: &Lens, stated_mm: Option<f64>) -> Option<String> {
+    let (stated_mm, found_mm) = (stated_mm?, lens.at(D_LINE_NM).ok()?.first_order().efl_mm);
+    let is_other = (found_mm / stated_mm - 1.0).abs() > SAME_FOCAL_LENGTH;
+    is_other.then(|| format!("the file states a focal length of {stated_mm} mm, its surfaces have {found_mm:.3} mm"))
+}
+
 /// Returns the medium of a row: the glass that it names, where that has the stated index, or a model of the stated numbers.
 fn medium(row: &Row<'_>, glasses: &Glasses, notes: &mut Vec<String>) -> Result<Glass, TextError> {
     let Some(nd) = row.number(3, "the index")?.filter(|nd| *nd != 0.0 && *nd != 1.0) else { return Ok(Glass::Air) };
@@ -265,7 +319,7 @@ fn medium(row: &Row<'_>, glasses: &Glasses, notes: &mut Vec<String>) -> Result<G
 
 /// Reads a `.lens` file; `name` serves where it has none.
 pub(super) fn lens_from_lens_text(text: &str, name: &str) -> Result<LensFile, TextError> {
-    let (mut title, mut is_table, mut stop) = (name.to_owned(), false, None);
+    let (mut title, mut focal_length_mm, mut is_table, mut stop) = (name.to_owned(), None, false, None);
     let (mut surfaces, mut notes, mut comments, mut n_coated) = (Vec::new(), Vec::new(), Vec::new(), 0);
     for (i, line) in text.lines().enumerate() {
         let (words, comment) = line.split_once('#').map_or((line, ""), |(words, comment)| (words, comment.trim()));
@@ -284,7 +338,7 @@ pub(super) fn lens_from_lens_text(text: &str, name: &str) -> Result<LensFile, Te
             let (key, value) = words.split_once(':').ok_or_else(wrong)?;
             match key.trim() {
                 "name" => title = value.trim().to_owned(),
-                "focal_length" => {}
+                "focal_length" => focal_length_mm = value.trim().parse().ok(),
                 "surfaces" => is_table = true,
                 _ => return Err(wrong()),
             }
@@ -345,5 +399,7 @@ pub(super) fn lens_from_lens_text(text: &str, name: &str) -> Result<LensFile, Te
         notes,
         is_reduced: true,
     };
-    system.build()
+    let mut file = system.build()?;
+    file.notes.extend(note_on_focal_length(&file.lens, focal_length_mm));
+    Ok(file)
 }

@@ -4,7 +4,7 @@ use std::cmp::Ordering;
 
 use glam::DVec2;
 
-use super::{PupilBoundary, Search, edge::EdgeSearch};
+use super::{EDGE_MM, PupilBoundary, Search, edge::EdgeSearch};
 use crate::{RayFate, Vignetting};
 
 /// Rays across the front of the lens in a first look, and in a second where that finds no light.
@@ -86,7 +86,7 @@ impl Search<'_> {
 
     pub(super) fn lit_targets(&self, targets_mm: Vec<DVec2>) -> Vec<(DVec2, f64)> {
         let clearances = self.clearances(&targets_mm);
-        targets_mm.into_iter().zip(clearances).filter(|(_, clearance)| *clearance > 0.0).collect()
+        targets_mm.into_iter().zip(clearances).filter(|(_, clearance)| *clearance > EDGE_MM).collect()
     }
 
     /// Returns where the ray through this place of the first surface, over its rim's radius, crosses the pupil's plane.
