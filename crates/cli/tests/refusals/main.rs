@@ -84,10 +84,10 @@ fn camera_files() {
     for (text, words) in [
         ("".to_owned(), "Expected opening `(` for struct `Camera`"),
         ("()".to_owned(), "missing field named `name` in `Camera`"),
-        ("\0\u{1}\u{2}".to_owned(), "Expected opening `(`"),
+        ("\0\u{1}\u{2}".to_owned(), "it is no text, expected a camera file"),
         ("(".repeat(100_000), "Expected identifier"),
         (CAMERA.to_owned() + "x", "Non-whitespace trailing characters"),
-        ("\u{feff}(".to_owned(), "camera.ron:1:2"),
+        ("\u{feff}(".to_owned(), "camera.ron:1:1: Unexpected end of RON"),
     ] {
         check(&vec![("camera.ron", text.into_bytes())], &RUN, words);
     }

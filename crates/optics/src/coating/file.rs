@@ -26,7 +26,7 @@ impl Coating {
         if size > MOST_BYTES {
             return Err(failed(format!("is {size} bytes long, expected a coating of at most {MOST_BYTES}")));
         }
-        let text = std::fs::read_to_string(path).map_err(|error| failed(format!("cannot be read: {error}")))?;
+        let text = dioptric_files::text::read(path).map_err(|error| failed(format!("cannot be read: {error}")))?;
         let is = |extension: &str| path.extension().is_some_and(|found| found.eq_ignore_ascii_case(extension));
         let coating = if is("csv") {
             table_from_csv(&text).map(Self::Table)
@@ -44,7 +44,7 @@ impl Coating {
 
 /// Reads a table whose rows are all pairs of some wavelengths and some angles, in any order.
 fn table_from_csv(text: &str) -> Result<ReflectanceTable, String> {
-    let text = text.trim_start_matches('\u{feff}');
+    let text = dioptric_files::text::with_commas(text);
     let lines = text.lines().enumerate().map(|(i, line)| (i + 1, line.trim()));
     let mut lines = lines.filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
     let (_, header) = lines.next().ok_or("is empty, expected wavelength_nm,angle_deg,r or r_s,r_p")?;

@@ -5,6 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use dioptric_files::text;
 use rayon::prelude::*;
 
 use super::{
@@ -224,8 +225,9 @@ fn are_wavelengths(numbers: &[f64]) -> bool {
 
 fn wavelengths_of(folder: &Path, pictures: &[(f64, PathBuf)]) -> Result<Vec<f64>, SceneError> {
     if let Some(list) = LISTS.iter().map(|name| folder.join(name)).find(|path| path.is_file()) {
-        let text = fs::read_to_string(&list).map_err(|error| unreadable(&list, error))?;
+        let text = text::read(&list).map_err(|error| unreadable(&list, error))?;
         let is_separator = |c: char| c.is_whitespace() || c == ',' || c == ';';
+        let text = text::with_commas(&text);
         let numbers: Vec<f64> = text.split(is_separator).filter_map(|word| word.parse().ok()).collect();
         return without_unit(&numbers)
             .ok_or_else(|| unreadable(&list, "its numbers are no likely nm: expected wavelengths in nm"));

@@ -2,6 +2,7 @@
 
 use std::{collections::BTreeMap, path::Path};
 
+use dioptric_files::text;
 use dioptric_spectrum::{Illuminant, Observer, WavelengthGrid};
 
 use super::stated::short;
@@ -60,23 +61,17 @@ impl PointTable {
     /// Names the line and the column that cannot be read.
     pub fn read(path: &Path) -> Result<Self, SceneError> {
         let unreadable = |reason: String| SceneError::Unreadable { file: path.to_owned(), reason };
-        let bytes = std::fs::read(path).map_err(|error| unreadable(error.to_string()))?;
-        let text = String::from_utf8(bytes).map_err(|_| {
-            unreadable("it is no text in UTF-8, expected a table with commas between columns".to_owned())
-        })?;
-        Self::parse(&text).map_err(|reason| SceneError::Unreadable { file: path.to_owned(), reason })
+        let text = text::read(path).map_err(|error| unreadable(error.to_string()))?;
+        Self::parse(&text::with_commas(&text))
+            .map_err(|reason| SceneError::Unreadable { file: path.to_owned(), reason })
     }
 
     fn parse(text: &str) -> Result<Self, String> {
-        let text = text.strip_prefix('\u{feff}').unwrap_or(text);
         let mut reader =
             csv::ReaderBuilder::new().comment(Some(b'#')).trim(csv::Trim::All).from_reader(text.as_bytes());
         let mut columns = BTreeMap::new();
         for (number, name) in reader.headers().map_err(|error| error.to_string())?.iter().enumerate() {
             let name = name.trim_matches(['"', ' ']).to_ascii_lowercase();
-            if name.contains([';', '\t']) {
-                return Err("line 1: expected commas between columns".to_owned());
-            }
             let is_known = PLACES.as_flattened().iter().chain(&AMOUNTS).chain(&OTHERS).any(|known| *known == name);
             if !is_known {
                 let known = [PLACES.as_flattened(), &AMOUNTS, &OTHERS].concat().join(", ");

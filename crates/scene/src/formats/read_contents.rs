@@ -30,7 +30,7 @@ use super::{
     spectral_exr::{AskedChannels, RawFile, RawHidden, RawImage, read_raw_exr},
     stated::{name_of, note_of},
     tiff_file::{RAW, TiffAs, TiffFile, TiffStack, has_depth_map, is_tiff, read_tiff},
-    unusable::{starts_with, unreadable},
+    unusable::{check_whole, starts_with, unreadable},
 };
 use crate::{SceneError, View};
 
@@ -54,6 +54,7 @@ pub(super) fn contents_of(path: &Path, options: &ReadOptions) -> Result<Contents
     if !path.exists() {
         return Err(unreadable(path, "there is no such file"));
     }
+    check_whole(path)?;
     let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
     match extension.as_str() {
         "exr" => of_exr(path, options),

@@ -98,7 +98,9 @@ pub(in super::super) fn read_mat(path: &Path, reading: &FileReading) -> Result<M
         let name = own.name.as_str();
         match told {
             // Others may be of a kind that cannot be read.
-            Some(told) => told == name || is_list(own),
+            Some(told) => {
+                told == name || told.strip_prefix(name).is_some_and(|rest| rest.starts_with('.')) || is_list(own)
+            }
             None => WANTED.contains(&name) || name == "dist" || is_cube(own) || is_list(own),
         }
     };
@@ -135,11 +137,13 @@ pub(in super::super) fn read_mat(path: &Path, reading: &FileReading) -> Result<M
         cubes.retain(|own| !last_part(own).eq_ignore_ascii_case("rgb"));
     }
     let name = match told {
-        Some(told) if has(told) => told,
+        Some(told) if has(told) || file.array(told).map_err(wrong)?.is_some() => told,
         Some(told) => {
-            return Err(wrong(format!("it has no variable '{told}', expected one of {}", names.join(", "))));
+            let known = in_structures(path)?.into_iter().map(|(own, _)| own);
+            let known: Vec<_> = names.iter().map(|own| (*own).to_owned()).chain(known).collect();
+            return Err(wrong(format!("it has no variable '{told}', expected one of {}", known.join(", "))));
         }
-        None if has("data") => "data",
+        None if file.array("data").map_err(wrong)?.is_some_and(|data| data.numbers().is_ok()) => "data",
         None => match cubes[..] {
             [one] => one,
             [] if file.listed.iter().any(|own| own.is_complex) => {
@@ -151,7 +155,12 @@ pub(in super::super) fn read_mat(path: &Path, reading: &FileReading) -> Result<M
                 let names = others.map(|own| format!(", and its '{}' has no numbers that are read", own.name));
                 let expected =
                     "expected a variable 'scene', 'mcCOEF' or 'photons', or an array of three axes outside structures";
-                return Err(wrong(format!("it holds no scene: {expected}{}", names.collect::<String>())));
+                let names = names.collect::<String>();
+                let inner = in_structures(path)?.into_iter().filter(|(_, sides)| sides.len() == 3);
+                let inner: Vec<_> = inner.map(|(own, _)| own).collect();
+                let way =
+                    if inner.is_empty() { String::new() } else { format!(", or --variable {}", inner.join(" or ")) };
+                return Err(wrong(format!("it holds no scene: {expected}{names}{way}")));
             }
             _ => return Err(wrong(format!("it has several cubes, {}: expected --variable", cubes.join(", ")))),
         },
@@ -164,6 +173,13 @@ pub(in super::super) fn read_mat(path: &Path, reading: &FileReading) -> Result<M
         return Ok(MatScene::Linear([plane(), plane(), plane()], cube.notes));
     }
     Ok(MatScene::Cube(cube))
+}
+
+/// Returns the arrays of numbers in the structures of a file, as `data.cube`, and the lengths of their sides.
+fn in_structures(path: &Path) -> Result<Vec<(String, Vec<usize>)>, SceneError> {
+    let file = MatFile::read(path, &|own| !own.is_numeric)?;
+    let arrays = file.listed.iter().filter(|own| !own.is_numeric).map(|own| (own, file.array(&own.name)));
+    Ok(arrays.filter_map(|(own, array)| Some(array.ok()??.numeric_fields(&own.name))).flatten().collect())
 }
 
 /// Returns the name of an array without the groups that it is in.
@@ -202,8 +218,14 @@ fn cube_of(path: &Path, file: &MatFile, name: &str, reading: &FileReading) -> Re
         (percent * packing.unpacked(numbers.at(index))) as f32
     })?;
     let is_depth = |own: &str| reading.depth.is_none() && reading.depth_variable.as_deref() == Some(own);
-    let used = |own: &str| own == name || is_depth(own) || waves.as_ref().is_some_and(|(list, _)| list == own);
-    let unused: Vec<String> = file.listed.iter().map(|own| own.name.clone()).filter(|own| !used(own)).collect();
+    let holds = |own: &str| name.strip_prefix(own).is_some_and(|rest| rest.starts_with('.'));
+    let used =
+        |own: &str| own == name || holds(own) || is_depth(own) || waves.as_ref().is_some_and(|(list, _)| list == own);
+    let mut unused: Vec<String> = file.listed.iter().map(|own| own.name.clone()).filter(|own| !used(own)).collect();
+    for outer in file.listed.iter().filter(|own| holds(&own.name)) {
+        let fields = file.array(&outer.name)?.map(|array| array.numeric_fields(&outer.name)).unwrap_or_default();
+        unused.extend(fields.into_iter().map(|(own, _)| own).filter(|own| own != name));
+    }
     let mut notes: Vec<String> = note_of(path, "variable", &unused).into_iter().collect();
     let file_name = name_of(path);
     let ambiguous = axes::note(&array.sides, order.as_deref(), n_bands);

@@ -180,8 +180,8 @@ fn check_refused(bytes: &[u8], word: &str) {
 #[test]
 fn other_files_are_refused_in_a_sentence() {
     let good = fs::read(fixture("iset_plain.mat")).unwrap();
-    check_refused(b"", "no MATLAB file");
-    check_refused(&[b' '; 500], "no MATLAB file");
+    check_refused(b"", "nor a MATLAB file");
+    check_refused(&[b' '; 500], "nor a MATLAB file");
     let new = fs::read(fixture("iset_scene_v73.mat")).unwrap();
     check_refused(&new[..new.len() / 2], "HDF5 that cannot be read");
     check_refused(&good[..good.len() / 2], "truncated");
