@@ -167,7 +167,7 @@ mod tests {
                 let line = [path, &[format!("{option}={value}")]].concat();
                 check(&line, &[&option, &format!("'{value}'"), "expected"]);
             }
-            check(&[path, &[option.clone()]].concat(), &[&option, "lacks its value, expected"]);
+            check(&[path, std::slice::from_ref(&option)].concat(), &[&option, "lacks its value, expected"]);
             check(&[path, &[format!("{option}xyzzy=3")]].concat(), &[&option, "is no option of", "--help"]);
         });
         assert!(wrong.is_empty() && n_told > 500, "{n_told}: {wrong:#?}");

@@ -353,7 +353,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("steps.csv");
         let read = |text: &str| {
-            fs::write(&path, text).unwrap();
+            std::fs::write(&path, text).unwrap();
             StepsRequest::read_steps(&path).map_err(|error| error.to_string())
         };
         let steps = read("x,y,w,h,luminance\n0,0,8,8,1.5\n8,0,8,8,3\n16,0,8,8,6\n").unwrap();

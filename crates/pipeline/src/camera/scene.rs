@@ -199,7 +199,10 @@ impl SceneSpec {
             checker.refused("reading", &error)?;
         }
         if !is_unsaid(&self.reading) && !matches!(self.source, SceneSource::File(_)) {
-            checker.wrong("reading", "what is said of a file", "a source that is a file")?;
+            checker.refused(
+                "reading",
+                &"it says what a scene's file does not, but the scene is no file: expected one (--scene FILE)",
+            )?;
         }
         if self.white_level.is_some() && !matches!(self.source, SceneSource::File(_)) {
             checker.wrong("white_level", "what is said of a file", "a source that is a file")?;

@@ -25,6 +25,8 @@ use crate::SceneError;
 /// What camera data are read as.
 const EXPECTED: &str = "expected JSON, YAML, a matrix of 3 × 3 numbers, or a line of COLMAP's cameras.txt (colmap model_converter --output_type \
                         TXT): number, model, width, height, parameters";
+/// Lines of YAML of ROS, the matrix of its messages.
+const YAML: [&str; 2] = ["k:", "K:"];
 /// Endings of a picture's stem that its camera file does not repeat.
 const PARTS: [&str; 4] = [".radiance_depth", ".radiance", ".reflectance", ".depth"];
 impl CameraFile {
@@ -55,7 +57,10 @@ impl CameraFile {
         })?;
         let data = match text.trim_start() {
             text if text.starts_with('{') => of_json(path, text, picture),
-            text if text.contains("camera_matrix") || text.contains("intrinsics:") || text.starts_with("%YAML") => {
+            text if text.starts_with("%YAML") || text.lines().any(|line| YAML.contains(&line.trim())) || {
+                text.contains("camera_matrix") || text.contains("intrinsics:")
+            } =>
+            {
                 of_yaml(path, text)
             }
             text => match matrix_of(text) {
@@ -243,19 +248,20 @@ fn with_frame(path: &Path, picture: &Path, mut all: Keys) -> Result<(Keys, Optio
     };
     let alike = frames_of(path, picture, &frames);
     let [Value::Object(frame)] = alike[..] else {
-        let how_many = if alike.is_empty() { "none" } else { "several" };
+        let how_many = if alike.is_empty() {
+            "none of the file_path of its frames is"
+        } else {
+            "several of the file_path of its frames are"
+        };
         if frames.iter().any(|frame| frame.get("fl_x").is_some()) {
             return Err(format!(
-                "its frames have focal lengths of their own, and {how_many} of their file_path are {}: expected one for all, or that of the picture",
+                "its frames have focal lengths of their own, and {how_many} {}: expected one for all, or that of the picture",
                 name_of(picture)
             ));
         }
         let have_depth = frames.iter().any(|frame| frame.get("depth_file_path").is_some());
-        let note = format!(
-            "{}: {how_many} of the file_path of its frames are {}, so that no depth_file_path of theirs is used",
-            name_of(path),
-            name_of(picture)
-        );
+        let note =
+            format!("{}: {how_many} {}, so that no depth_file_path of theirs is used", name_of(path), name_of(picture));
         return Ok((all, have_depth.then_some(note)));
     };
     let mut own = Stated::new("key", frame.clone().into_iter().collect());

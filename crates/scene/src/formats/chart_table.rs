@@ -65,6 +65,11 @@ pub(super) fn read_chart(path: &Path) -> Result<Cube, SceneError> {
             "it has no line of numbers: expected wavelengths in nm and a reflectance a column".to_owned(),
         ));
     }
+    const OTHERS: [&str; 4] = ["absorb", "radian", "emission", "photon"];
+    let is_other = |name: &&String| OTHERS.iter().any(|other| name.to_lowercase().contains(other));
+    if let Some(other) = names.iter().find(is_other) {
+        return Err(wrong(format!("its column '{}' says that it holds no reflectances, expected such", short(other))));
+    }
     let wavelengths_nm = wavelengths_of_column(&first, &wavelengths_nm).map_err(wrong)?;
     let mut notes = vec![];
     if names.iter().chain([&first]).any(|name| name.contains('%') || name.to_lowercase().contains("percent")) {
@@ -130,8 +135,28 @@ mod tests {
             "{:?}",
             scene.notes
         );
+        // As spreadsheets of half the world write it, in other units.
+        for text in [
+            "nm;pale;dark;gray\n400;0,2;0,05;0,5\n500;0,3;0,08;0,5\n600;0,5;0,1;0,5\n700;0,6;0,12;0,5\n",
+            "sep=;\nµm;pale;dark;gray\n0,4;0,2;0,05;0,5\n0,5;0,3;0,08;0,5\n0,6;0,5;0,1;0,5\n0,7;0,6;0,12;0,5\n",
+            "\u{feff}angstrom\tpale %\tdark\tgray\n4000\t20\t5\t50\n5000\t30\t8\t50\n6000\t50\t10\t50\n7000\t60\t12\t50\n",
+        ] {
+            write(text);
+            let other = read_scene(&path, &options).unwrap();
+            assert_eq!(other.radiance.grid(), scene.radiance.grid(), "{text}");
+            for column in [0, 40] {
+                for (a, b) in other.radiance.spectrum_at(9, column).iter().zip(scene.radiance.spectrum_at(9, column)) {
+                    assert_relative_eq!(*a, b, max_relative = 1e-6);
+                }
+            }
+        }
+        std::fs::write(&path, b"nm,Gr\xfcn\n400,.2\n500,.3\n").unwrap();
+        assert!(read_scene(&path, &options).unwrap().notes[1].contains("Grün"));
         for (text, word) in [
-            ("", "no line of numbers"),
+            ("", "it is empty"),
+            ("# nothing\n", "no line of numbers"),
+            ("nm,absorbance\n400,.2\n", "'absorbance' says that it holds no reflectances"),
+            ("waves (zorp),a\n400,.2\n", "'zorp'"),
             ("nm,a\n400,0.1\n500\n", "line 3: 1 numbers"),
             ("nm,a\n400,0.1\n500,x\n", "line 3: '500,x'"),
             ("nm\n400\n", "line 2"),

@@ -17,7 +17,7 @@ use super::{
     read_options::ReadOptions,
     stated::{Noted, name_of, note_of, short},
     unusable::{check_memory, fault, open_new, unreadable, unwritable},
-    wavelength_unit::listed_nm,
+    wavelength_unit::{listed_nm, unit_in},
 };
 use crate::SceneError;
 
@@ -135,7 +135,7 @@ pub(super) fn read_npz(path: &Path, options: &ReadOptions) -> Result<Cube, Scene
         Some(name) => {
             // Singles of decimals, as they were written.
             let numbers = archive.read(name)?.values.into_iter().map(|v| v.to_string().parse().unwrap_or(f64::NAN));
-            let unit = bare(name).ends_with("_nm").then_some("nm");
+            let unit = unit_in(bare(name));
             match listed_nm(bare(name), unit, &numbers.collect::<Vec<f64>>()) {
                 Err(_) if reading.wavelengths_nm.is_some() => None,
                 own => own.map_err(wrong)?,

@@ -67,8 +67,11 @@ impl PointTable {
     }
 
     fn parse(text: &str) -> Result<Self, String> {
-        let mut reader =
-            csv::ReaderBuilder::new().comment(Some(b'#')).trim(csv::Trim::All).from_reader(text.as_bytes());
+        let mut reader = csv::ReaderBuilder::new()
+            .flexible(true)
+            .comment(Some(b'#'))
+            .trim(csv::Trim::All)
+            .from_reader(text.as_bytes());
         let mut columns = BTreeMap::new();
         for (number, name) in reader.headers().map_err(|error| error.to_string())?.iter().enumerate() {
             let name = name.trim_matches(['"', ' ']).to_ascii_lowercase();
@@ -97,6 +100,9 @@ impl PointTable {
         for record in reader.records() {
             let record = record.map_err(|error| error.to_string())?;
             let line = record.position().map_or(0, csv::Position::line);
+            if record.len() != columns.len() {
+                return Err(format!("line {line}: {} columns, expected {}", record.len(), columns.len()));
+            }
             let cell =
                 |name: &str| columns.get(name).and_then(|&number| record.get(number)).filter(|text| !text.is_empty());
             let number = |name: &str| {
@@ -304,9 +310,9 @@ mod tests {
             ("x_deg,y_deg,lux,light\n0,0,1,950nm\n", "no eye sees"),
             ("x_deg,y_deg,lux,light\n0,0,1,D99\n", "line 2: light is 'D99'"),
             ("x_deg,y_deg,lux\n", "no point"),
-            ("x_deg;y_deg;lux\n1;2;3\n", "commas"),
             ("x_deg,y_deg,lux\n0,0,inf\n", "line 2: lux is inf"),
-            ("x_deg,y_deg,lux\n1,2\n", "fields"),
+            ("x_deg,y_deg,lux\n1,2\n", "line 2: 2 columns, expected 3"),
+            ("x_deg,y_deg,lux\n1,2,3,4\n", "line 2: 4 columns, expected 3"),
         ] {
             let found = PointTable::parse(text).unwrap_err();
             assert!(found.contains(words), "{text}: {found}");

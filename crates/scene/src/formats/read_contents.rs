@@ -25,7 +25,7 @@ use super::{
     radiance_header::RadianceHeader,
     raw_depth::{DepthWords, RawDepth},
     read_options::ReadOptions,
-    reading::{DepthKind, FileQuantity, FileReading, light_unit},
+    reading::{DepthKind, FileQuantity, FileReading, Panorama, light_unit},
     reduced::reduced_size,
     spectral_exr::{AskedChannels, RawFile, RawHidden, RawImage, read_raw_exr},
     stated::{name_of, note_of},
@@ -47,6 +47,10 @@ pub(super) fn contents_of(path: &Path, options: &ReadOptions) -> Result<Contents
         if let Some(missing) = CubeFolder::missing(path) {
             let reason =
                 format!("it has some faces of a cube, but of its six faces {} are missing", missing.join(", "));
+            return Err(unreadable(path, reason));
+        }
+        if matches!(options.reading.panorama, Some(Panorama::Cube { .. })) {
+            let reason = "it has no six faces of a cube: expected faces called right, left, up, down, front and back, or px, nx, py, ny, pz and nz";
             return Err(unreadable(path, reason));
         }
         return band_folder(path, options)?.into_contents(path, options);

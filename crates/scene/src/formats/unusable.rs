@@ -147,3 +147,44 @@ pub(crate) fn starts_with(path: &Path, start: &[u8]) -> Result<bool, SceneError>
     file.take(start.len() as u64).read_to_end(&mut bytes).map_err(|error| unreadable(path, error))?;
     Ok(bytes == start)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_libraries_say_becomes_one_of_four_sentences() {
+        for (error, variant, expected) in [
+            ("reference to missing bytes", None, TRUNCATED),
+            ("failed to fill whole buffer", Some("another"), TRUNCATED),
+            ("invalid Zip archive: Could not find EOCD", None, TRUNCATED),
+            ("invalid: file identifier missing", None, "it is no EXR, as its name says: it begins otherwise"),
+            (
+                "not supported: deep data",
+                Some("flat"),
+                "it is EXR of a kind that is not read (deep data): expected flat",
+            ),
+            (
+                "Format error decoding Png: CRC error: expected 1 have 2 while decoding ChunkType { type: IDAT }",
+                None,
+                "its PNG is damaged (CRC error: expected 1 have 2): expected an undamaged copy, or the file saved anew",
+            ),
+        ] {
+            assert_eq!(fault("EXR", error, variant), expected, "{error}");
+        }
+    }
+
+    #[test]
+    fn what_stands_in_the_place_of_a_file_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.png");
+        for (text, word) in [
+            ("", "it is empty"),
+            ("version https://git-lfs.github.com/spec/v1\n", "git lfs pull"),
+            ("\n<!DOCTYPE html>", "a page of the web"),
+        ] {
+            std::fs::write(&path, text).unwrap();
+            assert!(check_whole(&path).unwrap_err().to_string().contains(word), "{text}");
+        }
+    }
+}

@@ -65,6 +65,14 @@ fn list_of(name: &str, unit: Option<&str>, numbers: &[f64], or: &str) -> Result<
             return Ok(None);
         }
         let reason = || {
+            let is_odd = |number: &&f64| !(0.15..20_000.0).contains(*number);
+            if let Some(odd) = numbers.iter().find(is_odd).filter(|_| !numbers.iter().all(|number| is_odd(&number))) {
+                return format!(
+                    "its '{}' holds {}, which is no wavelength of light: expected nm{or}",
+                    short(name),
+                    shown(*odd)
+                );
+            }
             let shown = numbers.iter().take(3).map(|number| shown(*number)).collect::<Vec<_>>().join(", ");
             format!("its '{}' ({shown}, …) has no unit and is no likely nm or µm: expected nm{or}", short(name))
         };
@@ -80,17 +88,24 @@ fn list_of(name: &str, unit: Option<&str>, numbers: &[f64], or: &str) -> Result<
     }
 }
 
+/// Returns the unit of wavelengths, wavenumbers, frequencies or energies that a name is or has among its words, as `wavelength_um`.
+pub(super) fn unit_in(name: &str) -> Option<&str> {
+    // Single letters are in too many names.
+    let is_unit = |word: &&str| (word.chars().count() > 1 || *word == "Å") && in_nm(word, &[]).is_some();
+    Some(name.trim()).filter(is_unit).or_else(|| name.rsplit(['/', '_', ' ', '-', ',', '\t']).find(is_unit))
+}
+
 /// Returns the wavelengths, nm, of the column of a table, as the unit in its name says (`wavelength_nm`, `Wavelength (µm)`, `cm^-1`) or, where
 /// there is none, its numbers.
 ///
 /// # Errors
 /// When its unit is not known, or its numbers are no likely wavelengths.
 pub fn wavelengths_of_column(name: &str, numbers: &[f64]) -> Result<Vec<f64>, String> {
-    let is_unit = |word: &&str| (word.chars().count() > 1 || *word == "Å") && in_nm(word, &[]).is_some();
     let bracketed = name.rsplit_once(['(', '[']).map(|(_, rest)| rest.trim_end_matches([')', ']', ' ']));
-    let unit = bracketed.or(Some(name.trim()).filter(is_unit)).or_else(|| name.rsplit(['/', '_', ' ']).find(is_unit));
+    let unit = bracketed.or_else(|| unit_in(name));
+    let name = if name.is_empty() { "first column" } else { name };
     let counted = || format!("its '{}' counts bands: expected wavelengths in nm", short(name));
-    list_of(if name.is_empty() { "wavelengths" } else { name }, unit, numbers, "")?.ok_or_else(counted)
+    list_of(name, unit, numbers, "")?.ok_or_else(counted)
 }
 
 /// Returns these bands of a file, counted from 0, by ascending wavelength.
