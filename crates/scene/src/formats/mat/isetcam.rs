@@ -22,7 +22,7 @@ use super::{
     container::{Content, MatArray, MatFile, WHOLE},
     elements::Listed,
     iset_kinds,
-    packing::{Packing, rank_of_waves},
+    packing::{Packing, is_wave_unit, rank_of_waves},
 };
 use crate::{SceneError, SceneLight};
 
@@ -311,7 +311,8 @@ fn waves_of(file: &MatFile, cube: &str, sides: &[usize], is_told: bool) -> Resul
         let unit = stated.or_else(|| unit_in(last_part(own)));
         return match listed_nm(own, unit, &numbers) {
             Ok(list) => Ok(list.map(|nm| {
-                let left = packing.left(true, packing.unit.is_none());
+                let mut left = packing.left(true, false);
+                left.retain(|name| packing.unit.is_some() || !is_wave_unit(name));
                 Waves { name: own.clone(), nm, left }
             })),
             Err(_) if is_told => Ok(None),

@@ -45,7 +45,7 @@ const MISSING: [&str; 2] = ["_FillValue", "missing_value"];
 const UNITS: [&str; 2] = ["units", "unit"];
 
 /// Whether an attribute is called the unit of wavelengths.
-fn is_wave_unit(name: &str) -> bool {
+pub(super) fn is_wave_unit(name: &str) -> bool {
     let lower = name.to_lowercase();
     lower.contains("wave") && lower.contains("unit")
 }
