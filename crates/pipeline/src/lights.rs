@@ -60,13 +60,17 @@ fn read_light(path: &Path) -> Result<Illuminant, PipelineError> {
                 wavelengths_nm.push(nm);
                 values.push(value);
             }
-            _ if number == 0 => names = record.iter().map(str::to_lowercase).collect(),
+            _ if number == 0 => names = record.iter().map(str::to_owned).collect(),
             _ => return Err(unreadable(format!("line {line} is not a wavelength in nm and a power"))),
         }
     }
     let wavelengths_nm =
         wavelengths_of_column(names.first().map_or("", String::as_str), &wavelengths_nm).map_err(unreadable)?;
-    if names.get(1).is_some_and(|name| ["photon", "quanta", "mol"].iter().any(|of| name.contains(of))) {
+    if names
+        .get(1)
+        .map(|name| name.to_lowercase())
+        .is_some_and(|name| ["photon", "quanta", "mol"].iter().any(|of| name.contains(of)))
+    {
         values.iter_mut().zip(&wavelengths_nm).for_each(|(value, nm)| *value /= nm);
     }
     let mut order: Vec<usize> = (0..values.len()).collect();

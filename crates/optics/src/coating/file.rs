@@ -116,8 +116,7 @@ mod tests {
         .unwrap();
         assert_eq!((table.wavelengths_nm.clone(), table.angles_deg.clone()), (vec![400.0, 600.0], vec![0.0, 30.0]));
         assert_eq!((table.r_s[0].clone(), table.r_p[1].clone()), (vec![0.01, 0.03], vec![0.02, 0.0]));
-        for text in
-            ["wavelength_nm,angle_deg,r\n500,0,.01", "\u{feff}# lab\n\"wavelength_nm\",\"angle_deg\",\"r\"\n500,0,.01"]
+        for text in ["wavelength_nm,angle_deg,r\n500,0,.01", "# lab\n\"wavelength_nm\",\"angle_deg\",\"r\"\n500,0,.01"]
         {
             assert_eq!(table_from_csv(text).unwrap().r_p, vec![vec![0.01]]);
         }
