@@ -28,6 +28,7 @@ mod paintings;
 mod picture_args;
 mod psf;
 mod ranges;
+mod refused;
 mod render;
 mod render_args;
 mod run;
@@ -58,7 +59,11 @@ use crate::{
 };
 
 fn main() -> ExitCode {
-    let (cli, in_range) = Cli::read(std::env::args_os()).unwrap_or_else(|error| error.exit());
+    let (cli, in_range) = Cli::read(std::env::args_os()).unwrap_or_else(|error| {
+        let Some(sentence) = refused::sentence(&Cli::words(), &error) else { error.exit() };
+        terminal::print_error(&anyhow::Error::msg(sentence));
+        std::process::exit(terminal::WRONG_LINE)
+    });
     terminal::remove_partial_files_on_interrupt();
     if !matches!(cli.command, Command::Studio(_)) {
         memory::keep_freed();

@@ -161,16 +161,16 @@ impl RenderArgs {
 }
 
 fn parse_point(text: &str) -> Result<(f64, f64, f64), String> {
-    match parse_numbers("a point", text).map_err(|e| e.to_string())?.as_slice() {
-        &[x, y, z] => Ok((x, y, z)),
-        found => Err(format!("{} numbers, expected X,Y,Z", found.len())),
+    match parse_numbers("a point", text).as_deref() {
+        Ok(&[x, y, z]) => Ok((x, y, z)),
+        _ => Err("expected X,Y,Z: a place in m".to_owned()),
     }
 }
 
 fn parse_lamp(text: &str) -> Result<WorldLamp, String> {
-    match parse_numbers("a lamp", text).map_err(|e| e.to_string())?.as_slice() {
-        &[x, y, z, lumens] => Ok(WorldLamp { at_m: (x, y, z), lumens }),
-        found => Err(format!("{} numbers, expected X,Y,Z,LM: a place in m and lumens", found.len())),
+    match parse_numbers("a lamp", text).as_deref() {
+        Ok(&[x, y, z, lumens]) => Ok(WorldLamp { at_m: (x, y, z), lumens }),
+        _ => Err("expected X,Y,Z,LM: a place in m and lumens".to_owned()),
     }
 }
 

@@ -82,7 +82,15 @@ pub(crate) struct SceneConvertArgs {
     pub(crate) exr_samples: Option<ExrSamples>,
 }
 
+/// With less memory hardly any file can be read.
+const LEAST_BYTES: u64 = 60_000_000;
+
 pub(crate) fn run(command: &SceneCommand, common: &Common) -> anyhow::Result<()> {
+    anyhow::ensure!(
+        common.memory.is_none_or(|bytes| bytes >= LEAST_BYTES),
+        "--memory is {} MB, expected 60 MB or more: the program itself takes most of that",
+        common.memory.unwrap_or_default() / 1_000_000
+    );
     let info = match command {
         SceneCommand::Info(arguments) => request(&arguments.scene)?.describe(arguments.out.as_deref())?,
         SceneCommand::Convert(arguments) => {

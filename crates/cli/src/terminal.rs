@@ -19,6 +19,9 @@ use serde::Serialize;
 /// The status of a program that an interrupt ended.
 const INTERRUPTED: i32 = 130;
 
+/// The status of a command line that cannot be read.
+pub(crate) const WRONG_LINE: i32 = 2;
+
 /// Whoever read standard output is gone.
 #[derive(Debug)]
 pub(crate) struct ClosedPipe;

@@ -5,6 +5,7 @@ mod hidden;
 pub mod memory;
 mod staged;
 mod target;
+pub mod text;
 
 use std::{
     io,

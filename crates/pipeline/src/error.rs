@@ -59,13 +59,13 @@ pub enum PipelineError {
         reason: String,
     },
     /// A value that cannot be.
-    #[error("{origin}: {key} is {found}, expected {expected}")]
+    #[error("{origin}: {key}{}", of_value(found, expected))]
     Value {
         /// The file and line, or the camera's name.
         origin: String,
         /// The key.
         key: &'static str,
-        /// What was found.
+        /// What was found; nothing where what would do says it all.
         found: String,
         /// What would do.
         expected: String,
@@ -153,6 +153,11 @@ impl From<WriteError> for PipelineError {
     fn from(WriteError { path, reason, .. }: WriteError) -> Self {
         Self::Write { path, reason }
     }
+}
+
+/// Returns the words behind a key whose value cannot be.
+fn of_value(found: &str, expected: &str) -> String {
+    if found.is_empty() { format!(": {expected}") } else { format!(" is {found}, expected {expected}") }
 }
 
 impl PipelineError {

@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use dioptric_files::text;
+use dioptric_scene::wavelengths_of_column;
 use dioptric_sensor::WhiteBalance;
 use dioptric_spectrum::{Illuminant, Spectrum};
 
@@ -32,19 +34,17 @@ pub fn parse_white(text: &str) -> Result<WhiteBalance, PipelineError> {
     Ok(WhiteBalance::parse(text)?)
 }
 
-/// Below lie wavelengths in micrometres, and of no light that a camera sees.
-const SHORTEST_NM: f64 = 50.0;
-
 fn read_light(path: &Path) -> Result<Illuminant, PipelineError> {
     let unreadable = |reason: String| PipelineError::Read { path: path.to_owned(), reason };
+    let text = text::read(path).map_err(|e| unreadable(e.to_string()))?;
+    let text = text::with_commas(&text);
     let mut reader = csv::ReaderBuilder::new()
         .has_headers(false)
         .flexible(true)
         .comment(Some(b'#'))
         .trim(csv::Trim::All)
-        .from_path(path)
-        .map_err(|e| unreadable(e.to_string()))?;
-    let (mut wavelengths_nm, mut values) = (Vec::new(), Vec::new());
+        .from_reader(text.as_bytes());
+    let (mut names, mut wavelengths_nm, mut values) = (Vec::<String>::new(), Vec::new(), Vec::new());
     for (number, record) in reader.records().enumerate() {
         let record = record.map_err(|e| unreadable(e.to_string()))?;
         let line = record.position().map_or(number as u64 + 1, csv::Position::line);
@@ -60,15 +60,23 @@ fn read_light(path: &Path) -> Result<Illuminant, PipelineError> {
                 wavelengths_nm.push(nm);
                 values.push(value);
             }
-            // Names of the columns.
-            _ if number == 0 => {}
+            _ if number == 0 => names = record.iter().map(str::to_owned).collect(),
             _ => return Err(unreadable(format!("line {line} is not a wavelength in nm and a power"))),
         }
     }
-    if let Some(nm) = wavelengths_nm.iter().find(|nm| **nm < SHORTEST_NM) {
-        return Err(unreadable(format!("a wavelength is {nm}, expected nm")));
+    let wavelengths_nm =
+        wavelengths_of_column(names.first().map_or("", String::as_str), &wavelengths_nm).map_err(unreadable)?;
+    if names
+        .get(1)
+        .map(|name| name.to_lowercase())
+        .is_some_and(|name| ["photon", "quanta", "mol"].iter().any(|of| name.contains(of)))
+    {
+        values.iter_mut().zip(&wavelengths_nm).for_each(|(value, nm)| *value /= nm);
     }
-    let light = Spectrum::new(wavelengths_nm, values).map(Illuminant::Spectrum);
+    let mut order: Vec<usize> = (0..values.len()).collect();
+    order.sort_by(|a, b| wavelengths_nm[*a].total_cmp(&wavelengths_nm[*b]));
+    let sorted = |list: &[f64]| order.iter().map(|at| list[*at]).collect();
+    let light = Spectrum::new(sorted(&wavelengths_nm), sorted(&values)).map(Illuminant::Spectrum);
     let checked = light.and_then(|light| light.check().map(|()| light));
     checked.map_err(|e| unreadable(e.to_string()))
 }
@@ -85,10 +93,18 @@ mod tests {
             std::fs::write(&path, text).unwrap();
             parse_illuminant(&path.to_string_lossy())
         };
-        assert!(read("nm, power\n400, 1\n500, 2\n700, 1\n").is_ok());
+        let light = read("nm, power\n400, 1\n500, 2\n800, 1\n").unwrap();
+        for text in [
+            "µm;W/nm\n0,4;1\n0,5;2\n0,8;1\n",
+            "cm^-1\tpower\n12500\t1\n20000\t2\n25000\t1\n",
+            "nm, photons/s\n400, 400\n500, 1000\n800, 800\n",
+            "\u{feff}Å, W\n4000, 1\n5000, 2\n8000, 1\n",
+        ] {
+            assert_eq!(read(text).unwrap(), light, "{text}");
+        }
         for (text, word) in [
             ("nm, a, b\n400, 1, 2\n700, 1, 2\n", "3 columns"),
-            ("0.4, 1\n0.7, 1\n", "expected nm"),
+            ("waves (zorp), a\n400, 1\n700, 1\n", "'zorp'"),
             ("400, 1\n500; 2\n", "line 2"),
             ("400, 1\n400, 2\n", "400"),
         ] {

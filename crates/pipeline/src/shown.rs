@@ -1,6 +1,6 @@
 //! A picture viewed as on a given display.
 
-use std::{fs, path::Path};
+use std::path::Path;
 
 use dioptric_scene::{DisplayModel, ExrSamples, Scene, read_iset_display, write_scene_exr};
 use dioptric_spectrum::{Observer, WavelengthGrid, Xyz};
@@ -25,8 +25,8 @@ pub fn open_display(text: &str) -> Result<(DisplayModel, Vec<String>), PipelineE
     if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("mat")) {
         return Ok(read_iset_display(path)?);
     }
-    let read =
-        fs::read_to_string(path).map_err(|e| PipelineError::Read { path: path.to_owned(), reason: e.to_string() })?;
+    let read = dioptric_files::text::read(path)
+        .map_err(|e| PipelineError::Read { path: path.to_owned(), reason: e.to_string() })?;
     let options = ron::Options::default().with_default_extension(Extensions::IMPLICIT_SOME);
     let display: DisplayModel = options.from_str(&read).map_err(|e| PipelineError::Syntax {
         path: path.to_owned(),

@@ -50,7 +50,7 @@ impl Plan {
     #[staticmethod]
     fn read(path: PathBuf) -> PyResult<Self> {
         let unreadable = |error: std::io::Error| SweepError::Read { path: path.clone(), reason: error.to_string() };
-        let text = std::fs::read_to_string(&path).map_err(unreadable).map_err(sweep_exception)?;
+        let text = dioptric_files::text::read(&path).map_err(unreadable).map_err(sweep_exception)?;
         Self::of(text, path)
     }
 

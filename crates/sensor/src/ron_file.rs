@@ -1,6 +1,6 @@
 //! Files of this crate: RON texts, built in or read.
 
-use std::{fs, path::Path};
+use std::path::Path;
 
 use serde::{Serialize, de::DeserializeOwned};
 
@@ -12,7 +12,7 @@ use crate::SensorError;
 /// Names a file that cannot be read.
 pub(crate) fn read_text(path: &Path) -> Result<String, SensorError> {
     let read_error = |e: std::io::Error| SensorError::Read { path: path.to_owned(), reason: e.to_string() };
-    fs::read_to_string(path).map_err(read_error)
+    dioptric_files::text::read(path).map_err(read_error)
 }
 
 /// Returns what a text holds; `origin` names it in errors.

@@ -120,7 +120,7 @@ impl Plan {
     /// # Errors
     /// As [`parse`](Self::parse), and when the file cannot be read.
     pub fn read(path: &Path) -> Result<Self, SweepError> {
-        let text = fs::read_to_string(path).map_err(SweepError::reading(path))?;
+        let text = dioptric_files::text::read(path).map_err(SweepError::reading(path))?;
         Self::parse(&text, path)
     }
 

@@ -37,7 +37,7 @@ pub(crate) fn find_series(path: &Path) -> Result<Vec<FileSeries>, PipelineError>
     if path.is_dir() && !descriptor.exists() {
         return series_by_name(path);
     }
-    let text = fs::read_to_string(&descriptor)
+    let text = dioptric_files::text::read(&descriptor)
         .map_err(|e| PipelineError::Read { path: descriptor.clone(), reason: e.to_string() })?;
     parse(&text, &descriptor)
 }

@@ -1,6 +1,6 @@
 //! Gray steps of known luminance: the opto-electronic conversion (ISO 14524), and noise and dynamic range by it (ISO 15739).
 
-use std::{fs, path::Path};
+use std::path::Path;
 
 use dioptric_pipeline::PipelineError;
 use serde::Serialize;
@@ -86,8 +86,9 @@ impl StepsRequest {
     pub fn read_steps(path: &Path) -> Result<Vec<Step>, PipelineError> {
         let wrong =
             |line: usize, reason: String| PipelineError::Table { path: path.to_owned(), line: line as u64, reason };
-        let text = fs::read_to_string(path)
+        let text = dioptric_files::text::read(path)
             .map_err(|e| PipelineError::Read { path: path.to_owned(), reason: e.to_string() })?;
+        let text = dioptric_files::text::with_commas(&text);
         let mut lines =
             text.lines().enumerate().map(|(i, line)| (i + 1, line.trim())).filter(|(_, line)| !line.is_empty());
         let words = |line: &str| line.split(',').map(|word| word.trim().to_owned()).collect::<Vec<String>>();
@@ -352,7 +353,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("steps.csv");
         let read = |text: &str| {
-            fs::write(&path, text).unwrap();
+            std::fs::write(&path, text).unwrap();
             StepsRequest::read_steps(&path).map_err(|error| error.to_string())
         };
         let steps = read("x,y,w,h,luminance\n0,0,8,8,1.5\n8,0,8,8,3\n16,0,8,8,6\n").unwrap();

@@ -141,15 +141,11 @@ pub(crate) const CHANGED: &[(&str, &str, &str)] = &[
     ("depth_m: 2.0", "depth_m: NaN", "depth_m is NaN, expected "),
     ("depth_m: 2.0", "depth_m: 2.0, illuminance_lux: -1.0", "illuminance_lux is -1, expected "),
     ("depth_m: 2.0", "depth_m: 2.0, mean_luminance_cd_m2: NaN", "mean_luminance_cd_m2 is NaN, expected "),
-    (
-        "depth_m: 2.0",
-        "depth_m: 2.0, illuminant: Blackbody(0.0)",
-        "illuminant is the temperature of a black body is 0 K",
-    ),
+    ("depth_m: 2.0", "depth_m: 2.0, illuminant: Blackbody(0.0)", "illuminant: the temperature of a black body is 0 K"),
     (
         "depth_m: 2.0",
         "depth_m: 2.0, illuminant: Chromaticity(x: 0.9, y: 0.9)",
-        "illuminant is the chromaticity of a light is 0.9, 0.9",
+        "illuminant: the chromaticity of a light is 0.9, 0.9",
     ),
     (
         "depth_m: 2.0",

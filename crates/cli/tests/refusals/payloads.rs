@@ -126,12 +126,12 @@ pub(crate) fn pictures() -> Vec<(Vec<u8>, &'static str)> {
         (of(&|png| png.lines = Some(vec![0, 1, 2])), "does not have enough data for image"),
         (of(&|png| png.lines = Some(vec![9; 52])), "Unknown filter method 9"),
         (of(&|png| png.color_type = 3), "Missing palette"),
-        (of(&|_| {})[..60].to_vec(), "unexpected end of file"),
-        (of(&|_| {})[..8].to_vec(), "unexpected end of file"),
-        (vec![], "unexpected end of file"),
+        (of(&|_| {})[..60].to_vec(), "ends too early (truncated)"),
+        (of(&|_| {})[..8].to_vec(), "ends too early (truncated)"),
+        (vec![], "it is empty"),
         (words(b"no picture at all"), "s.png"),
-        (words(b"\xff\xd8\xff\xe0\0\x10JFIF\0"), "Jpeg"),
-        (words(b"II*\0\x08\0\0\0\xff\xff"), "fill whole buffer"),
+        (words(b"\xff\xd8\xff\xe0\0\x10JFIF\0"), "ends too early (truncated)"),
+        (words(b"II*\0\x08\0\0\0\xff\xff"), "ends too early (truncated)"),
         (words(b"\x76\x2f\x31\x01"), "s.png"),
     ]
 }
@@ -155,8 +155,8 @@ pub(crate) fn irradiances() -> Vec<(Vec<u8>, &'static str)> {
         (window([5, 5, 0, 0]), "cannot be read"),
         (window([i32::MIN, i32::MIN, i32::MAX, i32::MAX]), "data window"),
         (with(value_of(b"compression\0compression\0"), &[99]), "compression"),
-        (with(4, &[0xff; 4]), "not supported"),
-        (with(0, b"XXXX"), "file identifier missing"),
+        (with(4, &[0xff; 4]), "of a kind that is not read"),
+        (with(0, b"XXXX"), "it is no OpenEXR, as its name says"),
     ];
     for n in [0, 3, 8, 40, 200, good.len() / 3, good.len() - 5] {
         all.push((good[..n].to_vec(), "light.exr: cannot be read: "));

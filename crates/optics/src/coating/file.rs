@@ -26,7 +26,7 @@ impl Coating {
         if size > MOST_BYTES {
             return Err(failed(format!("is {size} bytes long, expected a coating of at most {MOST_BYTES}")));
         }
-        let text = std::fs::read_to_string(path).map_err(|error| failed(format!("cannot be read: {error}")))?;
+        let text = dioptric_files::text::read(path).map_err(|error| failed(format!("cannot be read: {error}")))?;
         let is = |extension: &str| path.extension().is_some_and(|found| found.eq_ignore_ascii_case(extension));
         let coating = if is("csv") {
             table_from_csv(&text).map(Self::Table)
@@ -44,7 +44,7 @@ impl Coating {
 
 /// Reads a table whose rows are all pairs of some wavelengths and some angles, in any order.
 fn table_from_csv(text: &str) -> Result<ReflectanceTable, String> {
-    let text = text.trim_start_matches('\u{feff}');
+    let text = dioptric_files::text::with_commas(text);
     let lines = text.lines().enumerate().map(|(i, line)| (i + 1, line.trim()));
     let mut lines = lines.filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
     let (_, header) = lines.next().ok_or("is empty, expected wavelength_nm,angle_deg,r or r_s,r_p")?;
@@ -116,8 +116,7 @@ mod tests {
         .unwrap();
         assert_eq!((table.wavelengths_nm.clone(), table.angles_deg.clone()), (vec![400.0, 600.0], vec![0.0, 30.0]));
         assert_eq!((table.r_s[0].clone(), table.r_p[1].clone()), (vec![0.01, 0.03], vec![0.02, 0.0]));
-        for text in
-            ["wavelength_nm,angle_deg,r\n500,0,.01", "\u{feff}# lab\n\"wavelength_nm\",\"angle_deg\",\"r\"\n500,0,.01"]
+        for text in ["wavelength_nm,angle_deg,r\n500,0,.01", "# lab\n\"wavelength_nm\",\"angle_deg\",\"r\"\n500,0,.01"]
         {
             assert_eq!(table_from_csv(text).unwrap().r_p, vec![vec![0.01]]);
         }

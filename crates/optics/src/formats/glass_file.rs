@@ -2,14 +2,11 @@
 
 use std::path::Path;
 
+use dioptric_files::text;
+
 use crate::{GlassCatalogue, OpticsError};
 
-use super::{
-    agf,
-    decode::{bytes_of, text_of},
-    rii_yaml,
-    text_error::TextError,
-};
+use super::{agf, decode::bytes_of, rii_yaml, text_error::TextError};
 
 impl GlassCatalogue {
     /// Reads a file of glasses, by its extension: `.agf` (Zemax), or `.yml` or `.yaml` (one material, as
@@ -29,8 +26,8 @@ impl GlassCatalogue {
         let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
         let name = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
         let read = match extension.as_str() {
-            "agf" => agf::glasses_from_agf(&text_of(bytes), &name.to_uppercase()),
-            "yml" | "yaml" => rii_yaml::glass_from_yaml(&text_of(bytes), &name).map(|glass| vec![glass]),
+            "agf" => agf::glasses_from_agf(&text::of_bytes(bytes), &name.to_uppercase()),
+            "yml" | "yaml" => rii_yaml::glass_from_yaml(&text::of_bytes(bytes), &name).map(|glass| vec![glass]),
             _ => {
                 let reason = format!("the extension '.{extension}' is no glass format; expected .agf, .yml or .yaml");
                 return Err(OpticsError::Io { path: path.to_owned(), reason });

@@ -2,11 +2,13 @@
 
 use std::path::Path;
 
+use dioptric_files::text;
+
 use crate::{GlassCatalogue, Lens, OpticsError};
 
 use super::{
     bench, dat,
-    decode::{bytes_of, text_of},
+    decode::bytes_of,
     deeplens,
     glasses::Glasses,
     iset_json, len,
@@ -60,7 +62,7 @@ impl LensFile {
     pub fn from_bytes(path: &Path, bytes: &[u8], options: &ReadOptions) -> Result<Self, OpticsError> {
         let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
         let name = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
-        let text = text_of(bytes);
+        let text = text::of_bytes(bytes);
         let glasses = Glasses::new(options);
         let read: Result<Self, TextError> = match extension.as_str() {
             "ron" => file_from_ron(&text),

@@ -57,6 +57,11 @@ impl<'a> Checker<'a> {
         Err(PipelineError::Value { origin, key, found: found.to_owned(), expected: expected.to_owned() })
     }
 
+    /// Says what another crate finds wrong with the value of a key.
+    pub(crate) fn refused(&self, key: &'static str, reason: &impl ToString) -> Result<(), PipelineError> {
+        self.wrong(key, "", &reason.to_string())
+    }
+
     /// Returns an error of the sensor's with the place of its key.
     pub(crate) fn of_sensor(&self, error: SensorError) -> PipelineError {
         let SensorError::Value { key, .. } = &error else { return error.into() };

@@ -19,10 +19,7 @@ mod syntax;
 mod video;
 mod world;
 
-use std::{
-    fs,
-    path::{Path, PathBuf},
-};
+use std::path::{Path, PathBuf};
 
 use dioptric_optics::{Iris, SurfaceChange};
 use dioptric_psf::{Diffraction, PsfError};
@@ -310,10 +307,10 @@ impl Camera {
     /// # Errors
     /// Names the file, the line and the key that is wrong, and what was expected.
     pub fn read(path: &Path) -> Result<Self, PipelineError> {
-        let text = fs::read_to_string(path).map_err(|e| {
+        let text = dioptric_files::text::read(path).map_err(|e| {
             let reason = match e.kind() {
                 std::io::ErrorKind::InvalidData => {
-                    "it is no text in UTF-8, expected a camera file; pictures are scenes (--scene FILE)".to_owned()
+                    "it is no text, expected a camera file; pictures are scenes (--scene FILE)".to_owned()
                 }
                 _ => e.to_string(),
             };

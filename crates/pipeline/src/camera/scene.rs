@@ -196,10 +196,13 @@ impl SceneSpec {
         }
         self.check_flat(checker)?;
         if let Err(error) = self.reading.check() {
-            checker.wrong("reading", &error.to_string(), "what can be said of a file")?;
+            checker.refused("reading", &error)?;
         }
         if !is_unsaid(&self.reading) && !matches!(self.source, SceneSource::File(_)) {
-            checker.wrong("reading", "what is said of a file", "a source that is a file")?;
+            checker.refused(
+                "reading",
+                &"it says what a scene's file does not, but the scene is no file: expected one (--scene FILE)",
+            )?;
         }
         if self.white_level.is_some() && !matches!(self.source, SceneSource::File(_)) {
             checker.wrong("white_level", "what is said of a file", "a source that is a file")?;
@@ -225,7 +228,7 @@ impl SceneSpec {
         }
         for (key, light) in [("illuminant", &self.illuminant), ("light", &self.light)] {
             if let Some(Err(error)) = light.as_ref().map(Illuminant::check) {
-                return checker.wrong(key, &error.to_string(), "a light");
+                return checker.refused(key, &error);
             }
         }
         match self.source {

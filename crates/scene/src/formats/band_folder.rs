@@ -5,6 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use dioptric_files::text;
 use rayon::prelude::*;
 
 use super::{
@@ -15,7 +16,7 @@ use super::{
     stated::{merged, name_of, note_of},
     tiff_file::TiffAs,
     unusable::unreadable,
-    wavelength_unit::{PLAUSIBLE_NM, without_unit},
+    wavelength_unit::{PLAUSIBLE_NM, listed_nm, unit_in},
 };
 use crate::SceneError;
 
@@ -210,9 +211,21 @@ fn listing(folder: &Path) -> Result<Listing, SceneError> {
     Ok(Listing { pictures, unused, files })
 }
 
+/// Returns the middle of the range of wavelengths that a stem ends in, as `b_445-455`: none wider than a filter's.
+fn middle_of_range(stem: &str) -> Option<f64> {
+    const MOST_NM: f64 = 100.0;
+    let (before, last) = stem.rsplit_once('-')?;
+    let first = before.rsplit(|c: char| !c.is_ascii_digit() && c != '.').next()?;
+    let (first, last) = (first.parse::<f64>().ok()?, last.parse::<f64>().ok()?);
+    (are_wavelengths(&[first, last]) && last > first && last - first <= MOST_NM).then_some(0.5 * (first + last))
+}
+
 /// Returns the number that a stem ends in, before an optional `nm`.
 fn number_at_end(stem: &str) -> Option<f64> {
     let stem = stem.strip_suffix("nm").map_or(stem, |own| own.trim_end_matches(['_', '-', ' ']));
+    if let Some(middle) = middle_of_range(stem) {
+        return Some(middle);
+    }
     let digits = stem.len() - stem.trim_end_matches(|c: char| c.is_ascii_digit() || c == '.').len();
     stem[stem.len() - digits..].trim_start_matches('.').parse().ok()
 }
@@ -224,11 +237,13 @@ fn are_wavelengths(numbers: &[f64]) -> bool {
 
 fn wavelengths_of(folder: &Path, pictures: &[(f64, PathBuf)]) -> Result<Vec<f64>, SceneError> {
     if let Some(list) = LISTS.iter().map(|name| folder.join(name)).find(|path| path.is_file()) {
-        let text = fs::read_to_string(&list).map_err(|error| unreadable(&list, error))?;
+        let text = text::read(&list).map_err(|error| unreadable(&list, error))?;
         let is_separator = |c: char| c.is_whitespace() || c == ',' || c == ';';
+        let text = text::with_commas(&text);
         let numbers: Vec<f64> = text.split(is_separator).filter_map(|word| word.parse().ok()).collect();
-        return without_unit(&numbers)
-            .ok_or_else(|| unreadable(&list, "its numbers are no likely nm: expected wavelengths in nm"));
+        let unit = text.split(|c| "()[]#:=;,".contains(c) || char::is_whitespace(c)).find_map(unit_in);
+        let own = listed_nm("wavelengths", unit, &numbers).map_err(|reason| unreadable(&list, reason))?;
+        return own.ok_or_else(|| unreadable(&list, "its numbers count bands: expected wavelengths in nm"));
     }
     let numbers: Vec<f64> = pictures.iter().map(|(number, _)| *number).collect();
     if are_wavelengths(&numbers) {
@@ -351,6 +366,18 @@ mod tests {
         assert_eq!(read_band_folder(folder.path(), None).unwrap().grid().centers_nm(), [450.0, 550.0, 650.0]);
         fs::write(folder.path().join("wavelengths.txt"), "450, 550").unwrap();
         assert!(read_band_folder(folder.path(), None).unwrap_err().to_string().contains("3 pictures"));
+    }
+
+    #[test]
+    fn ranges_and_units_of_wavelengths_are_obeyed() {
+        let folder = folder_of(&["b_445-455nm.png", "b_555-565nm.png"]);
+        assert_eq!(read_band_folder(folder.path(), None).unwrap().grid().centers_nm(), [450.0, 560.0]);
+        let folder = folder_of(&["b_1.png", "b_2.png"]);
+        for text in ["Angstrom\n4500\n5600\n", "# um\n0,45;0,56", "wavelength (nm)\n450\n560\n"] {
+            fs::write(folder.path().join("wavelengths.txt"), text).unwrap();
+            let image = read_band_folder(folder.path(), None).unwrap();
+            assert_eq!(image.grid().centers_nm(), [450.0, 560.0], "{text}");
+        }
     }
 
     #[test]

@@ -7,7 +7,7 @@ use std::{
 
 use serde::{
     Deserialize, Deserializer,
-    de::{MapAccess, Visitor},
+    de::{MapAccess, SeqAccess, Visitor},
 };
 use serde_json::Value;
 
@@ -16,11 +16,17 @@ use super::{
     camera_models::{HARMLESS, check_matrix, is_fisheye, unknown_model},
     camera_yaml::of_yaml,
     distortion::Distortion,
+    npy::parse as parse_npy,
     stated::{Stated, name_of, short},
-    unusable::{check_memory, unreadable},
+    unusable::{TRUNCATED, check_memory, check_whole, starts_with, unreadable},
 };
 use crate::SceneError;
 
+/// What camera data are read as.
+const EXPECTED: &str = "expected JSON, YAML, a matrix of 3 × 3 numbers, or a line of COLMAP's cameras.txt (colmap model_converter --output_type \
+                        TXT): number, model, width, height, parameters";
+/// Lines of YAML of ROS, the matrix of its messages.
+const YAML: [&str; 2] = ["k:", "K:"];
 /// Endings of a picture's stem that its camera file does not repeat.
 const PARTS: [&str; 4] = [".radiance_depth", ".radiance", ".reflectance", ".depth"];
 impl CameraFile {
@@ -41,13 +47,26 @@ impl CameraFile {
     pub(super) fn read(path: &Path, picture: &Path) -> Result<Self, SceneError> {
         let length = fs::metadata(path).map_err(|error| unreadable(path, error))?.len();
         check_memory(path, length.saturating_mul(4), length)?;
-        let text = fs::read_to_string(path).map_err(|error| unreadable(path, error))?;
-        let data = match text.trim_start_matches('\u{feff}').trim_start() {
+        check_whole(path)?;
+        if starts_with(path, NUMPY)? {
+            return of_npy(path, picture).and_then(Self::checked).map_err(|reason| unreadable(path, reason));
+        }
+        let text = dioptric_files::text::read(path).map_err(|error| match error.kind() {
+            std::io::ErrorKind::InvalidData => unreadable(path, format!("it is no text, {EXPECTED}")),
+            _ => unreadable(path, error),
+        })?;
+        let data = match text.trim_start() {
             text if text.starts_with('{') => of_json(path, text, picture),
-            text if text.contains("camera_matrix") || text.contains("intrinsics:") || text.starts_with("%YAML") => {
+            text if text.starts_with("%YAML") || text.lines().any(|line| YAML.contains(&line.trim())) || {
+                text.contains("camera_matrix") || text.contains("intrinsics:")
+            } =>
+            {
                 of_yaml(path, text)
             }
-            text => of_colmap(path, text),
+            text => match matrix_of(text) {
+                Some(numbers) => of_matrix(path, &numbers, picture),
+                None => of_colmap(path, text),
+            },
         };
         data.and_then(Self::checked).map_err(|reason| unreadable(path, reason))
     }
@@ -64,45 +83,129 @@ pub(super) fn beside(picture: &Path, endings: &[&str]) -> Vec<PathBuf> {
     names.into_iter().map(|name| picture.with_file_name(name)).collect()
 }
 
-/// An object of JSON, each of whose keys stands once.
-struct Object(Vec<(String, Value)>);
+/// JSON in whose objects each key stands once.
+struct Once(Value);
 
-impl<'de> Deserialize<'de> for Object {
+impl<'de> Deserialize<'de> for Once {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct Keys;
-        impl<'de> Visitor<'de> for Keys {
-            type Value = Object;
+        struct Any;
+        impl<'de> Visitor<'de> for Any {
+            type Value = Once;
 
             fn expecting(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-                formatter.write_str("an object")
+                formatter.write_str("a number, a text, a list or an object")
             }
 
-            fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Object, A::Error> {
-                let mut entries: Vec<(String, Value)> = vec![];
-                while let Some((key, value)) = map.next_entry::<String, Value>()? {
-                    if entries.iter().any(|(own, _)| *own == key) {
+            fn visit_bool<E>(self, own: bool) -> Result<Once, E> {
+                Ok(Once(own.into()))
+            }
+
+            fn visit_i64<E>(self, own: i64) -> Result<Once, E> {
+                Ok(Once(own.into()))
+            }
+
+            fn visit_u64<E>(self, own: u64) -> Result<Once, E> {
+                Ok(Once(own.into()))
+            }
+
+            fn visit_f64<E>(self, own: f64) -> Result<Once, E> {
+                Ok(Once(own.into()))
+            }
+
+            fn visit_str<E>(self, own: &str) -> Result<Once, E> {
+                Ok(Once(own.into()))
+            }
+
+            fn visit_unit<E>(self) -> Result<Once, E> {
+                Ok(Once(Value::Null))
+            }
+
+            fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Once, A::Error> {
+                let mut items = vec![];
+                while let Some(Once(item)) = list.next_element()? {
+                    items.push(item);
+                }
+                Ok(Once(items.into()))
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Once, A::Error> {
+                let mut entries = serde_json::Map::new();
+                while let Some((key, Once(value))) = map.next_entry::<String, Once>()? {
+                    if entries.contains_key(&key) {
                         return Err(serde::de::Error::custom(format!("the key '{}' stands twice", short(&key))));
                     }
-                    entries.push((key, value));
+                    entries.insert(key, value);
                 }
-                Ok(Object(entries))
+                Ok(Once(entries.into()))
             }
         }
-        deserializer.deserialize_map(Keys)
+        deserializer.deserialize_any(Any)
     }
+}
+
+/// What a file of an array of `NumPy` begins with.
+const NUMPY: &[u8] = b"\x93NUMPY";
+
+/// Reads the matrix of a camera: 3 rows of 3 numbers of `NumPy`.
+fn of_npy(path: &Path, picture: &Path) -> Result<CameraFile, String> {
+    let array = parse_npy(&fs::read(path).map_err(|error| error.to_string())?)?;
+    if array.sides != [3, 3] {
+        return Err(format!("its array has sides of {:?}, expected the 3 × 3 matrix of a camera", array.sides));
+    }
+    of_matrix(path, &array.values.iter().map(f32::to_string).collect::<Vec<_>>(), picture)
+}
+
+/// Reads the matrix of a camera, row by row.
+fn of_matrix(path: &Path, numbers: &[String], picture: &Path) -> Result<CameraFile, String> {
+    let rows: Vec<_> = numbers.chunks(3).map(|row| format!("[{}]", row.join(","))).collect();
+    of_json(path, &format!("{{\"intrinsic_matrix\": [{}]}}", rows.join(",")), picture)
+}
+
+/// Returns the numbers of a text that is a matrix of 3 rows of 3 numbers, as `savetxt` of `NumPy` writes it.
+fn matrix_of(text: &str) -> Option<Vec<String>> {
+    let is_comment = |line: &&str| line.trim().is_empty() || line.starts_with('#');
+    let number = |word: &str| Some(word.parse::<f64>().ok()?.to_string());
+    let row = |line: &str| line.split([' ', '\t', ',', ';']).filter(|word| !word.is_empty()).map(number).collect();
+    let rows: Option<Vec<Vec<String>>> = text.lines().filter(|line| !is_comment(line)).map(row).collect();
+    rows.filter(|rows| rows.len() == 3 && rows.iter().all(|row| row.len() == 3)).map(|rows| rows.concat())
+}
+
+/// Returns where and why a text is no JSON.
+fn no_json(text: &str, error: &serde_json::Error) -> String {
+    let (line, column) = (error.line(), error.column());
+    let said = error.to_string();
+    let said = said.split(" at line ").next().unwrap_or_default();
+    if error.is_data() {
+        return format!("line {line}: {said}");
+    }
+    if error.is_eof() {
+        return TRUNCATED.to_owned();
+    }
+    let of_line = text.lines().nth(line.saturating_sub(1)).unwrap_or_default();
+    let from = of_line.char_indices().nth(column.saturating_sub(1)).map_or(of_line.len(), |(at, _)| at);
+    let rest = &of_line[from..];
+    let end = rest.find([',', '}', ']']).unwrap_or(rest.len());
+    let found = rest.get(..end.max(1)).unwrap_or(rest);
+    let expected = match said.strip_prefix("expected ") {
+        Some("value") => "a number, a text, a list or an object",
+        expected => expected.unwrap_or("JSON"),
+    };
+    format!("line {line}, column {column}: found '{}', expected {expected}", short(found))
 }
 
 /// Reads JSON of ours, `Open3D`, nerfstudio or ROS.
 fn of_json(path: &Path, text: &str, picture: &Path) -> Result<CameraFile, String> {
-    let Object(entries) = serde_json::from_str(text).map_err(|error| error.to_string())?;
-    let (mut keys, frames_note) = with_frame(path, picture, Stated::new("key", entries))?;
+    let Once(all) = serde_json::from_str(text).map_err(|error| no_json(text, &error))?;
+    let Value::Object(entries) = all else { return Err("it is no object of JSON".to_owned()) };
+    let (mut keys, frames_note) = with_frame(path, picture, Stated::new("key", entries.into_iter().collect()))?;
     let depth_file = match keys.take("depth_file_path") {
         None | Some(Value::Null) => None,
-        Some(Value::String(own)) => Some(path.with_file_name(own)),
+        Some(Value::String(own)) => Some(path.with_file_name(own.replace('\\', "/"))),
         Some(other) => return Err(format!("depth_file_path is {other}, expected the name of a file")),
     };
     // Centers of pixels are at whole numbers for OpenCV and Open3D, at halves for nerfstudio.
-    let is_nerf = keys.get("fl_x").is_some() || keys.get("camera_angle_x").is_some();
+    let is_nerf = ["fl_x", "camera_angle_x"].iter().any(|name| keys.get(name).is_some())
+        && ["fx_px", "fx"].iter().all(|name| keys.get(name).is_none());
     let is_fisheye = is_of_fisheye(&mut keys)?;
     if keys.get("units").and_then(Value::as_str).is_some_and(|unit| ["px", "pixel", "pixels"].contains(&unit)) {
         keys.take("units");
@@ -143,19 +246,22 @@ fn with_frame(path: &Path, picture: &Path, mut all: Keys) -> Result<(Keys, Optio
         Some(Value::Array(frames)) => frames,
         Some(_) => return Err("its frames are no list, expected an object for each".to_owned()),
     };
-    let Some(Value::Object(frame)) = frame_of(path, picture, &frames) else {
+    let alike = frames_of(path, picture, &frames);
+    let [Value::Object(frame)] = alike[..] else {
+        let how_many = if alike.is_empty() {
+            "none of the file_path of its frames is"
+        } else {
+            "several of the file_path of its frames are"
+        };
         if frames.iter().any(|frame| frame.get("fl_x").is_some()) {
             return Err(format!(
-                "its frames have focal lengths of their own, and none of their file_path is {}: expected one for all, or that of the picture",
+                "its frames have focal lengths of their own, and {how_many} {}: expected one for all, or that of the picture",
                 name_of(picture)
             ));
         }
         let have_depth = frames.iter().any(|frame| frame.get("depth_file_path").is_some());
-        let note = format!(
-            "{}: none of the file_path of its frames is {}, so that no depth_file_path of theirs is used",
-            name_of(path),
-            name_of(picture)
-        );
+        let note =
+            format!("{}: {how_many} {}, so that no depth_file_path of theirs is used", name_of(path), name_of(picture));
         return Ok((all, have_depth.then_some(note)));
     };
     let mut own = Stated::new("key", frame.clone().into_iter().collect());
@@ -165,17 +271,20 @@ fn with_frame(path: &Path, picture: &Path, mut all: Keys) -> Result<(Keys, Optio
     Ok((own, None))
 }
 
-/// Returns the frame whose file is a picture, or else the only one that is called like it elsewhere; the ending may be left out.
-fn frame_of<'a>(path: &Path, picture: &Path, frames: &'a [Value]) -> Option<&'a Value> {
-    let (name, here) = (picture.file_name()?, picture.canonicalize().ok());
-    let file = |frame: &Value| frame.get("file_path").and_then(Value::as_str).map(|own| path.with_file_name(own));
-    let is_called = |own: &PathBuf| own.file_name() == Some(name) || own.file_name() == picture.file_stem();
-    let is_here = |own: PathBuf| here.is_some() && own.with_file_name(name).canonicalize().ok() == here;
-    let mut alike = frames.iter().filter(|frame| file(frame).is_some_and(|own| is_called(&own)));
-    alike
-        .clone()
-        .find(|frame| file(frame).is_some_and(is_here))
-        .or_else(|| alike.next().filter(|_| alike.next().is_none()))
+/// Returns the frames whose file is a picture, or else those that are called like it elsewhere; the ending may be left out.
+fn frames_of<'a>(path: &Path, picture: &Path, frames: &'a [Value]) -> Vec<&'a Value> {
+    let Some(name) = picture.file_name() else { return vec![] };
+    let here = picture.canonicalize().ok();
+    let is_called = |own: &Path| own.file_name() == Some(name) || own.file_name() == picture.file_stem();
+    let is_here = |own: &Path| here.is_some() && own.with_file_name(name).canonicalize().ok() == here;
+    let of = |is_wanted: &dyn Fn(&Path) -> bool| {
+        let file = |frame: &Value| Some(path.with_file_name(frame.get("file_path")?.as_str()?.replace('\\', "/")));
+        let mut found: Vec<_> = frames.iter().filter(|frame| file(frame).is_some_and(|own| is_wanted(&own))).collect();
+        found.dedup();
+        found
+    };
+    let alike = of(&|own| is_called(own) && is_here(own));
+    if alike.is_empty() { of(&is_called) } else { alike }
 }
 
 /// Takes the number of the first of these keys that is there; `null` is none.
@@ -249,7 +358,8 @@ fn distortion_of(keys: &mut Keys, is_fisheye: bool, is_nerf: bool) -> Result<Dis
     for (place, name) in ["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"].iter().enumerate() {
         k[place] = number(keys, &[name])?.unwrap_or(0.0);
     }
-    if let Some(list) = keys.take_any(&["distortion", "dist_coeffs", "distortion_coefficients", "D"]) {
+    let list = keys.take_any(&["distortion", "dist_coeffs", "distortion_coefficients", "D"]);
+    if let Some(list) = list.filter(|list| !list.is_null()) {
         if k.iter().any(|v| *v != 0.0) {
             return Err("it states its distortion twice, as a list and by names: expected one".to_owned());
         }
@@ -307,14 +417,13 @@ fn numbers_of(value: &Value, name: &str) -> Result<Vec<f64>, String> {
 
 /// Reads the first camera of COLMAP's `cameras.txt`: number, model, width, height and parameters, with centers of pixels at halves.
 fn of_colmap(path: &Path, text: &str) -> Result<CameraFile, String> {
-    let expected = "expected JSON, YAML, or a line of COLMAP's cameras.txt: number, model, width, height, parameters";
     let mut lines = text.lines().map(str::trim).filter(|line| !line.is_empty() && !line.starts_with('#'));
-    let line = lines.next().ok_or(expected)?;
+    let line = lines.next().ok_or(EXPECTED)?;
     let words: Vec<&str> = line.split_whitespace().collect();
-    let [_, model, width, height, parameters @ ..] = &words[..] else { return Err(expected.to_owned()) };
-    let side = |word: &str| word.parse::<usize>().ok().filter(|n| *n > 0).ok_or(expected);
+    let [_, model, width, height, parameters @ ..] = &words[..] else { return Err(EXPECTED.to_owned()) };
+    let side = |word: &str| word.parse::<usize>().ok().filter(|n| *n > 0).ok_or(EXPECTED);
     let size = (side(width)?, side(height)?);
-    let p: Vec<f64> = parameters.iter().map(|word| word.parse()).collect::<Result<_, _>>().map_err(|_| expected)?;
+    let p: Vec<f64> = parameters.iter().map(|word| word.parse()).collect::<Result<_, _>>().map_err(|_| EXPECTED)?;
     let (f, c, k): (_, _, &[f64]) = match (*model, &p[..]) {
         ("SIMPLE_PINHOLE", &[f, cx, cy]) => ((f, f), (cx, cy), &[]),
         ("PINHOLE", &[fx, fy, cx, cy]) => ((fx, fy), (cx, cy), &[]),

@@ -33,9 +33,47 @@ fn camera_file_is_found_and_scaled() {
 fn unknown_keys_are_named() {
     let text = GOOD.replace("\"source\"", "\"shutter\": 3, \"Fx_px\": 5, \"units\": \"mm\", \"source\"");
     let notes = read(&text, 500, 741).unwrap().notes;
-    assert_eq!(notes[0], "motor_camera.json: its keys 'shutter', 'Fx_px', 'units' are not used");
+    assert_eq!(notes[0], "motor_camera.json: its keys 'Fx_px', 'shutter', 'units' are not used");
     let in_samples = GOOD.replace("\"source\"", "\"units\": \"pixels\", \"source\"");
     assert_eq!(read(&in_samples, 500, 741).unwrap().notes, [""; 0]);
+}
+
+/// What a tester's files had that was dropped or refused with the wrong words.
+#[test]
+fn keys_that_stand_twice_and_lists_of_items_are_seen() {
+    let nested = r#"{"w":640,"h":480,"frames":[{"file_path":"motor_370.radiance_depth.exr","fl_x":525,"fl_x":526}]}"#;
+    assert!(read(nested, 480, 640).unwrap_err().to_string().contains("'fl_x' stands twice"));
+    // A key of another program moves no center.
+    let both = GOOD.replace("\"source\"", "\"fl_x\": 7.0, \"source\"");
+    assert_eq!(read(&both, 500, 741).unwrap().cx_px, 311.0);
+    let ros = "header:\n  frame_id: c\nheight: 480\nwidth: 640\ndistortion_model: plumb_bob\nd:\n- 0.1\n- 0.0\n- 0.0\n- 0.0\n- 0.0\n\
+               k:\n- 525.0\n- 0.0\n- 319.5\n- 0.0\n- 526.0\n- 239.5\n- 0.0\n- 0.0\n- 1.0\n";
+    let kalibr = "cam0:\n  T_cam_imu:\n  - [1.0, 0.0]\n  - [0.0, 1.0]\n  camera_model: pinhole\n  intrinsics: [525, 526, 319.5, 239.5]\n  \
+                  resolution: [640, 480]\n";
+    for text in [ros, kalibr, "525 0 319.5\n0 526 239.5\n0 0 1\n", "\u{feff}525,0,319.5\r\n0,526,239.5\r\n0,0,1\r\n"] {
+        let data = read(text, 480, 640).unwrap();
+        assert_eq!([data.fx_px, data.fy_px, data.cx_px, data.cy_px], [525.0, 526.0, 319.5, 239.5], "{text}");
+    }
+    for (text, word) in [
+        ("{\"width\": NaN}", "line 1, column 11: found 'NaN', expected a number"),
+        ("{\"width\": 3", "ends too early (truncated)"),
+        ("", "it is empty"),
+        ("PK\0\u{3}", "it is no text, expected JSON"),
+    ] {
+        assert!(read(text, 480, 640).unwrap_err().to_string().contains(word), "{text}");
+    }
+}
+
+#[test]
+fn frames_of_one_name_and_backslashes_are_told_apart() {
+    let frames = |names: [&str; 2]| {
+        let of = |(name, fl): (&str, f64)| format!(r#"{{"file_path":"{name}","fl_x":{fl}}}"#);
+        let list = names.into_iter().zip([525.0, 526.0]).map(of).collect::<Vec<_>>().join(",");
+        read(&format!(r#"{{"w":640,"h":480,"cx":320,"cy":240,"frames":[{list}]}}"#), 480, 640)
+    };
+    let two = frames(["a/motor_370.radiance_depth.exr", "b/motor_370.radiance_depth.exr"]);
+    assert!(two.unwrap_err().to_string().contains("several of the file_path of its frames are"));
+    assert_eq!(frames([r"images\\motor_370.radiance_depth.exr", "b.exr"]).unwrap().fx_px, 525.0);
 }
 
 #[test]
@@ -146,7 +184,7 @@ fn camera_file_that_does_not_fit_is_refused_by_name() {
         ),
         (r#"{"width":741,"height":500,"intrinsic_matrix":[525.0,0,0,5,526.0,0,319.5,239.5,1]}"#, 500, 741, "skew"),
         (r#"{"K":[[525.0,0,319.5],[0,526.0,239.5],[0,0,0]]}"#, 500, 741, "skew"),
-        ("{", 500, 741, "EOF"),
+        ("{", 500, 741, "truncated"),
         ("[3]", 500, 741, "expected JSON"),
         ("1 FISHEYE 3 4 5", 500, 741, "FISHEYE"),
     ] {

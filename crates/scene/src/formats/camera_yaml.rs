@@ -18,7 +18,7 @@ pub(super) fn of_yaml(path: &Path, text: &str) -> Result<CameraFile, String> {
         let words = text.trim_matches(['[', ']']).split(',').map(str::trim).filter(|word| !word.is_empty());
         words.map(|word| word.parse().map_err(|_| format!("'{}' is no number", short(word)))).collect()
     };
-    let matrix = keys.take_any(&["camera_matrix", "Camera_Matrix", "K", "cameraMatrix"]).map(list).transpose()?;
+    let matrix = keys.take_any(&["camera_matrix", "Camera_Matrix", "K", "k", "cameraMatrix"]).map(list).transpose()?;
     let (f, c) = match (matrix, keys.take("intrinsics").map(list).transpose()?) {
         (Some(m), None) => {
             let &[fx, skew, cx, below, fy, cy, left, right, last] = &m[..] else {
@@ -41,18 +41,19 @@ pub(super) fn of_yaml(path: &Path, text: &str) -> Result<CameraFile, String> {
         let Some(model) = keys.take(name) else { continue };
         is_bent_as_fisheye |= is_fisheye(&model).ok_or_else(|| unknown_model(&model))?;
     }
-    let names = ["distortion_coefficients", "Distortion_Coefficients", "distortion_coeffs", "distCoeffs", "D"];
+    let names = ["distortion_coefficients", "Distortion_Coefficients", "distortion_coeffs", "distCoeffs", "D", "d"];
     let k = keys.take_any(&names).map(list).transpose()?.unwrap_or_default();
     let mut side = |names: &[&str]| -> Result<Option<usize>, String> {
         let Some(text) = keys.take_any(names) else { return Ok(None) };
         let wrong = || format!("{} is '{}', expected a number of samples", names[0], short(&text));
         text.parse::<usize>().ok().filter(|n| *n > 0).map(Some).ok_or_else(wrong)
     };
-    let size = match (side(&["image_width", "image_Width"])?, side(&["image_height", "image_Height"])?) {
-        (Some(width), Some(height)) => Some((width, height)),
-        (None, None) => None,
-        _ => return Err("it has one of image_width and image_height, expected both".to_owned()),
-    };
+    let size =
+        match (side(&["image_width", "image_Width", "width"])?, side(&["image_height", "image_Height", "height"])?) {
+            (Some(width), Some(height)) => Some((width, height)),
+            (None, None) => None,
+            _ => return Err("it has one of image_width and image_height, expected both".to_owned()),
+        };
     let size = match (size, keys.take("resolution").map(list).transpose()?.as_deref()) {
         (None, Some(&[width, height])) if width >= 1.0 && height >= 1.0 => Some((width as usize, height as usize)),
         (None, Some(_)) => return Err("its resolution is no width and height".to_owned()),
@@ -114,6 +115,18 @@ fn yaml_entries(text: &str) -> Result<Vec<(String, String)>, String> {
     let mut rest = text.lines().map(without_comment);
     while let Some(line) = rest.next() {
         if line.is_empty() || line.starts_with(['%', '#']) || line == "---" || line == "..." {
+            continue;
+        }
+        // A list with an item a line belongs to the key above.
+        if let Some(item) = line.strip_prefix('-').filter(|item| item.starts_with(' ')) {
+            match (matrix.take(), entries.last_mut()) {
+                (Some(name), _) => entries.push((name, format!("[{}]", item.trim()))),
+                (None, Some((_, list))) if list.ends_with(']') => {
+                    list.truncate(list.len() - 1);
+                    list.push_str(&format!(", {}]", item.trim()));
+                }
+                _ => return Err(format!("'{}' stands under no key", short(&line))),
+            }
             continue;
         }
         let Some((key, value)) = line.split_once(':') else {

@@ -2,13 +2,15 @@
 
 use std::path::Path;
 
+use dioptric_files::text;
 use ndarray::Array2;
 
 use super::{
     contents::Cube,
     reading::FileQuantity,
-    stated::{name_of, short},
+    stated::{name_of, note_of, short},
     unusable::{check_made, unreadable},
+    wavelength_unit::wavelengths_of_column,
 };
 use crate::SceneError;
 
@@ -23,21 +25,24 @@ const MOST_NAMES: usize = 24;
 /// Names the line that is no list of numbers, or is longer or shorter than the first.
 pub(super) fn read_chart(path: &Path) -> Result<Cube, SceneError> {
     let wrong = |reason: String| unreadable(path, reason);
-    let reader = csv::ReaderBuilder::new()
+    let text = text::read(path).map_err(|error| unreadable(path, error))?;
+    let text = text::with_commas(&text);
+    let mut reader = csv::ReaderBuilder::new()
         .has_headers(false)
         .flexible(true)
         .trim(csv::Trim::All)
         .comment(Some(b'#'))
-        .from_path(path);
-    let mut reader = reader.map_err(|error| unreadable(path, error))?;
+        .from_reader(text.as_bytes());
     let (mut names, mut wavelengths_nm, mut lines): (Vec<String>, Vec<f64>, Vec<Vec<f32>>) = (vec![], vec![], vec![]);
+    let mut first = String::new();
     for (index, record) in reader.records().enumerate() {
         let record = record.map_err(|error| wrong(format!("line {}: {error}", index + 1)))?;
         let line = record.position().map_or(index as u64 + 1, csv::Position::line);
         let numbers: Result<Vec<f64>, _> = record.iter().map(str::parse::<f64>).collect();
         let Ok(numbers) = numbers else {
             if index == 0 {
-                names = record.iter().skip(1).map(str::to_owned).collect();
+                names = record.iter().map(str::to_owned).collect();
+                first = if names.is_empty() { String::new() } else { names.remove(0) };
                 continue;
             }
             let text = record.iter().collect::<Vec<_>>().join(",");
@@ -60,6 +65,20 @@ pub(super) fn read_chart(path: &Path) -> Result<Cube, SceneError> {
             "it has no line of numbers: expected wavelengths in nm and a reflectance a column".to_owned(),
         ));
     }
+    const OTHERS: [&str; 4] = ["absorb", "radian", "emission", "photon"];
+    let is_other = |name: &&String| OTHERS.iter().any(|other| name.to_lowercase().contains(other));
+    if let Some(other) = names.iter().find(is_other) {
+        return Err(wrong(format!("its column '{}' says that it holds no reflectances, expected such", short(other))));
+    }
+    let wavelengths_nm = wavelengths_of_column(&first, &wavelengths_nm).map_err(wrong)?;
+    let mut notes = vec![];
+    if names.iter().chain([&first]).any(|name| name.contains('%') || name.to_lowercase().contains("percent")) {
+        lines.iter_mut().flatten().for_each(|value| *value /= 100.0);
+        notes.push(format!("{}: its reflectances are in percent", name_of(path)));
+    }
+    let comments: Vec<_> = text.lines().filter_map(|line| line.strip_prefix('#')).map(str::trim).collect();
+    let comments: Vec<_> = comments.into_iter().filter(|comment| !comment.is_empty()).map(str::to_owned).collect();
+    notes.extend(note_of(path, "comment", &comments));
     // As wide to its height as the usual charts of 6 × 4.
     let across = ((1.5 * n as f64).sqrt().ceil() as usize).min(n);
     let down = n.div_ceil(across);
@@ -74,7 +93,7 @@ pub(super) fn read_chart(path: &Path) -> Result<Cube, SceneError> {
     let named = names.iter().take(MOST_NAMES).map(|name| short(name)).collect::<Vec<_>>().join(", ");
     let more = if names.len() > MOST_NAMES { ", …" } else { "" };
     let named = if names.is_empty() { String::new() } else { format!(", from the top left: {named}{more}") };
-    let note = format!("{}: {n} patches, {across} × {down}, of {PATCH_PX} samples each{named}", name_of(path));
+    notes.push(format!("{}: {n} patches, {across} × {down}, of {PATCH_PX} samples each{named}", name_of(path)));
     let planes = lines.iter().map(plane).collect();
     Ok(Cube {
         planes,
@@ -82,7 +101,7 @@ pub(super) fn read_chart(path: &Path) -> Result<Cube, SceneError> {
         wavelengths_nm: Some(wavelengths_nm),
         quantity: Some(FileQuantity::Reflectance),
         unit: None,
-        notes: vec![note],
+        notes,
     })
 }
 
@@ -116,8 +135,28 @@ mod tests {
             "{:?}",
             scene.notes
         );
+        // As spreadsheets of half the world write it, in other units.
+        for text in [
+            "nm;pale;dark;gray\n400;0,2;0,05;0,5\n500;0,3;0,08;0,5\n600;0,5;0,1;0,5\n700;0,6;0,12;0,5\n",
+            "sep=;\nµm;pale;dark;gray\n0,4;0,2;0,05;0,5\n0,5;0,3;0,08;0,5\n0,6;0,5;0,1;0,5\n0,7;0,6;0,12;0,5\n",
+            "\u{feff}angstrom\tpale %\tdark\tgray\n4000\t20\t5\t50\n5000\t30\t8\t50\n6000\t50\t10\t50\n7000\t60\t12\t50\n",
+        ] {
+            write(text);
+            let other = read_scene(&path, &options).unwrap();
+            assert_eq!(other.radiance.grid(), scene.radiance.grid(), "{text}");
+            for column in [0, 40] {
+                for (a, b) in other.radiance.spectrum_at(9, column).iter().zip(scene.radiance.spectrum_at(9, column)) {
+                    assert_relative_eq!(*a, b, max_relative = 1e-6);
+                }
+            }
+        }
+        std::fs::write(&path, b"nm,Gr\xfcn\n400,.2\n500,.3\n").unwrap();
+        assert!(read_scene(&path, &options).unwrap().notes[1].contains("Grün"));
         for (text, word) in [
-            ("", "no line of numbers"),
+            ("", "it is empty"),
+            ("# nothing\n", "no line of numbers"),
+            ("nm,absorbance\n400,.2\n", "'absorbance' says that it holds no reflectances"),
+            ("waves (zorp),a\n400,.2\n", "'zorp'"),
             ("nm,a\n400,0.1\n500\n", "line 3: 1 numbers"),
             ("nm,a\n400,0.1\n500,x\n", "line 3: '500,x'"),
             ("nm\n400\n", "line 2"),

@@ -24,9 +24,16 @@ const NAMES: [&[&str]; 6] = [
     &["back", "nz", "negz"],
 ];
 
+const SIGNED: [&str; 6] = ["+x", "-x", "+y", "-y", "+z", "-z"];
+
 /// Returns the face of the cube that a file is named after.
 fn face_of(path: &Path) -> Option<usize> {
     let stem = path.file_stem()?.to_string_lossy().to_lowercase();
+    // `+x`, `-z`.
+    let signed = stem.get(stem.len().saturating_sub(2)..).unwrap_or_default();
+    if let Some(number) = SIGNED.iter().position(|own| *own == signed) {
+        return Some(number);
+    }
     let word = stem.rsplit(|c: char| !c.is_ascii_alphanumeric()).next().unwrap_or_default().to_owned();
     NAMES.iter().position(|names| names.contains(&word.as_str()))
 }
@@ -132,12 +139,13 @@ fn side_by_side(folder: &Path, faces: Vec<Contents>) -> Result<Image, SceneError
 
 #[cfg(test)]
 mod tests {
+    use super::SIGNED;
     use crate::{FileReading, ReadOptions, read_scene};
 
     /// Each face is of a gray of its own, and is found in its direction.
     #[test]
     fn faces_of_a_folder_are_seen_in_their_directions() {
-        for names in [["right", "left", "up", "down", "front", "back"], ["px", "nx", "py", "ny", "pz", "nz"]] {
+        for names in [["right", "left", "up", "down", "front", "back"], ["px", "nx", "py", "ny", "pz", "nz"], SIGNED] {
             let folder = tempfile::tempdir().unwrap();
             for (face, name) in names.iter().enumerate() {
                 let gray = image::RgbImage::from_pixel(8, 8, image::Rgb([40 * face as u8 + 40; 3]));
@@ -162,5 +170,15 @@ mod tests {
             let message = read_scene(folder.path(), &ReadOptions::default()).unwrap_err().to_string();
             assert!(message.contains("of its six faces up are missing"), "{message}");
         }
+        // Skies of games lie in frames of their own.
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["rt", "lf", "up", "dn", "ft", "bk"] {
+            let gray = image::RgbImage::from_pixel(8, 8, image::Rgb([40; 3]));
+            dioptric_pictures::save(&gray.into(), &folder.path().join(format!("{name}.png"))).unwrap();
+        }
+        let reading = FileReading { panorama: "cube".parse().ok(), ..FileReading::default() };
+        let options = ReadOptions { reading, horizontal_fov_deg: Some(60.0), ..ReadOptions::default() };
+        let message = read_scene(folder.path(), &options).unwrap_err().to_string();
+        assert!(message.contains("expected faces called right, left, up, down, front and back"), "{message}");
     }
 }

@@ -13,7 +13,7 @@ use super::{
     raw_depth::{DepthWords, RawDepth},
     reading::{DepthKind, DepthUnit},
     stated::name_of,
-    unusable::unreadable,
+    unusable::{check_whole, unreadable},
 };
 use crate::SceneError;
 
@@ -106,6 +106,7 @@ fn is_of_hypersim(path: &Path) -> bool {
 /// When the file is none of these, or its unit is not known.
 pub(super) fn read_depth(path: &Path, words: DepthWords<'_>) -> Result<RawDepth, SceneError> {
     let mut notes = vec![];
+    check_whole(path)?;
     let numbers = depth_numbers(path, words.variable)?.told_in(&mut notes);
     if numbers.values.is_empty() {
         return Err(unreadable(path, "it has no samples"));

@@ -156,7 +156,7 @@ fn header_text(header_path: &Path) -> Result<String, SceneError> {
     let mut bytes = Vec::new();
     let file = File::open(header_path).map_err(|error| unreadable(header_path, error))?;
     file.take(LIMIT_HEADER_BYTES).read_to_end(&mut bytes).map_err(|error| unreadable(header_path, error))?;
-    Ok(String::from_utf8_lossy(&bytes).into_owned())
+    Ok(dioptric_files::text::of_bytes(&bytes))
 }
 
 /// Returns the header that belongs to a file: itself, or `a.raw.hdr` or `a.hdr` for `a.raw`.

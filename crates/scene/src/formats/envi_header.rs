@@ -521,7 +521,7 @@ fn entries(path: &Path, text: &str) -> Result<Vec<Entry>, SceneError> {
     };
     let mut lines = text.lines().enumerate().map(|(i, line)| (i + 1, line.trim()));
     match lines.next() {
-        Some((_, first)) if first.trim_start_matches('\u{feff}') == "ENVI" => {}
+        Some((_, "ENVI")) => {}
         first => return wrong(1, first.map_or("", |(_, line)| line), "expected the word ENVI on the first line"),
     }
     let mut list = Vec::new();

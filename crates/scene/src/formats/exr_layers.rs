@@ -14,7 +14,7 @@ use super::{
     exr_colors::are_srgb,
     reading::Frame,
     stated::{Noted, Stated},
-    unusable::{check_memory, said, unreadable},
+    unusable::{check_memory, fault, unreadable},
 };
 use crate::SceneError;
 
@@ -268,12 +268,8 @@ fn guard(path: &Path, file: File) -> Result<(), SceneError> {
 
 /// Returns what is wrong with an EXR file in a few words.
 fn explain(error: &exr::error::Error) -> String {
-    let text = said(error);
-    // The crate turns the end of a file into these words.
-    if text.contains("reference to missing bytes") {
-        return "the file ends too early (truncated)".to_owned();
-    }
-    format!("no OpenEXR file that can be read ({text})")
+    let is_variant = matches!(error, exr::error::Error::NotSupported(_));
+    fault("OpenEXR", error, is_variant.then_some("one with scan lines or tiles that are not deep"))
 }
 
 /// A channel of a file, with the part of the display window that it has.

@@ -107,3 +107,4 @@ pub use reading::{DepthKind, FileQuantity, FileReading, NoData, Panorama};
 pub use spectral_exr::{NamedPlanes, SpectralFile, read_planes_exr, read_spectral_exr};
 pub use stated::Noted;
 pub use unmeasured::{FillDepth, filled_depth};
+pub use wavelength_unit::wavelengths_of_column;

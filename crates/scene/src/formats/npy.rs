@@ -4,7 +4,7 @@ use std::{fs::File, io::Read, path::Path};
 
 use super::{
     stated::{Noted, Stated, name_of, short},
-    unusable::{check_memory, unreadable},
+    unusable::{TRUNCATED, check_memory, unreadable},
 };
 use crate::SceneError;
 
@@ -59,7 +59,7 @@ struct Header {
 }
 
 fn truncated() -> String {
-    "the file ends too early (truncated)".to_owned()
+    TRUNCATED.to_owned()
 }
 
 fn header_of(bytes: &[u8]) -> Result<Header, String> {

@@ -16,8 +16,8 @@ use super::{
     npy::{NpyArray, is_array_of, npy_bytes, parse, parse_complex},
     read_options::ReadOptions,
     stated::{Noted, name_of, note_of, short},
-    unusable::{check_memory, open_new, unreadable, unwritable},
-    wavelength_unit::listed_nm,
+    unusable::{check_memory, fault, open_new, unreadable, unwritable},
+    wavelength_unit::{listed_nm, unit_in},
 };
 use crate::SceneError;
 
@@ -40,9 +40,9 @@ impl<'a> Archive<'a> {
         let wrong = |reason: String| unreadable(path, reason);
         let file = File::open(path).map_err(|error| unreadable(path, error))?;
         let length = file.metadata().map_err(|error| unreadable(path, error))?.len();
-        let zip = ZipArchive::new(BufReader::new(file)).map_err(|error| wrong(format!("it is no archive: {error}")))?;
+        let zip = ZipArchive::new(BufReader::new(file)).map_err(|error| wrong(of_zip(&error)))?;
         let names = zip.file_names().map(|name| Ok(name?.into_owned())).collect::<Result<Vec<String>, ZipError>>();
-        let names = names.map_err(|error| wrong(format!("it is no archive: {error}")))?;
+        let names = names.map_err(|error| wrong(of_zip(&error)))?;
         Ok(Self { path, zip, length, names, notes: vec![] })
     }
 
@@ -58,12 +58,12 @@ impl<'a> Archive<'a> {
     ) -> Result<(NpyArray, bool), SceneError> {
         let (path, length) = (self.path, self.length);
         let wrong = |reason: String| unreadable(path, format!("its '{}': {reason}", short(name)));
-        let mut entry = self.zip.by_name(name).map_err(|error| wrong(error.to_string()))?;
+        let mut entry = self.zip.by_name(name).map_err(|error| wrong(fault("archive", error, None)))?;
         // The bytes of the array, the single floats that they become, and the planes that are made of these.
         check_memory(path, entry.size().saturating_mul(9), length)?;
         let mut bytes = vec![];
         let limit = entry.size();
-        entry.by_ref().take(limit).read_to_end(&mut bytes).map_err(|error| wrong(error.to_string()))?;
+        entry.by_ref().take(limit).read_to_end(&mut bytes).map_err(|error| wrong(fault("archive", error, None)))?;
         let (array, is_complex) = parse(&bytes).map_err(wrong)?;
         Ok((array.noted(Path::new(name)).told_in(&mut self.notes), is_complex))
     }
@@ -81,15 +81,24 @@ impl<'a> Archive<'a> {
         let mut found = vec![];
         for name in self.names.clone() {
             let wrong = |error: String| unreadable(self.path, format!("its '{}': {error}", short(&name)));
-            let entry = self.zip.by_name(&name).map_err(|error| wrong(error.to_string()))?;
+            let entry = self.zip.by_name(&name).map_err(|error| wrong(fault("archive", error, None)))?;
             let mut start = vec![];
-            entry.take(MOST_HEADER_BYTES).read_to_end(&mut start).map_err(|error| wrong(error.to_string()))?;
+            entry
+                .take(MOST_HEADER_BYTES)
+                .read_to_end(&mut start)
+                .map_err(|error| wrong(fault("archive", error, None)))?;
             if name.ends_with(".npy") && rank_of_waves(bare(&name)).is_none() && is_array_of(&start, &is_wanted) {
                 found.push(name);
             }
         }
         Ok(found)
     }
+}
+
+/// Returns what is wrong with an archive.
+fn of_zip(error: &ZipError) -> String {
+    let is_variant = matches!(error, ZipError::UnsupportedArchive(_) | ZipError::CompressionMethodNotSupported(_));
+    fault("archive", error, is_variant.then_some("one of numpy.savez or savez_compressed"))
 }
 
 fn bare(name: &str) -> &str {
@@ -108,6 +117,9 @@ pub(super) fn read_npz(path: &Path, options: &ReadOptions) -> Result<Cube, Scene
         Some(told) => archive.named(told)?,
         None => match &archive.of_sides(|sides| sides.len() == 3)?[..] {
             [one] => one.clone(),
+            [] if archive.names.is_empty() => {
+                return Err(wrong("it is empty, expected an array of three axes".to_owned()));
+            }
             [] => {
                 let reason =
                     format!("it has no array of three axes, but {}: expected a cube", shown(archive.names.iter()));
@@ -123,7 +135,7 @@ pub(super) fn read_npz(path: &Path, options: &ReadOptions) -> Result<Cube, Scene
         Some(name) => {
             // Singles of decimals, as they were written.
             let numbers = archive.read(name)?.values.into_iter().map(|v| v.to_string().parse().unwrap_or(f64::NAN));
-            let unit = bare(name).ends_with("_nm").then_some("nm");
+            let unit = unit_in(bare(name));
             match listed_nm(bare(name), unit, &numbers.collect::<Vec<f64>>()) {
                 Err(_) if reading.wavelengths_nm.is_some() => None,
                 own => own.map_err(wrong)?,

@@ -6,7 +6,7 @@ use ndarray::Array2;
 
 use super::{
     stated::{Noted, name_of},
-    unusable::{check_memory, unreadable},
+    unusable::{TRUNCATED, check_memory, unreadable},
 };
 use crate::SceneError;
 
@@ -54,7 +54,7 @@ fn parse(bytes: &[u8]) -> Result<(Vec<Array2<f32>>, Vec<String>), String> {
         data = &data[1..];
     }
     if data.len() / 4 / n_channels / columns < rows {
-        return Err("the file ends too early (truncated)".to_owned());
+        return Err(TRUNCATED.to_owned());
     }
     let is_little = scale < 0.0;
     let plane = |channel: usize| {

@@ -15,7 +15,7 @@ use super::{
     spectral_exr::{NamedPlanes, notes_on_planes_exr, read_planes_and_primaries_exr},
     stated::{Noted, name_of, note_of},
     tiff_file::{float_planes, is_tiff, notes_on_pages},
-    unusable::{check_made, said, unreadable},
+    unusable::{check_made, fault, unreadable},
 };
 use crate::SceneError;
 
@@ -362,8 +362,8 @@ pub(super) fn pnm_top(path: &Path) -> Option<u32> {
 }
 
 fn undecodable(path: &Path, error: &ImageError) -> SceneError {
-    let said = said(error);
-    let is_cut = |error: &std::io::Error| error.kind() == std::io::ErrorKind::UnexpectedEof;
+    let said = error.to_string();
+    let ending = path.extension().map(|own| own.to_string_lossy().to_uppercase()).unwrap_or_default();
     let is_decoding = matches!(error, ImageError::Decoding(_));
     let reason = match error {
         ImageError::Decoding(_) if said.contains("critical chunk") => {
@@ -374,18 +374,24 @@ fn undecodable(path: &Path, error: &ImageError) -> SceneError {
         }
         _ if is_decoding && is_of(path, &["hdr"]) => match first_line(path) {
             Some(line) if line.starts_with("#?RADIANCE") => {
-                format!("it is broken, or of another format than its name says ({said})")
+                fault("Radiance picture", error, None)
             }
             line => format!(
                 "its first line is '{}', expected '#?RADIANCE' of a Radiance picture, or 'ENVI' of the header of a cube",
                 super::stated::short(&line.unwrap_or_default())
             ),
         },
-        ImageError::IoError(error) if is_cut(error) => format!("it ends before all of its samples ({said})"),
-        ImageError::Decoding(_) if said.contains("failed to fill whole buffer") => {
-            format!("it ends before all of its samples ({said})")
+        ImageError::IoError(error) if error.kind() == std::io::ErrorKind::UnexpectedEof => {
+            fault(&ending, "unexpected EOF", None)
         }
-        ImageError::Decoding(_) => format!("it is broken, or of another format than its name says ({said})"),
+        ImageError::Decoding(_) => fault(&ending, error, None),
+        ImageError::Unsupported(_) if said.contains("Orientation ") => format!(
+            "its rows and columns are in the order {}, expected -Y +X (save it anew)",
+            said.split("Orientation ").nth(1).unwrap_or_default()
+        ),
+        ImageError::Unsupported(_) if said.contains("xyze") => {
+            "its colors are X, Y and Z, expected red, green and blue (ra_xyze -r)".to_owned()
+        }
         ImageError::Unsupported(_) if said.contains("color type `Unknown") => {
             "its samples are of other bits or channels than those of pictures: expected gray, or red, green and blue with or without \
              opacity, of 8 or 16 bits, or bands of a TIFF, which --scene-wavelengths-nm tells"

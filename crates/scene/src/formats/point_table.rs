@@ -2,6 +2,7 @@
 
 use std::{collections::BTreeMap, path::Path};
 
+use dioptric_files::text;
 use dioptric_spectrum::{Illuminant, Observer, WavelengthGrid};
 
 use super::stated::short;
@@ -60,23 +61,20 @@ impl PointTable {
     /// Names the line and the column that cannot be read.
     pub fn read(path: &Path) -> Result<Self, SceneError> {
         let unreadable = |reason: String| SceneError::Unreadable { file: path.to_owned(), reason };
-        let bytes = std::fs::read(path).map_err(|error| unreadable(error.to_string()))?;
-        let text = String::from_utf8(bytes).map_err(|_| {
-            unreadable("it is no text in UTF-8, expected a table with commas between columns".to_owned())
-        })?;
-        Self::parse(&text).map_err(|reason| SceneError::Unreadable { file: path.to_owned(), reason })
+        let text = text::read(path).map_err(|error| unreadable(error.to_string()))?;
+        Self::parse(&text::with_commas(&text))
+            .map_err(|reason| SceneError::Unreadable { file: path.to_owned(), reason })
     }
 
     fn parse(text: &str) -> Result<Self, String> {
-        let text = text.strip_prefix('\u{feff}').unwrap_or(text);
-        let mut reader =
-            csv::ReaderBuilder::new().comment(Some(b'#')).trim(csv::Trim::All).from_reader(text.as_bytes());
+        let mut reader = csv::ReaderBuilder::new()
+            .flexible(true)
+            .comment(Some(b'#'))
+            .trim(csv::Trim::All)
+            .from_reader(text.as_bytes());
         let mut columns = BTreeMap::new();
         for (number, name) in reader.headers().map_err(|error| error.to_string())?.iter().enumerate() {
             let name = name.trim_matches(['"', ' ']).to_ascii_lowercase();
-            if name.contains([';', '\t']) {
-                return Err("line 1: expected commas between columns".to_owned());
-            }
             let is_known = PLACES.as_flattened().iter().chain(&AMOUNTS).chain(&OTHERS).any(|known| *known == name);
             if !is_known {
                 let known = [PLACES.as_flattened(), &AMOUNTS, &OTHERS].concat().join(", ");
@@ -102,6 +100,9 @@ impl PointTable {
         for record in reader.records() {
             let record = record.map_err(|error| error.to_string())?;
             let line = record.position().map_or(0, csv::Position::line);
+            if record.len() != columns.len() {
+                return Err(format!("line {line}: {} columns, expected {}", record.len(), columns.len()));
+            }
             let cell =
                 |name: &str| columns.get(name).and_then(|&number| record.get(number)).filter(|text| !text.is_empty());
             let number = |name: &str| {
@@ -309,9 +310,9 @@ mod tests {
             ("x_deg,y_deg,lux,light\n0,0,1,950nm\n", "no eye sees"),
             ("x_deg,y_deg,lux,light\n0,0,1,D99\n", "line 2: light is 'D99'"),
             ("x_deg,y_deg,lux\n", "no point"),
-            ("x_deg;y_deg;lux\n1;2;3\n", "commas"),
             ("x_deg,y_deg,lux\n0,0,inf\n", "line 2: lux is inf"),
-            ("x_deg,y_deg,lux\n1,2\n", "fields"),
+            ("x_deg,y_deg,lux\n1,2\n", "line 2: 2 columns, expected 3"),
+            ("x_deg,y_deg,lux\n1,2,3,4\n", "line 2: 4 columns, expected 3"),
         ] {
             let found = PointTable::parse(text).unwrap_err();
             assert!(found.contains(words), "{text}: {found}");

@@ -26,12 +26,12 @@ use super::{
     radiance_header::RadianceHeader,
     raw_depth::{DepthWords, RawDepth},
     read_options::ReadOptions,
-    reading::{DepthKind, FileQuantity, FileReading, light_unit},
+    reading::{DepthKind, FileQuantity, FileReading, Panorama, light_unit},
     reduced::reduced_size,
     spectral_exr::{AskedChannels, RawFile, RawHidden, RawImage, read_raw_exr},
     stated::{name_of, note_of},
     tiff_file::{RAW, TiffAs, TiffFile, TiffStack, has_depth_map, is_tiff, read_tiff},
-    unusable::{starts_with, unreadable},
+    unusable::{check_whole, starts_with, unreadable},
 };
 use crate::{SceneError, View};
 
@@ -50,11 +50,16 @@ pub(super) fn contents_of(path: &Path, options: &ReadOptions) -> Result<Contents
                 format!("it has some faces of a cube, but of its six faces {} are missing", missing.join(", "));
             return Err(unreadable(path, reason));
         }
+        if matches!(options.reading.panorama, Some(Panorama::Cube { .. })) {
+            let reason = "it has no six faces of a cube: expected faces called right, left, up, down, front and back, or px, nx, py, ny, pz and nz";
+            return Err(unreadable(path, reason));
+        }
         return band_folder(path, options)?.into_contents(path, options);
     }
     if !path.exists() {
         return Err(unreadable(path, "there is no such file"));
     }
+    check_whole(path)?;
     let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
     match extension.as_str() {
         "exr" => of_exr(path, options),

@@ -79,6 +79,8 @@ fn a_name_that_tells_nothing_is_refused() {
     let message = |path: &Path| read_scene(path, &ReadOptions::default()).unwrap_err().to_string();
     assert!(message(&path).contains("scene.xyz: cannot be read: there is no such file"));
     std::fs::write(&path, "").unwrap();
+    assert!(message(&path).contains("it is empty"));
+    std::fs::write(&path, "a").unwrap();
     assert!(message(&path).contains("expected a .exr"));
     assert!(message(&folder.path().join("absent.exr")).contains("absent.exr"));
 }

@@ -277,7 +277,7 @@ impl DepthKind {
     pub fn check(self) -> Result<(), SceneError> {
         match self {
             Self::InverseBetween { near_m, far_m } if !(near_m > 0.0 && near_m.is_finite() && far_m > near_m) => {
-                Err(setting("the anchors of the depth", &format!("{near_m} m and {far_m} m"), "0 < near < far"))
+                Err(setting("the pair of anchors of the depth", &format!("{near_m} m and {far_m} m"), "0 < near < far"))
             }
             Self::Disparity { baseline_m, offset_px } => {
                 positive("the baseline of the disparity", baseline_m)?;

@@ -516,7 +516,7 @@ fn frames_of_nerfstudio_name_their_depth() {
     let scene = read("", r#""file_path": "images/lobby.png""#).unwrap();
     check_named(&scene, "none of the file_path of its frames is room.png");
     for (frame, words) in
-        [(with("absent.png"), "absent.png', which is no file"), (r#""fl_x": 1"#.to_owned(), "none of their file_path")]
+        [(with("absent.png"), "absent.png', which is no file"), (r#""fl_x": 1"#.to_owned(), "none of the file_path")]
     {
         let message = read("", &frame).unwrap_err().to_string();
         assert!(message.contains(words), "{message}");

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use dioptric_files::text;
 use ndarray::Array2;
 
 use super::{
@@ -21,7 +22,8 @@ pub(super) fn read_text_depth(path: &Path) -> Result<Noted<Array2<f32>>, SceneEr
     let length = std::fs::metadata(path).map_err(|error| unreadable(path, error))?.len();
     // A number takes two characters at least.
     check_memory(path, length.saturating_mul(4), length)?;
-    let text = std::fs::read_to_string(path).map_err(|error| unreadable(path, error))?;
+    let text = text::read(path).map_err(|error| unreadable(path, error))?;
+    let text = text::with_commas(&text);
     let (table, words) = parse(&text).map_err(|reason| unreadable(path, reason))?;
     let shown: Vec<String> = words.iter().take(MOST_LINES).map(|line| format!("'{}'", short(line))).collect();
     let note = (!words.is_empty())
@@ -32,7 +34,7 @@ pub(super) fn read_text_depth(path: &Path) -> Result<Noted<Array2<f32>>, SceneEr
 /// Returns the table of a text, and its lines of words.
 fn parse(text: &str) -> Result<(Array2<f32>, Vec<&str>), String> {
     let (mut values, mut words, mut columns, mut rows) = (vec![], vec![], 0, 0);
-    for (index, line) in text.trim_start_matches('\u{feff}').lines().map(str::trim).enumerate() {
+    for (index, line) in text.lines().map(str::trim).enumerate() {
         if line.is_empty() {
             continue;
         }
@@ -71,7 +73,7 @@ mod tests {
     #[test]
     fn tables_of_text_are_read() {
         let expected = ndarray::arr2(&[[1.5, 2.0], [3.0, f32::INFINITY]]);
-        for text in ["1.5 2\n3 inf\n", "\u{feff}1.5,2\r\n3,inf", "  1.5\t 2e0 \n\n 3 ; inf"] {
+        for text in ["1.5 2\n3 inf\n", "1.5,2\r\n3,inf", "  1.5\t 2e0 \n\n 3 ; inf"] {
             assert_eq!(parse(text).unwrap(), (expected.clone(), vec![]), "{text}");
         }
         assert_eq!(parse("# depths, mm\n1 2\n").unwrap().1, ["depths, mm"]);

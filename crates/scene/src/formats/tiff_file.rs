@@ -18,7 +18,7 @@ use super::{
     tiff_bands::{AsGray, planes_of},
     tiff_directory::{BELOW, Directory},
     tiff_page::{Marked, Page, PageWords, SampleDepth, StatedBands},
-    unusable::{check_memory, said, unreadable},
+    unusable::{check_memory, fault, unreadable},
 };
 use crate::SceneError;
 
@@ -38,7 +38,6 @@ pub(super) const RAW: &str = "it is a raw photograph, which is no scene: `dioptr
 
 /// Returns what is wrong with a file that what decodes it does not take.
 fn broken(path: &Path, error: &TiffError) -> SceneError {
-    let said = said(error);
     let is_unknown = matches!(error, TiffError::UnsupportedError(TiffUnsupportedError::UnknownInterpretation));
     if let Some(what) = Some(path).filter(|_| is_unknown).and_then(unknown_mark) {
         return unreadable(path, what);
@@ -51,10 +50,20 @@ fn broken(path: &Path, error: &TiffError) -> SceneError {
                  `dioptric develop` makes a picture of a raw photograph"
                     .to_owned()
             }
-            TiffError::UnsupportedError(_) => {
-                format!("it is of a kind that is not read ({said}): expected it without compression, or with LZW or Deflate")
+            TiffError::UnsupportedError(TiffUnsupportedError::UnsupportedSampleFormat(formats)) => {
+                let kinds = formats.iter().map(|own| match own.to_u16() {
+                    4 => "of no stated kind",
+                    5 => "complex whole numbers",
+                    6 => "complex numbers",
+                    _ => "of a kind that is not known",
+                });
+                let kinds = kinds.collect::<std::collections::BTreeSet<_>>().into_iter().collect::<Vec<_>>().join(" and ");
+                format!("its samples are {kinds} (SampleFormat): expected whole numbers or floats")
             }
-            _ => said,
+            TiffError::UnsupportedError(_) => {
+                fault("TIFF", error, Some("whole numbers or floats of one kind without compression, or with LZW or Deflate"))
+            }
+            _ => fault("TIFF", error, None),
         },
     )
 }

@@ -56,25 +56,56 @@ pub(super) fn are_counted(numbers: &[f64]) -> bool {
 /// # Errors
 /// When its unit is not known, or its numbers are no likely wavelengths.
 pub(super) fn listed_nm(name: &str, unit: Option<&str>, numbers: &[f64]) -> Result<Option<Vec<f64>>, String> {
-    const EXPECTED: &str = "or --scene-wavelengths-nm";
+    list_of(name, unit, numbers, ", or --scene-wavelengths-nm")
+}
+
+fn list_of(name: &str, unit: Option<&str>, numbers: &[f64], or: &str) -> Result<Option<Vec<f64>>, String> {
     let Some(unit) = unit else {
         if are_counted(numbers) {
             return Ok(None);
         }
         let reason = || {
+            let is_odd = |number: &&f64| !(0.15..20_000.0).contains(*number);
+            if let Some(odd) = numbers.iter().find(is_odd).filter(|_| !numbers.iter().all(|number| is_odd(&number))) {
+                return format!(
+                    "its '{}' holds {}, which is no wavelength of light: expected nm{or}",
+                    short(name),
+                    shown(*odd)
+                );
+            }
             let shown = numbers.iter().take(3).map(|number| shown(*number)).collect::<Vec<_>>().join(", ");
-            format!("its '{}' ({shown}, …) has no unit and is no likely nm or µm: expected nm, {EXPECTED}", short(name))
+            format!("its '{}' ({shown}, …) has no unit and is no likely nm or µm: expected nm{or}", short(name))
         };
         return without_unit(numbers).map(Some).ok_or_else(reason);
     };
     let own = in_nm(unit, numbers)
-        .ok_or_else(|| format!("its '{}' are in '{}': expected {UNITS}, {EXPECTED}", short(name), short(unit)))?;
+        .ok_or_else(|| format!("its '{}' are in '{}': expected {UNITS}{or}", short(name), short(unit)))?;
     match own.iter().zip(numbers).find(|(nm, _)| !PLAUSIBLE_NM.contains(*nm)) {
         Some((_, number)) => {
             Err(format!("{} of its '{}' in {} is no wavelength of light", shown(*number), short(name), short(unit)))
         }
         None => Ok(Some(own)),
     }
+}
+
+/// Returns the unit of wavelengths, wavenumbers, frequencies or energies that a name is or has among its words, as `wavelength_um`.
+pub(super) fn unit_in(name: &str) -> Option<&str> {
+    // Single letters are in too many names.
+    let is_unit = |word: &&str| (word.chars().count() > 1 || *word == "Å") && in_nm(word, &[]).is_some();
+    Some(name.trim()).filter(is_unit).or_else(|| name.rsplit(['/', '_', ' ', '-', ',', '\t']).find(is_unit))
+}
+
+/// Returns the wavelengths, nm, of the column of a table, as the unit in its name says (`wavelength_nm`, `Wavelength (µm)`, `cm^-1`) or, where
+/// there is none, its numbers.
+///
+/// # Errors
+/// When its unit is not known, or its numbers are no likely wavelengths.
+pub fn wavelengths_of_column(name: &str, numbers: &[f64]) -> Result<Vec<f64>, String> {
+    let bracketed = name.rsplit_once(['(', '[']).map(|(_, rest)| rest.trim_end_matches([')', ']', ' ']));
+    let unit = bracketed.or_else(|| unit_in(name));
+    let name = if name.is_empty() { "first column" } else { name };
+    let counted = || format!("its '{}' counts bands: expected wavelengths in nm", short(name));
+    list_of(name, unit, numbers, "")?.ok_or_else(counted)
 }
 
 /// Returns these bands of a file, counted from 0, by ascending wavelength.
@@ -140,6 +171,27 @@ mod tests {
         {
             assert!(of(unit, &numbers).unwrap_err().contains("'waves'"), "{unit:?}");
         }
+    }
+
+    #[test]
+    fn columns_state_their_unit_in_their_name() {
+        for (name, number) in [
+            ("wavelength_nm", 500.0),
+            ("Wavelength (nm)", 500.0),
+            ("λ [µm]", 0.5),
+            ("Wavelength/nm", 500.0),
+            ("cm^-1", 20_000.0),
+            ("wavenumber (1/cm)", 20_000.0),
+            ("Wavelength Å", 5000.0),
+            ("Wavelength angstrom", 5000.0),
+            ("wavelength", 0.5),
+            ("", 500.0),
+        ] {
+            let nm = wavelengths_of_column(name, &[number]).map(|nm| nm[0].round());
+            assert_eq!(nm, Ok(500.0), "{name}");
+        }
+        assert!(wavelengths_of_column("waves (zorp)", &[500.0]).unwrap_err().contains("'zorp'"));
+        assert!(wavelengths_of_column("band", &[1.0, 2.0]).unwrap_err().contains("counts bands"));
     }
 
     #[test]

@@ -93,7 +93,7 @@ pub(super) fn read(path: &Path, unit: f64) -> Result<WorldBuilder, WorldError> {
 
 impl Contents {
     fn read(path: &Path) -> Result<Self, WorldError> {
-        let text = text_of(&read_bytes(path, MAX_BYTES)?);
+        let text = dioptric_files::text::of_bytes(&read_bytes(path, MAX_BYTES)?);
         let mut contents = Self::default();
         let (mut object, mut material) = (String::new(), None);
         let mut corners = Vec::new();
@@ -242,25 +242,6 @@ impl Part {
     }
 }
 
-/// Returns a text of UTF-8 or UTF-16, or of Latin-1 where it is neither.
-fn text_of(bytes: &[u8]) -> String {
-    let wide = |pairs: &[u8], read: fn([u8; 2]) -> u16| {
-        let units = pairs.chunks_exact(2).map(|pair| read([pair[0], pair[1]]));
-        char::decode_utf16(units).map(|c| c.unwrap_or(char::REPLACEMENT_CHARACTER)).collect()
-    };
-    match bytes {
-        [0xff, 0xfe, rest @ ..] => wide(rest, u16::from_le_bytes),
-        [0xfe, 0xff, rest @ ..] => wide(rest, u16::from_be_bytes),
-        _ => {
-            let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
-            match std::str::from_utf8(bytes) {
-                Ok(text) => text.to_owned(),
-                Err(_) => bytes.iter().map(|&byte| char::from(byte)).collect(),
-            }
-        }
-    }
-}
-
 /// Returns the lines with their numbers, those that end in a backslash with what follows.
 fn lines(text: &str) -> impl Iterator<Item = (usize, std::borrow::Cow<'_, str>)> {
     let mut rest = text.lines().enumerate();
@@ -327,7 +308,7 @@ impl Library {
                 self.builder.note_of("libraries of materials that aren't there, gray in their place", name);
                 continue;
             }
-            let text = text_of(&read_bytes(&path, MAX_BYTES)?);
+            let text = dioptric_files::text::of_bytes(&read_bytes(&path, MAX_BYTES)?);
             let folder = path.parent().unwrap_or(Path::new("")).to_owned();
             let mut words: Option<Words> = None;
             for (_, line) in lines(&text) {

@@ -8,7 +8,7 @@ use std::{fs::File, io::Read, path::Path};
 use flate2::read::ZlibDecoder;
 
 use super::{
-    super::unusable::{check_memory, unreadable},
+    super::unusable::{TRUNCATED, check_memory, unreadable},
     elements::{self, LIMIT_ARRAYS, LIMIT_DEPTH, Listed},
     hdf5::Hdf5,
     packing::Attribute,
@@ -117,7 +117,9 @@ impl MatFile {
         let is_big_endian = match bytes.get(126..128) {
             Some(b"IM") => false,
             Some(b"MI") => true,
-            _ => return Err("it is no MATLAB file of version 5 to 7.3".to_owned()),
+            _ => {
+                return Err("it is neither HDF5 nor a MATLAB file of version 5 to 7.3: expected one of them".to_owned());
+            }
         };
         let mut rest = Elements { bytes: &bytes[128..], is_big_endian };
         let (mut variables, mut listed): (Vec<(String, Vec<u8>)>, _) = (Vec::new(), Vec::new());
@@ -148,15 +150,34 @@ impl MatFile {
         self.words.iter().find(|(own, ..)| own == name).map_or(("", &[]), |(_, words, axes)| (words, axes))
     }
 
-    /// Returns a variable, or `None` where the file has none of this name.
+    /// Returns a variable, or a field of a structure as `data.cube`; `None` where the file has none of this name.
     pub(super) fn array(&self, name: &str) -> Result<Option<MatArray<'_>>, String> {
-        let Some((_, content)) = self.variables.iter().find(|(own, _)| own == name) else { return Ok(None) };
+        let Some((_, content)) = self.variables.iter().find(|(own, _)| own == name) else {
+            let Some((outer, field)) = name.rsplit_once('.') else { return Ok(None) };
+            return Ok(self.array(outer)?.and_then(|array| array.into_field(field)));
+        };
         let mut n_left = LIMIT_ARRAYS;
         array_of(content, self.is_big_endian, LIMIT_DEPTH, &mut n_left).map(Some)
     }
 }
 
 impl<'a> MatArray<'a> {
+    fn into_field(self, name: &str) -> Option<Self> {
+        let Content::Fields(fields) = self.content else { return None };
+        fields.into_iter().find(|(own, _)| own == name).map(|(_, array)| array)
+    }
+
+    /// Returns the names of the arrays of numbers in it, as `data.cube`, and the lengths of their sides.
+    pub(super) fn numeric_fields(&self, name: &str) -> Vec<(String, Vec<usize>)> {
+        match &self.content {
+            Content::Numbers(_) => vec![(name.to_owned(), self.sides.clone())],
+            Content::Fields(fields) => {
+                fields.iter().flat_map(|(own, array)| array.numeric_fields(&format!("{name}.{own}"))).collect()
+            }
+            Content::Other(_) => vec![],
+        }
+    }
+
     /// Returns a field of a structure that is there and not empty.
     pub(super) fn field(&self, name: &str) -> Option<&Self> {
         match &self.content {
@@ -262,8 +283,6 @@ struct Elements<'a> {
     bytes: &'a [u8],
     is_big_endian: bool,
 }
-
-const TRUNCATED: &str = "the file ends too early (truncated)";
 
 impl<'a> Elements<'a> {
     fn word(&self, at: usize) -> Option<u32> {

@@ -10,7 +10,7 @@ use exr::prelude::f16;
 use hdf5_pure::{AttrValue, DType, Dataset, Datatype, DatatypeByteOrder, File, FloatingPointLayout, Group};
 
 use super::{
-    super::unusable::said,
+    super::unusable::fault,
     dimensions::Dimensions,
     elements::{self, LIMIT_ARRAYS, LIMIT_DEPTH, Listed},
     links::take_links,
@@ -340,18 +340,23 @@ fn numbers_of(dataset: &Dataset) -> Result<Vec<u8>, String> {
     }
 }
 
+/// Filters of HDF5 that are not read, by their numbers.
+const FILTERS: [(u32, &str); 6] =
+    [(4, "SZIP"), (307, "bzip2"), (32_001, "Blosc"), (32_004, "LZ4"), (32_008, "bitshuffle"), (32_015, "Zstandard")];
+
 fn broken(error: hdf5_pure::Error) -> String {
-    let said = said(error);
-    let way = if said.contains("unexpected EOF") {
-        "expected all of it, for it ends too early"
-    } else if said.contains("virtual") || said.contains("external files") {
-        "expected its numbers in the file itself (h5repack --layout=CONTI)"
+    let said = error.to_string();
+    let expected = if said.contains("virtual") || said.contains("external files") {
+        Some("its numbers in the file itself (h5repack --layout=CONTI)")
     } else if said.contains("unsupported filter") {
-        "expected none or gzip (h5repack -f GZIP=4)"
+        Some("none of its filters, or gzip (h5repack -f GZIP=4)")
+    } else if said.contains("unsupported") {
+        Some("one that older programs read as well (h5repack --high=V18)")
     } else {
-        "expected one that older programs read as well (h5repack --high=V18)"
+        None
     };
-    format!("it is HDF5 that cannot be read ({said}): {way}")
+    let known = FILTERS.iter().find(|(number, _)| said.ends_with(&format!("unsupported filter: {number}")));
+    fault("HDF5", known.map_or(said.clone(), |(_, name)| format!("its numbers are packed by {name}")), expected)
 }
 
 fn too_many() -> String {

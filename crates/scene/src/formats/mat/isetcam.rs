@@ -17,12 +17,12 @@ use super::{
         reading::{FileQuantity, FileReading},
         stated::{name_of, note_of},
         unusable::unreadable,
-        wavelength_unit::{self, listed_nm},
+        wavelength_unit::{self, listed_nm, unit_in},
     },
     container::{Content, MatArray, MatFile, WHOLE},
     elements::Listed,
     iset_kinds,
-    packing::{Packing, rank_of_waves},
+    packing::{Packing, is_wave_unit, rank_of_waves},
 };
 use crate::{SceneError, SceneLight};
 
@@ -98,7 +98,9 @@ pub(in super::super) fn read_mat(path: &Path, reading: &FileReading) -> Result<M
         let name = own.name.as_str();
         match told {
             // Others may be of a kind that cannot be read.
-            Some(told) => told == name || is_list(own),
+            Some(told) => {
+                told == name || told.strip_prefix(name).is_some_and(|rest| rest.starts_with('.')) || is_list(own)
+            }
             None => WANTED.contains(&name) || name == "dist" || is_cube(own) || is_list(own),
         }
     };
@@ -135,11 +137,13 @@ pub(in super::super) fn read_mat(path: &Path, reading: &FileReading) -> Result<M
         cubes.retain(|own| !last_part(own).eq_ignore_ascii_case("rgb"));
     }
     let name = match told {
-        Some(told) if has(told) => told,
+        Some(told) if has(told) || file.array(told).map_err(wrong)?.is_some() => told,
         Some(told) => {
-            return Err(wrong(format!("it has no variable '{told}', expected one of {}", names.join(", "))));
+            let known = in_structures(path)?.into_iter().map(|(own, _)| own);
+            let known: Vec<_> = names.iter().map(|own| (*own).to_owned()).chain(known).collect();
+            return Err(wrong(format!("it has no variable '{told}', expected one of {}", known.join(", "))));
         }
-        None if has("data") => "data",
+        None if file.array("data").map_err(wrong)?.is_some_and(|data| data.numbers().is_ok()) => "data",
         None => match cubes[..] {
             [one] => one,
             [] if file.listed.iter().any(|own| own.is_complex) => {
@@ -151,7 +155,12 @@ pub(in super::super) fn read_mat(path: &Path, reading: &FileReading) -> Result<M
                 let names = others.map(|own| format!(", and its '{}' has no numbers that are read", own.name));
                 let expected =
                     "expected a variable 'scene', 'mcCOEF' or 'photons', or an array of three axes outside structures";
-                return Err(wrong(format!("it holds no scene: {expected}{}", names.collect::<String>())));
+                let names = names.collect::<String>();
+                let inner = in_structures(path)?.into_iter().filter(|(_, sides)| sides.len() == 3);
+                let inner: Vec<_> = inner.map(|(own, _)| own).collect();
+                let way =
+                    if inner.is_empty() { String::new() } else { format!(", or --variable {}", inner.join(" or ")) };
+                return Err(wrong(format!("it holds no scene: {expected}{names}{way}")));
             }
             _ => return Err(wrong(format!("it has several cubes, {}: expected --variable", cubes.join(", ")))),
         },
@@ -164,6 +173,13 @@ pub(in super::super) fn read_mat(path: &Path, reading: &FileReading) -> Result<M
         return Ok(MatScene::Linear([plane(), plane(), plane()], cube.notes));
     }
     Ok(MatScene::Cube(cube))
+}
+
+/// Returns the arrays of numbers in the structures of a file, as `data.cube`, and the lengths of their sides.
+fn in_structures(path: &Path) -> Result<Vec<(String, Vec<usize>)>, SceneError> {
+    let file = MatFile::read(path, &|own| !own.is_numeric)?;
+    let arrays = file.listed.iter().filter(|own| !own.is_numeric).map(|own| (own, file.array(&own.name)));
+    Ok(arrays.filter_map(|(own, array)| Some(array.ok()??.numeric_fields(&own.name))).flatten().collect())
 }
 
 /// Returns the name of an array without the groups that it is in.
@@ -181,7 +197,11 @@ fn cube_of(path: &Path, file: &MatFile, name: &str, reading: &FileReading) -> Re
     if file.listed.iter().any(|own| own.name == name && own.is_complex) {
         return Err(complex(name));
     }
-    let numbers = array.numbers().map_err(|what| format!("its '{name}' is {what}, expected numbers"))?;
+    let numbers = array.numbers().map_err(|what| {
+        let inner = array.numeric_fields(name).into_iter().map(|(own, _)| own).collect::<Vec<_>>();
+        let way = if inner.is_empty() { String::new() } else { format!(": --variable {}", inner.join(" or ")) };
+        format!("its '{name}' is {what}, expected numbers{way}")
+    })?;
     let packing = Packing::of(file.attributes_of(name));
     let waves = waves_of(file, name, &array.sides, reading.wavelengths_nm.is_some())?;
     // What is known by name gives way to what is told.
@@ -192,8 +212,12 @@ fn cube_of(path: &Path, file: &MatFile, name: &str, reading: &FileReading) -> Re
         .map(|(_, n, [first, last])| {
             (0..*n).map(|i| first + (last - first) * i as f64 / (*n as f64 - 1.0)).collect::<Vec<f64>>()
         });
-    let stated = packing.wavelengths_nm(&array.sides).filter(|_| waves.is_none());
-    let own = waves.as_ref().map(|(_, list)| list.clone()).or(stated.clone()).or(known);
+    let stated = match packing.wavelengths_nm(&array.sides) {
+        Ok(stated) => stated.filter(|_| waves.is_none()),
+        Err(_) if reading.wavelengths_nm.is_some() || waves.is_some() => None,
+        Err(reason) => return Err(reason),
+    };
+    let own = waves.as_ref().map(|waves| waves.nm.clone()).or(stated.clone()).or(known);
     let n_bands = reading.wavelengths_nm.as_ref().or(own.as_ref()).map(Vec::len);
     let unit = UnitOf::read(packing.unit.as_deref());
     let percent = if matches!(unit, UnitOf::Percent) { 0.01 } else { 1.0 };
@@ -202,14 +226,21 @@ fn cube_of(path: &Path, file: &MatFile, name: &str, reading: &FileReading) -> Re
         (percent * packing.unpacked(numbers.at(index))) as f32
     })?;
     let is_depth = |own: &str| reading.depth.is_none() && reading.depth_variable.as_deref() == Some(own);
-    let used = |own: &str| own == name || is_depth(own) || waves.as_ref().is_some_and(|(list, _)| list == own);
-    let unused: Vec<String> = file.listed.iter().map(|own| own.name.clone()).filter(|own| !used(own)).collect();
+    let holds = |own: &str| name.strip_prefix(own).is_some_and(|rest| rest.starts_with('.'));
+    let used =
+        |own: &str| own == name || holds(own) || is_depth(own) || waves.as_ref().is_some_and(|waves| waves.name == own);
+    let mut unused: Vec<String> = file.listed.iter().map(|own| own.name.clone()).filter(|own| !used(own)).collect();
+    for outer in file.listed.iter().filter(|own| holds(&own.name)) {
+        let fields = file.array(&outer.name)?.map(|array| array.numeric_fields(&outer.name)).unwrap_or_default();
+        unused.extend(fields.into_iter().map(|(own, _)| own).filter(|own| own != name && !used(own)));
+    }
     let mut notes: Vec<String> = note_of(path, "variable", &unused).into_iter().collect();
     let file_name = name_of(path);
     let ambiguous = axes::note(&array.sides, order.as_deref(), n_bands);
     notes.extend(named.into_iter().chain(ambiguous).map(|note| format!("{file_name}: '{name}': {note}")));
     let of_file = file.attributes_of(WHOLE).iter().map(|own| own.name.clone());
-    let left = packing.left(!matches!(unit, UnitOf::Unknown), stated.is_some());
+    let mut left = packing.left(!matches!(unit, UnitOf::Unknown), stated.is_some());
+    left.extend(waves.iter().flat_map(|waves| waves.left.iter().map(|name| format!("{name} of {}", waves.name))));
     notes.extend(note_of(path, "attribute", &of_file.chain(left).collect::<Vec<_>>()));
     let mut quantity = matches!(unit, UnitOf::Percent | UnitOf::Reflectance).then_some(FileQuantity::Reflectance);
     let is_integer = numbers.is_integer && !packing.is_packed();
@@ -252,19 +283,38 @@ impl UnitOf {
     }
 }
 
-/// Returns the name of the list of wavelengths beside a cube of these sides, and the list, nm; none where wavelengths are told and the list is no
-/// likely one.
-fn waves_of(file: &MatFile, cube: &str, sides: &[usize], is_told: bool) -> Result<Option<(String, Vec<f64>)>, String> {
-    let rank = |own: &&Listed| rank_of_waves(last_part(&own.name));
-    let mut lists: Vec<&Listed> = file.listed.iter().filter(|own| own.name != cube && rank(own).is_some()).collect();
+/// A list of wavelengths beside a cube.
+struct Waves {
+    name: String,
+    nm: Vec<f64>,
+    /// The names of what is stated of it and not used.
+    left: Vec<String>,
+}
+
+/// Returns the list of wavelengths beside a cube of these sides; none where wavelengths are told and the list is no likely one.
+fn waves_of(file: &MatFile, cube: &str, sides: &[usize], is_told: bool) -> Result<Option<Waves>, String> {
+    // Those of the structure that the cube is in before all others.
+    let inner = match cube.rsplit_once('.') {
+        Some((outer, _)) => file.array(outer)?.map(|array| array.numeric_fields(outer)).unwrap_or_default(),
+        None => vec![],
+    };
+    let names = inner.iter().map(|(name, _)| name).chain(file.listed.iter().map(|own| &own.name));
+    let rank = |own: &&String| rank_of_waves(last_part(own).rsplit('.').next().unwrap_or_default());
+    let mut lists: Vec<&String> = names.filter(|own| *own != cube && rank(own).is_some()).collect();
     lists.sort_by_key(rank);
     for own in lists {
-        let numbers = file.array(&own.name)?.and_then(|array| array.list());
+        let numbers = file.array(own)?.and_then(|array| array.list());
         let Some(numbers) = numbers.filter(|list| sides.contains(&list.len())) else { continue };
-        let unit =
-            Packing::of(file.attributes_of(&own.name)).unit.or(own.name.ends_with("_nm").then(|| "nm".to_owned()));
-        return match listed_nm(&own.name, unit.as_deref(), &numbers) {
-            Ok(list) => Ok(list.map(|list| (own.name.clone(), list))),
+        let packing = Packing::of(file.attributes_of(own));
+        let numbers: Vec<f64> = numbers.into_iter().map(|number| packing.unpacked(number)).collect();
+        let stated = packing.unit.as_deref().or(packing.wave_unit());
+        let unit = stated.or_else(|| unit_in(last_part(own)));
+        return match listed_nm(own, unit, &numbers) {
+            Ok(list) => Ok(list.map(|nm| {
+                let mut left = packing.left(true, false);
+                left.retain(|name| packing.unit.is_some() || !is_wave_unit(name));
+                Waves { name: own.clone(), nm, left }
+            })),
             Err(_) if is_told => Ok(None),
             Err(reason) => Err(reason),
         };

@@ -1,12 +1,13 @@
 //! What the attributes of an array of HDF5 say of its numbers, by the conventions of netCDF ("Climate and Forecast", 8.1 and 2.5.1).
 
-use super::super::wavelength_unit::without_unit;
+use super::super::wavelength_unit::{listed_nm, unit_in};
 
 /// Names of the list of wavelengths beside a cube, the likelier first.
 const WAVES: [&str; 9] =
     ["wave", "wavelength", "wavelengths", "wavelengths_nm", "waves", "lambda", "bands", "wl", "wlens"];
 /// Words in the names of lists of other numbers of wavelengths.
-const NO_WAVES: [&str; 7] = ["width", "fwhm", "error", "uncert", "offset", "shift", "delta"];
+const NO_WAVES: [&str; 13] =
+    ["width", "fwhm", "error", "uncert", "offset", "shift", "delta", "good", "bad", "mask", "flag", "valid", "unit"];
 
 /// Returns how likely a name is that of a list of wavelengths, 0 the most; none of other names.
 pub(in super::super) fn rank_of_waves(name: &str) -> Option<usize> {
@@ -43,6 +44,12 @@ pub(super) struct Packing<'a> {
 const MISSING: [&str; 2] = ["_FillValue", "missing_value"];
 const UNITS: [&str; 2] = ["units", "unit"];
 
+/// Whether an attribute is called the unit of wavelengths.
+pub(super) fn is_wave_unit(name: &str) -> bool {
+    let lower = name.to_lowercase();
+    lower.contains("wave") && lower.contains("unit")
+}
+
 impl<'a> Packing<'a> {
     pub(super) fn of(attributes: &'a [Attribute]) -> Self {
         let value = |name: &str| attributes.iter().find(|own| own.name == name).map(|own| &own.value);
@@ -51,9 +58,11 @@ impl<'a> Packing<'a> {
             _ => vec![],
         };
         let number = |name: &str| Some(numbers(name)).filter(|list| list.len() == 1).map(|list| list[0]);
-        let text = |name: &&str| match value(name) {
-            Some(Value::Text(text)) => Some(text.trim().to_owned()),
-            _ => None,
+        let text = |name: &&str| {
+            attributes.iter().find_map(|own| match &own.value {
+                Value::Text(text) if own.name.eq_ignore_ascii_case(name) => Some(text.trim().to_owned()),
+                _ => None,
+            })
         };
         Self {
             attributes,
@@ -74,23 +83,41 @@ impl<'a> Packing<'a> {
         if self.missing.contains(&number) { f64::NAN } else { number * self.scale + self.offset }
     }
 
-    /// Returns the list of wavelengths of so many bands.
-    pub(super) fn wavelengths_nm(&self, n_bands: &[usize]) -> Option<Vec<f64>> {
+    /// Returns the attribute that lists wavelengths, its name first.
+    fn waves(&self) -> Option<(&'a str, &'a [f64])> {
+        let lists = self.attributes.iter().filter_map(|own| match &own.value {
+            Value::Numbers(list) if list.len() > 1 => Some((rank_of_waves(&own.name)?, own.name.as_str(), &list[..])),
+            _ => None,
+        });
+        lists.min_by_key(|(rank, ..)| *rank).map(|(_, name, list)| (name, list))
+    }
+
+    /// Returns the list of wavelengths of so many bands, nm.
+    ///
+    /// # Errors
+    /// As [`listed_nm`].
+    pub(super) fn wavelengths_nm(&self, n_bands: &[usize]) -> Result<Option<Vec<f64>>, String> {
+        let Some((name, list)) = self.waves().filter(|(_, list)| n_bands.contains(&list.len())) else {
+            return Ok(None);
+        };
+        listed_nm(name, self.wave_unit().or_else(|| unit_in(name)), list)
+    }
+
+    /// Returns the unit that an attribute states of a list of wavelengths.
+    pub(super) fn wave_unit(&self) -> Option<&'a str> {
         self.attributes.iter().find_map(|own| match &own.value {
-            Value::Numbers(list) if rank_of_waves(&own.name).is_some() && n_bands.contains(&list.len()) => {
-                without_unit(list)
-            }
+            Value::Text(text) if is_wave_unit(&own.name) => Some(text.trim()),
             _ => None,
         })
     }
 
-    /// Returns the names of attributes that are not used, where the unit and the wavelengths are, or not.
+    /// Returns the names of attributes that are not used, where the unit is, and the wavelengths with theirs are, or not.
     pub(super) fn left(&self, is_unit_used: bool, are_waves_used: bool) -> Vec<String> {
         let is_used = |own: &Attribute| match own.name.as_str() {
             "scale_factor" | "add_offset" => matches!(&own.value, Value::Numbers(list) if list.len() == 1),
             name if MISSING.contains(&name) => matches!(own.value, Value::Numbers(_)),
-            name if UNITS.contains(&name) => is_unit_used,
-            name => are_waves_used && rank_of_waves(name).is_some(),
+            name if UNITS.iter().any(|unit| name.eq_ignore_ascii_case(unit)) => is_unit_used,
+            name => are_waves_used && (is_wave_unit(name) || self.waves().is_some_and(|(waves, _)| waves == name)),
         };
         self.attributes.iter().filter(|own| !is_used(own)).map(|own| own.name.clone()).collect()
     }
@@ -120,6 +147,19 @@ mod tests {
         assert!((packing.unpacked(500.0) - 2.5).abs() < 1e-12 && packing.unpacked(-1.0).is_nan());
         assert_eq!((packing.left(true, false), packing.is_packed()), (vec!["valid_min".to_owned()], true));
         assert_eq!(packing.unit.as_deref().and_then(length_m), Some(1e-3));
+        // A list of its own names its unit; what says which bands are good is no list.
+        let attributes = [
+            of("good_wavelengths", Value::Numbers(vec![1.0, 1.0])),
+            of("wavelengths", Value::Numbers(vec![4500.0, 5500.0])),
+            of("wavelength_units", Value::Text("Angstroms".to_owned())),
+            of("Units", Value::Text("1".to_owned())),
+        ];
+        let packing = Packing::of(&attributes);
+        assert_eq!(packing.wavelengths_nm(&[2]), Ok(Some(vec![450.0, 550.0])));
+        assert_eq!(
+            (packing.left(true, true), packing.unit.as_deref()),
+            (vec!["good_wavelengths".to_owned()], Some("1"))
+        );
         assert!(!Packing::of(&[]).is_packed() && Packing::of(&[]).unpacked(3.0) == 3.0);
     }
 }

@@ -61,6 +61,13 @@ pub(in super::super) fn read_plane(path: &Path, told: Option<&str>) -> Result<No
         (None, _) if told.is_some() => {
             let names = file.listed.iter().map(|own| own.name.as_str()).collect::<Vec<_>>().join(", ");
             let told = told.unwrap_or_default();
+            if let Some(own) = file.listed.iter().find(|own| own.name == told && own.is_numeric) {
+                let sides = own.sides.iter().map(usize::to_string).collect::<Vec<_>>().join(" × ");
+                return Err(wrong(format!(
+                    "its '{told}' has {} axes ({sides}), expected rows and columns: save one picture's of them alone",
+                    own.sides.len()
+                )));
+            }
             return Err(wrong(format!("it has no array '{told}' of rows and columns, expected one of {names}")));
         }
         (None, [only]) => only,

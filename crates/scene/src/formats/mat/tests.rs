@@ -180,10 +180,10 @@ fn check_refused(bytes: &[u8], word: &str) {
 #[test]
 fn other_files_are_refused_in_a_sentence() {
     let good = fs::read(fixture("iset_plain.mat")).unwrap();
-    check_refused(b"", "no MATLAB file");
-    check_refused(&[b' '; 500], "no MATLAB file");
+    check_refused(b"", "nor a MATLAB file");
+    check_refused(&[b' '; 500], "nor a MATLAB file");
     let new = fs::read(fixture("iset_scene_v73.mat")).unwrap();
-    check_refused(&new[..new.len() / 2], "HDF5 that cannot be read");
+    check_refused(&new[..new.len() / 2], "truncated");
     check_refused(&good[..good.len() / 2], "truncated");
     check_refused(&good[..128], "no scene");
     // Twice the bands that the photons have.
@@ -200,6 +200,39 @@ fn other_files_are_refused_in_a_sentence() {
     check_refused(&with(&[500.0, 600.0], &[u32::MAX, u32::MAX, u32::MAX], 6), "sides");
     check_refused(&with(&[500.0, 600.0], &[0, 3, 2], 0), "samples");
     assert!(matches!(read_iset_mat(&fixture("absent.mat")), Err(SceneError::Unreadable { .. })));
+}
+
+#[test]
+fn fields_of_structures_are_taken_by_their_names() {
+    let field = |name: &str, sides: &[usize], numbers: &[f64]| {
+        (name.to_owned(), elements::doubles("", sides, numbers).unwrap())
+    };
+    let numbers: Vec<f64> = (0..12).map(|i| f64::from(i) / 12.0).collect();
+    let fields = [
+        field("cube", &[2, 3, 2], &numbers),
+        field("wavelengths", &[2, 1], &[450.0, 550.0]),
+        field("gain", &[1, 1], &[2.0]),
+    ];
+    let data = elements::variable(&elements::structure("data", &fields).unwrap()).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.mat");
+    fs::write(&path, [elements::file_head(), data].concat()).unwrap();
+    let read = |variable: Option<&str>| {
+        let quantity = Some(crate::FileQuantity::Reflectance);
+        let reading = crate::FileReading { variable: variable.map(str::to_owned), quantity, ..Default::default() };
+        crate::read_scene(&path, &crate::ReadOptions { reading, ..Default::default() })
+    };
+    let scene = read(Some("data.cube")).unwrap();
+    assert_eq!(scene.radiance.grid().centers_nm(), [450.0, 550.0]);
+    assert!(scene.notes.join(" ").contains("'data.gain'"), "{:?}", scene.notes);
+    for (variable, words) in [
+        (None, "or --variable data.cube"),
+        (Some("data"), "is a structure, expected numbers: --variable data.cube"),
+        (Some("data.cub"), "expected one of data, data.cube, data.wavelengths"),
+    ] {
+        let message = read(variable).unwrap_err().to_string();
+        assert!(message.contains(words), "{message}");
+    }
 }
 
 #[test]

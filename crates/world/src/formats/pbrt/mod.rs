@@ -160,7 +160,7 @@ impl<'c> Reader<'c> {
         let bytes = unpacked(path, read_bytes(path, self.bytes_left)?, self.bytes_left)?;
         self.bytes_left -= bytes.len() as u64;
         // Names and comments may be in any old encoding.
-        let text = String::from_utf8_lossy(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&bytes));
+        let text = dioptric_files::text::of_bytes(&bytes);
         if depth == 0 && text.contains("WorldEnd") {
             self.version = Version::Three;
         }
