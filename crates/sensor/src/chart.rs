@@ -99,7 +99,7 @@ fn median(values: &[f64]) -> f64 {
 /// Returns XYZ of the patches under a light, moved to D65, white having Y = 1.
 fn wanted(light: &Illuminant) -> Vec<Xyz> {
     let grid = fine_grid();
-    let values = light.spectrum().sample_held(&grid);
+    let values = light.on_bands(&grid);
     let white = Observer::Cie1931.xyz(&grid, &values);
     let relative = |xyz: Xyz| Xyz(xyz.0.map(|v| v / white.0[1]));
     let patch = |reflectance: &dioptric_spectrum::Spectrum| {

@@ -219,7 +219,7 @@ struct Training {
 impl Training {
     fn new(sensor: &Sensor, light: &Illuminant, reflectances: &[Spectrum]) -> Self {
         let grid = fine_grid();
-        let light_values = light.spectrum().sample_held(&grid);
+        let light_values = light.on_bands(&grid);
         let weights = color_weights(sensor, &grid);
         let white = white_response(sensor, light);
         // Once for all colors: they take longer than everything else here.

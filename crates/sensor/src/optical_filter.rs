@@ -165,7 +165,7 @@ impl OpticalFilter {
     /// The share of a light that passes as an eye sees it: ∫ τ S V dλ / ∫ S V dλ, with the ȳ of the 1931 observer.
     pub fn luminous_transmittance(&self, light: &Illuminant) -> f64 {
         let grid = fine_grid();
-        let spectrum = light.spectrum().sample_held(&grid);
+        let spectrum = light.on_bands(&grid);
         let passed: Vec<f64> =
             self.transmittance.sample_held(&grid).iter().zip(&spectrum).map(|(t, s)| t * s).collect();
         let [whole, passed] = [&spectrum, &passed].map(|of| Observer::Cie1931.xyz(&grid, of).luminance_cd_m2());
@@ -229,7 +229,7 @@ mod tests {
 
     fn under(filter: &OpticalFilter, light: &Illuminant) -> (f64, f64) {
         let grid = fine_grid();
-        let light = light.spectrum().sample_held(&grid);
+        let light = light.on_bands(&grid);
         let passed: Vec<f64> = filter.transmittance.sample_held(&grid).iter().zip(light).map(|(t, s)| t * s).collect();
         let [x, y, z] = Observer::Cie1931.xyz(&grid, &passed).0;
         (x / (x + y + z), y / (x + y + z))

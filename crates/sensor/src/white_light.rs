@@ -7,7 +7,7 @@ use crate::Sensor;
 /// Returns what each channel sees of a perfect white under a light, up to a common factor.
 pub(crate) fn white_response(sensor: &Sensor, light: &Illuminant) -> Vec<f64> {
     let grid = fine_grid();
-    let white = light.spectrum().sample_held(&grid);
+    let white = light.on_bands(&grid);
     color_weights(sensor, &grid).iter().map(|w| w.iter().zip(&white).map(|(w, s)| w * s).sum()).collect()
 }
 
@@ -33,7 +33,7 @@ pub(crate) fn light_of_gains(sensor: &Sensor, gains: &[f64]) -> Illuminant {
     let weights = color_weights(sensor, &grid);
     // How far from equal the balanced channels of a light are: the variance of their logarithms.
     let unevenness = |light: &Illuminant| {
-        let white = light.spectrum().sample_held(&grid);
+        let white = light.on_bands(&grid);
         let signal = |w: &Vec<f64>| w.iter().zip(&white).map(|(w, s)| w * s).sum::<f64>();
         let logs: Vec<f64> = weights.iter().zip(gains).map(|(w, gain)| (signal(w) * gain).ln()).collect();
         let mean = logs.iter().sum::<f64>() / logs.len() as f64;

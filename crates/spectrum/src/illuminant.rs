@@ -152,7 +152,7 @@ impl Illuminant {
 
     /// Returns the chromaticity x, y for the 1931 observer.
     pub fn chromaticity(&self) -> [f64; 2] {
-        Observer::Cie1931.xyz(&visible(), &self.spectrum().sample_held(&visible())).chromaticity()
+        Observer::Cie1931.xyz(&visible(), &self.on_bands(&visible())).chromaticity()
     }
 
     /// Returns the correlated color temperature.
@@ -205,17 +205,19 @@ impl Illuminant {
     /// Returns the radiance of a perfect white diffuser under this light, W m⁻² sr⁻¹ nm⁻¹ a band,
     /// at an illuminance in lux (luminance = illuminance / π).
     pub fn white_radiance(&self, grid: &WavelengthGrid, illuminance_lux: f64) -> Vec<f64> {
-        let spectrum = self.spectrum();
         // The luminance comes from the full 1 nm table, not from the caller's grid.
         let fine = WavelengthGrid::uniform(360.0, 830.0, 1.0).expect("a valid range");
-        let luminance = Observer::Cie1931.xyz(&fine, &spectrum.sample_held(&fine)).luminance_cd_m2();
+        let luminance = Observer::Cie1931.xyz(&fine, &self.on_bands(&fine)).luminance_cd_m2();
         let scale = illuminance_lux / std::f64::consts::PI / luminance;
-        // Lines fall between the centers of bands.
-        let samples = match self {
-            Self::Fl2 | Self::Fl11 | Self::LedB3 => spectrum.band_means(grid),
-            _ => spectrum.sample_held(grid),
-        };
-        samples.iter().map(|v| v * scale).collect()
+        self.on_bands(grid).iter().map(|v| v * scale).collect()
+    }
+
+    /// Returns its relative power, in each band: means where it has lines, or may have, that fall between the centers of bands.
+    pub fn on_bands(&self, grid: &WavelengthGrid) -> Vec<f64> {
+        match self {
+            Self::Fl2 | Self::Fl11 | Self::LedB3 | Self::Spectrum(_) => self.spectrum().band_means_held(grid),
+            _ => self.spectrum().sample_held(grid),
+        }
     }
 
     /// Returns what is said of bands beyond a light's table, where there are any.

@@ -83,14 +83,42 @@ impl Spectrum {
         if wavelength_nm < first || wavelength_nm > last { 0.0 } else { self.at_held(wavelength_nm) }
     }
 
-    /// Returns the mean over each band of a grid, 0 outside its range: what bands hold of a spectrum with lines.
+    /// Returns the mean over each band of a grid, as far as the table goes, and 0 beyond: what bands hold of a spectrum with lines.
     pub fn band_means(&self, grid: &WavelengthGrid) -> Vec<f64> {
-        let mean = |(&center, &width): (&f64, &f64)| {
-            let n = (2.0 * width).ceil().max(1.0) as usize;
-            let at = |i: usize| self.at_or_zero(center + width * ((i as f64 + 0.5) / n as f64 - 0.5));
-            (0..n).map(at).sum::<f64>() / n as f64
-        };
-        grid.centers_nm().iter().zip(grid.widths_nm()).map(mean).collect()
+        self.means(grid).map(|(_, mean)| mean.unwrap_or(0.0)).collect()
+    }
+
+    /// Returns the mean over each band of a grid; beyond the table its end values are held.
+    pub fn band_means_held(&self, grid: &WavelengthGrid) -> Vec<f64> {
+        self.means(grid).map(|(center_nm, mean)| mean.unwrap_or_else(|| self.at_held(center_nm))).collect()
+    }
+
+    fn means(&self, grid: &WavelengthGrid) -> impl Iterator<Item = (f64, Option<f64>)> {
+        let bands = grid.centers_nm().iter().zip(grid.widths_nm());
+        bands.map(|(&center_nm, &width_nm)| (center_nm, self.mean_over(center_nm, width_nm)))
+    }
+
+    /// Returns the mean over a band, of the lines between the values of the table; `None` beyond it.
+    fn mean_over(&self, center_nm: f64, width_nm: f64) -> Option<f64> {
+        let (start, end) = (center_nm - 0.5 * width_nm, center_nm + 0.5 * width_nm);
+        let (first, last) = self.range_nm();
+        let (from, to) = (start.max(first), end.min(last));
+        if from > to {
+            return None;
+        }
+        let index = |nm: f64| self.wavelengths_nm.partition_point(|&w| w < nm);
+        // A table that is no finer than bands has what they hold.
+        if index(end) - index(start) <= 1 {
+            return Some(self.at_held(center_nm));
+        }
+        let inner = (index(from)..index(to)).map(|i| (self.wavelengths_nm[i], self.values[i]));
+        let [start, end] = [from, to].map(|nm| (nm, self.at_held(nm)));
+        let (mut sum, mut before) = (0.0, start);
+        for point in inner.chain([end]) {
+            sum += 0.5 * (before.1 + point.1) * (point.0 - before.0);
+            before = point;
+        }
+        Some(if to > from { sum / (to - from) } else { start.1 })
     }
 
     /// Returns [`at_held`](Self::at_held) at each band center.
@@ -150,6 +178,29 @@ mod tests {
         assert_eq!([450.0, 500.0, 575.0].map(|w| s.at_held(w)), [2.0, 3.0, 2.25]);
         assert_eq!([s.at_held(300.0), s.at_held(700.0)], [1.0, 2.0]);
         assert_eq!([s.at_or_zero(399.9), s.at_or_zero(600.1), s.at_or_zero(600.0)], [0.0, 0.0, 2.0]);
+    }
+
+    /// Lines between the centers of bands, and on them: bands beside each other hold all of a table, whatever their width.
+    #[test]
+    fn bands_hold_all_light_of_lines() {
+        let wavelengths_nm: Vec<f64> = (0..=600).map(|i| 395.0 + 0.5 * f64::from(i)).collect();
+        let light = |nm: f64| if [405.5, 450.0, 589.0].contains(&nm) { 20.0 } else { 0.02 };
+        let values: Vec<f64> = wavelengths_nm.iter().map(|nm| light(*nm)).collect();
+        let table = Spectrum::new(wavelengths_nm, values).unwrap();
+        let all: f64 = table.values().windows(2).map(|pair| 0.25 * (pair[0] + pair[1])).sum();
+        for step_nm in [2.5, 10.0, 50.0] {
+            let (first, last) = (395.0 + 0.5 * step_nm, 695.0 - 0.5 * step_nm);
+            let grid = WavelengthGrid::uniform(first, last, step_nm).unwrap();
+            for means in [table.band_means(&grid), table.band_means_held(&grid)] {
+                let held: f64 = means.iter().map(|mean| mean * step_nm).sum();
+                assert!((held / all - 1.0).abs() < 1e-12, "{step_nm}: {held} {all}");
+            }
+        }
+        // A table no finer than bands has what they hold, to its ends.
+        let grid = WavelengthGrid::uniform(400.0, 440.0, 10.0).unwrap();
+        let coarse = Spectrum::new(vec![410.0, 420.0, 430.0], vec![1.0, 5.0, 2.0]).unwrap();
+        assert_eq!(coarse.band_means(&grid), [0.0, 1.0, 5.0, 2.0, 0.0]);
+        assert_eq!(coarse.band_means_held(&grid), [1.0, 1.0, 5.0, 2.0, 2.0]);
     }
 
     #[test]

@@ -93,7 +93,7 @@ impl TableParts<'_> {
 
     /// Returns the share of each band in the signal of each channel under the light; of an even one where that is not known.
     fn channel_weights(&self) -> Vec<Vec<f64>> {
-        let light = self.light.unwrap_or(&Illuminant::E).spectrum().sample_held(self.grid);
+        let light = self.light.unwrap_or(&Illuminant::E).on_bands(self.grid);
         let shares = |weights: Vec<f64>| {
             let signal: Vec<f64> = weights.iter().zip(&light).map(|(w, s)| w * s).collect();
             let sum: f64 = signal.iter().sum();

@@ -241,7 +241,9 @@ fn wavelengths_of(folder: &Path, pictures: &[(f64, PathBuf)]) -> Result<Vec<f64>
         let is_separator = |c: char| c.is_whitespace() || c == ',' || c == ';';
         let text = text::with_commas(&text);
         let numbers: Vec<f64> = text.split(is_separator).filter_map(|word| word.parse().ok()).collect();
-        let unit = text.split(|c| "()[]#:=;,".contains(c) || char::is_whitespace(c)).find_map(unit_in);
+        let words = text.split(|c| "()[]#:=;,".contains(c) || char::is_whitespace(c));
+        // Beside numbers alone a letter is a unit, too.
+        let unit = words.clone().find_map(unit_in).or_else(|| words.clone().find(|word| *word == "A"));
         let own = listed_nm("wavelengths", unit, &numbers).map_err(|reason| unreadable(&list, reason))?;
         return own.ok_or_else(|| unreadable(&list, "its numbers count bands: expected wavelengths in nm"));
     }

@@ -8,8 +8,8 @@ use std::{
 use super::{
     camera_files::beside,
     contents::{MATLAB_OR_HDF5, is_of},
+    depth_names::SaidOfDepth,
     depth_numbers::{DepthNumbers, depth_numbers},
-    length_unit::length_in_name,
     raw_depth::{DepthWords, RawDepth},
     reading::{DepthKind, DepthUnit},
     stated::name_of,
@@ -149,7 +149,7 @@ fn unit_m_of(path: &Path, numbers: &DepthNumbers, words: DepthWords<'_>) -> Resu
     if let Some(unit_m) = words.unit_m {
         return Ok(unit_m);
     }
-    let own = length_in_name(&path.file_stem().unwrap_or_default().to_string_lossy());
+    let own = SaidOfDepth::of_file(&path.file_stem().unwrap_or_default().to_string_lossy()).unit_m;
     // Codes of metres would be of whole ones.
     if let Some(own_m) = own.filter(|own_m| numbers.top.is_none() || *own_m < 1.0) {
         return Ok(own_m);

@@ -6,9 +6,9 @@ use ndarray::Array2;
 
 use super::{
     contents::{MATLAB_OR_HDF5, is_of},
+    depth_names::SaidOfDepth,
     exr_depth_file::{DepthChannel, read_depth_exr},
     gray_picture::{GrayPicture, read_gray},
-    length_unit::length_in_name,
     mat::{Plane, read_plane},
     npy::{NpyArray, read_npy},
     npz::read_npz_plane,
@@ -74,11 +74,11 @@ pub(super) fn depth_numbers(path: &Path, told: Option<&str>) -> Result<Noted<Dep
             let (name, array) = read_npz_plane(path, told)?.told_in(&mut notes);
             let (values, top) = plane_of(path, array)?;
             names = name.clone();
-            DepthNumbers { from: named(&name), unit_m: length_in_name(&name), ..of(values, top) }
+            DepthNumbers { from: named(&name), unit_m: SaidOfDepth::of(&name).unit_m, ..of(values, top) }
         }
         _ if is_of(path, MATLAB_OR_HDF5) => {
             let Plane { name, values, top, unit_m, words } = read_plane(path, told)?.told_in(&mut notes);
-            let named_m = length_in_name(&name);
+            let named_m = SaidOfDepth::of(&name).unit_m;
             if let (Some(unit_m), Some(named_m)) = (unit_m, named_m)
                 && unit_m != named_m
             {
@@ -91,7 +91,7 @@ pub(super) fn depth_numbers(path: &Path, told: Option<&str>) -> Result<Noted<Dep
         }
         "exr" => {
             let DepthChannel { name, plane, kind, frame } = read_depth_exr(path, told)?.told_in(&mut notes);
-            let (from, unit_m) = (format!("channel {}", named(&name)), length_in_name(&name));
+            let (from, unit_m) = (format!("channel {}", named(&name)), SaidOfDepth::of(&name).unit_m);
             names = name;
             DepthNumbers { from, kind, unit_m, frame: Some(frame), ..of(plane, None) }
         }
@@ -116,62 +116,14 @@ pub(super) fn depth_numbers(path: &Path, told: Option<&str>) -> Result<Noted<Dep
             }
         }
     };
-    let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    if numbers.kind == DepthKind::Axial && is_radial(&stem, &names, &called) {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    // What stands nearest to the numbers counts first.
+    let said = [SaidOfDepth::of(&called), SaidOfDepth::of(&names), SaidOfDepth::of_file(&stem)];
+    if numbers.kind == DepthKind::Axial && said.iter().find_map(|own| own.is_radial) == Some(true) {
         numbers.kind = DepthKind::Radial;
     }
-    numbers.lacks = numbers.lacks.or_else(|| [&stem, &names, &called].into_iter().find_map(|own| lacks_length(own)));
+    numbers.lacks = numbers.lacks.or_else(|| said.iter().find_map(|own| own.lacks));
     Ok(Noted::new(numbers, notes))
-}
-
-/// Returns the words of a name, as `inv`, `depth` and `mm` of `invDepth_mm`, in small letters.
-fn words_of(name: &str) -> Vec<String> {
-    let mut apart = String::new();
-    for c in name.chars() {
-        // A capital behind a small letter begins a word.
-        if c.is_uppercase() && apart.ends_with(char::is_lowercase) {
-            apart.push(' ');
-        }
-        apart.push(c);
-    }
-    apart.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty()).map(str::to_lowercase).collect()
-}
-
-/// Whether distances are counted from the camera by the name of their file, their array or channel, or the words that the file has for it.
-fn is_radial(stem: &str, name: &str, called: &str) -> bool {
-    const RAYS: [&str; 7] = ["ray", "rays", "radial", "euclidean", "slant", "sight", "range"];
-    const DISTANCES: [&str; 3] = ["distance", "distances", "dist"];
-    let last = name.rsplit('/').next().unwrap_or(name);
-    let ([stem, name], lower) = ([stem, last].map(words_of), called.to_lowercase());
-    let called = words_of(called);
-    let is_in = |words: &[String], known: &[&str]| words.iter().any(|own| known.contains(&own.as_str()));
-    let is_last = |words: &[String], known: &[&str]| words.last().is_some_and(|own| known.contains(&own.as_str()));
-    if is_in(&called, &["axis", "axial", "planar", "perpendicular"]) || is_in(&name, &["axial", "planar"]) {
-        return false;
-    }
-    is_in(&name, &RAYS)
-        || is_in(&name, &DISTANCES)
-        || is_in(&called, &RAYS)
-        || ["distance from ", "distance to "].iter().any(|start| lower.contains(start))
-        // Files may be called after what they show.
-        || is_in(&stem, &["radial", "euclidean"])
-        || is_last(&stem, &DISTANCES)
-        || is_last(&stem, &["range"])
-}
-
-/// Returns what is asked for where words speak of what is no length.
-fn lacks_length(words: &str) -> Option<&'static str> {
-    let (lower, own) = (words.to_lowercase(), words_of(words));
-    let has = |word: &str| own.iter().any(|own| own == word);
-    if has("mist") {
-        return Some(
-            "its name says that it is a mist, whose numbers are no lengths: expected the pass of depth (Z), or --depth-unit or --depth-kind",
-        );
-    }
-    let is_inverse = lower.contains("inverse") || ["inv", "idepth", "invdepth", "reciprocal"].into_iter().any(has);
-    (lower.contains("disparit") || has("disp") || is_inverse).then_some(
-        "its name or words say that it holds disparities or inverse distances: expected --depth-kind, as disparity:BASELINE_M or inverse",
-    )
 }
 
 /// Whether a file is the header of an ENVI cube, or has one.

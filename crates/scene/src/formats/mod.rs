@@ -12,6 +12,7 @@ mod chart_table;
 mod contents;
 mod cube_folder;
 mod depth;
+mod depth_names;
 mod depth_numbers;
 #[cfg(test)]
 mod depth_tests;

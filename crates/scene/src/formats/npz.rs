@@ -12,7 +12,8 @@ use zip::{CompressionMethod, ZipArchive, ZipWriter, result::ZipError, write::Sim
 use super::{
     axes,
     contents::Cube,
-    mat::{DEPTHS, is_called, rank_of_waves},
+    depth_names::is_called,
+    mat::{DEPTHS, rank_of_waves},
     npy::{NpyArray, is_array_of, npy_bytes, parse, parse_complex},
     read_options::ReadOptions,
     stated::{Noted, name_of, note_of, short},

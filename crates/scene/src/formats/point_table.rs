@@ -186,7 +186,7 @@ impl Color {
     /// Returns the spectrum, relative, as means over bands: of a line its whole power, 1 W, in the band that it falls into.
     fn on(&self, grid: &WavelengthGrid) -> Vec<f64> {
         match self {
-            Self::Of(illuminant) => illuminant.spectrum().sample_held(grid),
+            Self::Of(illuminant) => illuminant.on_bands(grid),
             Self::Line(nm) => {
                 let (centers, widths) = (grid.centers_nm(), grid.widths_nm());
                 let bands = centers.iter().zip(widths);

@@ -410,11 +410,10 @@ impl Target {
 
     /// Returns the radiance of the white in each band.
     fn white_radiance(&self, grid: &WavelengthGrid) -> Result<Vec<f64>, SceneError> {
-        let spectrum = self.light.spectrum();
         // The luminance comes from the full 1 nm table, not from the caller's grid.
         let fine = WavelengthGrid::uniform(360.0, 830.0, 1.0)?;
-        let luminance = Observer::Cie1931.xyz(&fine, &spectrum.sample_held(&fine)).luminance_cd_m2();
-        Ok(spectrum.sample_held(grid).into_iter().map(|v| v * self.luminance_cd_m2 / luminance).collect())
+        let luminance = Observer::Cie1931.xyz(&fine, &self.light.on_bands(&fine)).luminance_cd_m2();
+        Ok(self.light.on_bands(grid).into_iter().map(|v| v * self.luminance_cd_m2 / luminance).collect())
     }
 
     fn chart(&self, grid: &WavelengthGrid, white: &[f64]) -> Result<SpectralImage, SceneError> {

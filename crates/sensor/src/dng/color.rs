@@ -74,7 +74,7 @@ pub(crate) fn camera_from_xyz(sensor: &Sensor, light: &Illuminant) -> Vec<[f64; 
         return (0..3).map(|i| balanced_from_xyz[i].map(|v| v * white[i] / brightest)).collect();
     }
     let grid = fine_grid();
-    let lit = light.spectrum().sample_held(&grid);
+    let lit = light.on_bands(&grid);
     let weights = color_weights(sensor, &grid);
     let white_y = Observer::Cie1931.xyz(&grid, &lit).0[1];
     let mut normals: Vec<Normal> = weights.iter().map(|_| Normal::new(3)).collect();
@@ -122,7 +122,7 @@ pub(crate) fn xyz_d50_from_balanced(sensor: &Sensor, light: &Illuminant) -> Opti
 fn balanced_from_xyz(srgb_from_balanced: [[f64; 3]; 3], light: &Illuminant) -> [[f64; 3]; 3] {
     let balanced_from_srgb = inverse(srgb_from_balanced);
     let grid = fine_grid();
-    let light_xyz = Observer::Cie1931.xyz(&grid, &light.spectrum().sample_held(&grid));
+    let light_xyz = Observer::Cie1931.xyz(&grid, &light.on_bands(&grid));
     let light_xyz = Xyz(light_xyz.0.map(|v| v / light_xyz.0[1]));
     // Column by column: what the camera gives for X, Y and Z alone.
     let columns = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|unit| {
@@ -159,7 +159,7 @@ mod tests {
         for sensor in [three, four] {
             for light in [Illuminant::A, Illuminant::D65] {
                 let grid = fine_grid();
-                let xyz = Observer::Cie1931.xyz(&grid, &light.spectrum().sample_held(&grid)).0;
+                let xyz = Observer::Cie1931.xyz(&grid, &light.on_bands(&grid)).0;
                 let white = white_response(&sensor, &light);
                 let brightest = white.iter().copied().fold(0.0, f64::max);
                 for (row, white) in camera_from_xyz(&sensor, &light).iter().zip(&white) {

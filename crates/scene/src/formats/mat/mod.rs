@@ -24,4 +24,4 @@ pub use iset_write::write_iset_scene;
 use isetcam::IsetScene;
 pub(super) use isetcam::{MatScene, read_mat};
 pub(super) use packing::rank_of_waves;
-pub(super) use plane::{DEPTHS, Plane, is_called, read_plane};
+pub(super) use plane::{DEPTHS, Plane, read_plane};

@@ -7,7 +7,8 @@ use ndarray::Array2;
 use super::{
     super::{
         axes,
-        length_unit::{length_in_name, length_in_words, length_m},
+        depth_names::{SaidOfDepth, is_called},
+        length_unit::length_m,
         stated::{Noted, note_of},
         unusable::unreadable,
     },
@@ -21,12 +22,6 @@ use crate::SceneError;
 /// Names of arrays of depth, those of distances from the camera first.
 pub(in super::super) const DEPTHS: [&str; 9] =
     ["distance", "depth", "depths", "depthmap", "depth_map", "z", "dataset", "rawdepths", "disparity"];
-
-/// Whether an array is called so, or so with a unit of length behind, as `depth_mm`.
-pub(in super::super) fn is_called(name: &str, wanted: &str) -> bool {
-    let bare = length_in_name(name).and_then(|_| name.rsplit_once(['_', '-', ' ', '.'])).map(|(bare, _)| bare);
-    [Some(name), bare].into_iter().flatten().any(|own| own.eq_ignore_ascii_case(wanted))
-}
 
 /// A plane of numbers.
 pub(in super::super) struct Plane {
@@ -97,7 +92,7 @@ pub(in super::super) fn read_plane(path: &Path, told: Option<&str>) -> Result<No
         file.listed.iter().map(|own| own.name.clone()).filter(|own| *own != chosen.name).collect();
     let packing = Packing::of(file.attributes_of(&chosen.name));
     // What it is called may have its unit.
-    let called_m = length_in_words(words);
+    let called_m = SaidOfDepth::of(words).unit_m;
     let unit_m = packing.unit.as_deref().and_then(length_m).or(called_m);
     let mut notes: Vec<String> = note_of(path, "array", &others).into_iter().collect();
     let of_file = file.attributes_of(WHOLE).iter().map(|own| own.name.clone());

@@ -1,0 +1,236 @@
+//! What names and words say of a depth, whatever bears them: an array, a channel, a file, an attribute.
+
+use super::length_unit::length_m;
+
+/// What words say of the numbers of a depth.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct SaidOfDepth {
+    /// The length of 1, m, where they name one unit of length.
+    pub(super) unit_m: Option<f64>,
+    /// Whether distances are counted from the camera, or along its axis.
+    pub(super) is_radial: Option<bool>,
+    /// What is asked for where the numbers are no lengths of a known unit.
+    pub(super) lacks: Option<&'static str>,
+}
+
+const DEPTHS: [&str; 4] = ["depth", "depths", "depthmap", "z"];
+const DISTANCES: [&str; 3] = ["distance", "distances", "dist"];
+const RAYS: [&str; 7] = ["ray", "rays", "radial", "euclidean", "slant", "sight", "range"];
+const MIST: &str = "its name says that it is a mist, whose numbers are no lengths: expected the pass of depth (Z), or --depth-unit or --depth-kind";
+const INVERSE: &str = "its name or words say that it holds disparities or inverse distances: expected --depth-kind, as disparity:BASELINE_M or inverse";
+const RELATIVE: &str = "its name or words say that its numbers are relative, or logarithms, and no lengths: expected lengths, or --depth-unit or --depth-kind";
+
+impl SaidOfDepth {
+    /// Of an array, a channel, or what a file says of it.
+    pub(super) fn of(words: &str) -> Self {
+        let own = words_of(words.rsplit('/').next().unwrap_or(words));
+        let has = |known: &[&str]| own.iter().any(|word| known.contains(&word.as_str()));
+        let radial = has(&RAYS) || has(&DISTANCES) || has(&["perspective"]);
+        let is_axial = has(&["axial", "axis", "planar", "perpendicular"]) || has_pair(&own, &["image"], &["plane"]);
+        let is_radial = if is_axial { Some(false) } else { radial.then_some(true) };
+        Self { unit_m: unit_of(&own), is_radial, lacks: lacks(&own) }
+    }
+
+    /// Of the stem of a file, which may be called after what it shows.
+    pub(super) fn of_file(stem: &str) -> Self {
+        let own = words_of(stem);
+        let has = |known: &[&str]| own.iter().any(|word| known.contains(&word.as_str()));
+        let is_last = |known: &[&str]| {
+            let words = own.iter().filter(|word| length_m(word).is_none() && !is_number(word));
+            words.last().is_some_and(|word| known.contains(&word.as_str()))
+        };
+        const LENGTHS: [&str; 7] = ["depth", "depths", "distance", "distances", "dist", "length", "lengths"];
+        let is_axial = has(&["axial", "planar"]) || has_pair(&own, &["image"], &["plane"]);
+        let radial = has(&["radial", "euclidean"])
+            || is_last(&DISTANCES)
+            || is_last(&["range"])
+            || has_pair(&own, &DISTANCES, &["to", "from"])
+            || has_pair(&own, &DEPTHS, &["perspective"])
+            || has_pair(&own, &["ray"], &LENGTHS)
+            || has_pair(&own, &LENGTHS, &["ray"]);
+        let is_radial = if is_axial { Some(false) } else { radial.then_some(true) };
+        Self { unit_m: unit_of(&own), is_radial, lacks: lacks(&own) }
+    }
+}
+
+/// Whether an array is called so, whatever unit of length and number stand with it, as in `depth_mm`.
+pub(super) fn is_called(name: &str, wanted: &str) -> bool {
+    let bare = |name: &str| -> Vec<String> {
+        words_of(name).into_iter().filter(|word| length_m(word).is_none() && !is_number(word)).collect()
+    };
+    name.eq_ignore_ascii_case(wanted) || bare(name) == bare(wanted)
+}
+
+/// Returns the words of a name, as `inv`, `depth` and `mm` of `invDepth_mm`, in small letters.
+fn words_of(name: &str) -> Vec<String> {
+    let mut apart = String::new();
+    for c in name.chars() {
+        // A capital behind a small letter begins a word.
+        if c.is_uppercase() && apart.ends_with(char::is_lowercase) {
+            apart.push(' ');
+        }
+        apart.push(c);
+    }
+    let words = apart.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty()).map(str::to_lowercase);
+    // A unit may stand without a gap, as in depthmm.
+    let parts = |word: String| match word.strip_prefix("depth").filter(|rest| length_m(rest).is_some()) {
+        Some(unit) => vec!["depth".to_owned(), unit.to_owned()],
+        None => vec![word],
+    };
+    words.flat_map(parts).collect()
+}
+
+fn is_number(word: &str) -> bool {
+    word.chars().all(|c| c.is_ascii_digit())
+}
+
+/// Whether one of some words stands before one of others.
+fn has_pair(words: &[String], first: &[&str], second: &[&str]) -> bool {
+    words.windows(2).any(|pair| first.contains(&pair[0].as_str()) && second.contains(&pair[1].as_str()))
+}
+
+/// Returns the metres of the one unit of length among some words, beside others; a unit behind a number is of what it counts, as in `lens_50_mm`.
+fn unit_of(words: &[String]) -> Option<f64> {
+    let is_counted = |i: usize| i > 0 && is_number(&words[i - 1]);
+    let units = words.iter().enumerate().filter(|(i, _)| words.len() > 1 && !is_counted(*i));
+    let mut found: Vec<f64> = units.filter_map(|(_, word)| length_m(word)).collect();
+    found.dedup();
+    Some(found).filter(|found| found.len() == 1).map(|found| found[0])
+}
+
+fn lacks(words: &[String]) -> Option<&'static str> {
+    let is = |known: &[&str]| words.iter().any(|word| known.contains(&word.as_str()));
+    let is_disparity = |word: &String| {
+        let rest = word.strip_prefix("disp");
+        word.contains("disparit") || rest.is_some_and(|rest| rest == "map" || is_number(rest))
+    };
+    const INVERSES: [&str; 11] = [
+        "inv",
+        "idepth",
+        "invdepth",
+        "depthinv",
+        "reciprocal",
+        "inverted",
+        "diopter",
+        "diopters",
+        "dioptre",
+        "dioptres",
+        "dpt",
+    ];
+    const RELATIVES: [&str; 9] =
+        ["log", "logarithm", "logarithmic", "rel", "relative", "norm", "normalized", "normalised", "ordinal"];
+    if is(&["mist"]) {
+        return Some(MIST);
+    }
+    if words.iter().any(|word| is_disparity(word) || word.contains("inverse")) || is(&INVERSES) {
+        return Some(INVERSE);
+    }
+    let is_relative = has_pair(words, &RELATIVES, &DEPTHS)
+        || has_pair(words, &DEPTHS, &RELATIVES)
+        || has_pair(words, &RELATIVES, &DISTANCES)
+        || is(&["logdepth", "reldepth"]);
+    is_relative.then_some(RELATIVE)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_state_units() {
+        for of in [SaidOfDepth::of, SaidOfDepth::of_file] {
+            for name in [
+                "depth_mm",
+                "z-mm",
+                "depth.mm",
+                "depthMM",
+                "depth (mm)",
+                "depth[mm]",
+                "depth_mm_raw",
+                "mm_depth",
+                "depthmm",
+                "depthInMillimeters",
+                "depth_mm_0001",
+                "0001_depth_mm",
+                "frame12.depth_mm",
+            ] {
+                assert_eq!(of(name).unit_m, Some(1e-3), "{name}");
+            }
+            for name in ["mm", "_mm", "depth_map", "View.Depth.Z", "m_or_mm", "lens_50_mm_depth", "50mm_depth"] {
+                assert_eq!(of(name).unit_m, None, "{name}");
+            }
+            assert_eq!(
+                [of("depth_inches"), of("depth_dm"), of("z_feet")].map(|own| own.unit_m),
+                [0.0254, 0.1, 0.3048].map(Some)
+            );
+        }
+    }
+
+    #[test]
+    fn words_state_what_is_counted() {
+        let both = |name: &str| [SaidOfDepth::of(name), SaidOfDepth::of_file(name)].map(|own| own.is_radial);
+        for name in [
+            "distance",
+            "distance_0001",
+            "distance.0001",
+            "range_0001",
+            "radial_depth",
+            "ray_depth",
+            "depthRay",
+            "ray_length",
+            "euclidean_distance",
+            "distance_to_camera",
+            "dist_to_camera",
+            "img_0_DepthPerspective",
+            "distance_mm",
+        ] {
+            assert_eq!(both(name), [Some(true); 2], "{name}");
+        }
+        for name in ["depth", "z", "depth_0001", "depth_arranged", "X-ray.room"] {
+            assert_eq!(SaidOfDepth::of_file(name).is_radial, None, "{name}");
+        }
+        for name in ["distance_to_image_plane", "depth_planar", "img_0_DepthPlanar"] {
+            assert_eq!(both(name), [Some(false); 2], "{name}");
+        }
+        assert_eq!(SaidOfDepth::of("distance along the optical axis").is_radial, Some(false));
+        assert_eq!(SaidOfDepth::of("distance from the camera").is_radial, Some(true));
+    }
+
+    #[test]
+    fn words_state_what_is_no_length() {
+        for name in [
+            "disparity",
+            "disp",
+            "disp0",
+            "dispmap",
+            "disparities_12",
+            "inv_depth",
+            "depth_inv",
+            "depthinv",
+            "idepth",
+            "inverse_depth",
+            "inverseDepth",
+            "diopters",
+            "log_depth",
+            "logdepth",
+            "relative_depth",
+            "depth_norm",
+            "Mist",
+        ] {
+            assert!(SaidOfDepth::of(name).lacks.is_some() && SaidOfDepth::of_file(name).lacks.is_some(), "{name}");
+        }
+        for name in ["display", "depth", "log_cabin", "relative_to_the_camera", "norm_room", "dispatch"] {
+            assert_eq!(SaidOfDepth::of_file(name).lacks, None, "{name}");
+        }
+    }
+
+    #[test]
+    fn arrays_are_called_whatever_their_unit() {
+        for (name, wanted) in
+            [("depth_mm", "depth"), ("DepthMap", "depth_map"), ("depthMM", "depth"), ("Z", "z"), ("depth_0", "depth")]
+        {
+            assert!(is_called(name, wanted), "{name}");
+        }
+        assert!(!is_called("depth_raw", "depth") && !is_called("mm", "depth"));
+    }
+}
