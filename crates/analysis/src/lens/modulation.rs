@@ -3,7 +3,11 @@
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 use dioptric_diffraction::{TransferFunction, TransferQuality};
-use dioptric_optics::{Lens, MonoLens, glam::DVec2};
+use dioptric_optics::{
+    Lens, MonoLens,
+    analysis::{PupilLight, PupilRule},
+    glam::DVec2,
+};
 use rayon::prelude::*;
 
 use super::afocal::AfocalView;
@@ -20,6 +24,8 @@ const STEPS: usize = 60;
 const EACH: usize = 2;
 /// Steps of the film to each side of its place.
 const FOCUS_STEPS: i32 = 10;
+/// Rings of rays of a geometric modulation: as many as resolve a blur of some ten periods.
+const RINGS: usize = 24;
 /// Where a modulation counts as lost.
 const LOST: f64 = 0.1;
 /// The color of the diffraction limit.
@@ -33,10 +39,24 @@ const LIMIT_COLOR: &str = "#888888";
 pub struct LensModulation {
     /// Over frequency, of each field; and of a lens without aberrations with the pupil of the first, at the reference wavelength.
     pub over_frequency: LineChart,
+    /// The same by rays alone, as if light had no wavelength.
+    pub geometric: LineChart,
     /// Over field, at three frequencies.
     pub over_field: LineChart,
     /// As the film moves, at the middle one of these and the reference wavelength.
     pub through_focus: LineChart,
+}
+
+impl LensModulation {
+    /// Returns the charts, each with the name of its file.
+    pub fn charts(&self) -> [(&'static str, &LineChart); 4] {
+        [
+            ("mtf", &self.over_frequency),
+            ("mtf_geometric", &self.geometric),
+            ("mtf_over_field", &self.over_field),
+            ("mtf_through_focus", &self.through_focus),
+        ]
+    }
 }
 
 impl LensAnalysis {
@@ -67,12 +87,13 @@ impl LensAnalysis {
         let frequencies = round_frequencies(reach_per_mm);
         let charts = [
             bench.over_frequency(&fields, &at_fields, reach_per_mm),
+            bench.geometric(&fields, &at_fields, reach_per_mm),
             bench.over_field(frequencies),
             bench.through_focus(&fields, frequencies[1]),
         ];
-        let [over_frequency, over_field, through_focus] =
+        let [over_frequency, geometric, over_field, through_focus] =
             if self.afocal.is_some() { charts.map(AfocalView::chart_in_angles) } else { charts };
-        Ok(LensModulation { over_frequency, over_field, through_focus })
+        Ok(LensModulation { over_frequency, geometric, over_field, through_focus })
     }
 }
 
@@ -139,6 +160,40 @@ impl Bench<'_> {
     }
 
     fn over_frequency(&self, places: &[FieldPlace], lights: &[FieldLight], reach_per_mm: f64) -> LineChart {
+        self.of_fields("Modulation over frequency", (places, lights), reach_per_mm, |i, f| lights[i].modulation(f))
+    }
+
+    /// Returns the modulation of the rays of each field, all wavelengths together.
+    fn geometric(&self, places: &[FieldPlace], lights: &[FieldLight], reach_per_mm: f64) -> LineChart {
+        let film_mm = self.analysis.film_distance_mm;
+        let rays_of = |place: &FieldPlace| -> Vec<(DVec2, f64)> {
+            let point = Field::of_place(place).point(&self.reference, self.dioptres);
+            let lit = self.lenses.iter().zip(&self.weights).filter_map(|(lens, weight)| {
+                let light = PupilLight::to_film(lens, &point, film_mm, PupilRule::of_rings(RINGS))?;
+                Some(light.on_film(lens, film_mm).map(|(at_mm, share)| (at_mm, share * weight)).collect::<Vec<_>>())
+            });
+            lit.flatten().collect()
+        };
+        let rays: Vec<Vec<(DVec2, f64)>> = places.par_iter().map(rays_of).collect();
+        let modulation = |i: usize, per_mm: f64| {
+            let total: f64 = rays[i].iter().map(|(_, share)| share).sum();
+            lights[i].directions().map(|direction| {
+                let turns_per_mm = DVec2::from_angle(direction) * per_mm;
+                let wave = |(at_mm, share): &(DVec2, f64)| *share * DVec2::from_angle(TAU * turns_per_mm.dot(*at_mm));
+                rays[i].iter().map(wave).sum::<DVec2>().length() / total
+            })
+        };
+        self.of_fields("Geometric modulation, by rays alone", (places, lights), reach_per_mm, modulation)
+    }
+
+    /// Returns a chart over frequency of the modulations of each field, and the diffraction limit.
+    fn of_fields(
+        &self,
+        title: &str,
+        (places, lights): (&[FieldPlace], &[FieldLight]),
+        reach_per_mm: f64,
+        modulation: impl Fn(usize, f64) -> [f64; 2],
+    ) -> LineChart {
         let x: Vec<f64> = (0..=STEPS).map(|step| reach_per_mm * step as f64 / STEPS as f64).collect();
         let mut series = Vec::new();
         if let Some((limit, light)) = lights.iter().find_map(|light| Some((light.limit.as_ref()?, light))) {
@@ -146,11 +201,11 @@ impl Bench<'_> {
             let label = format!("diffraction limit at {:.0} nm", self.reference.wavelength_nm());
             series.push(Series { label: Some(label), color: LIMIT_COLOR.to_owned(), points, is_dashed: false });
         }
-        for (i, (place, light)) in places.iter().zip(lights).enumerate() {
-            let values: Vec<[f64; 2]> = x.iter().map(|&f| light.modulation(f)).collect();
+        for (i, place) in places.iter().enumerate() {
+            let values: Vec<[f64; 2]> = x.iter().map(|&f| modulation(i, f)).collect();
             series.extend(pair(Some(place.label()), i, &x, &values));
         }
-        chart("Modulation over frequency", ("cycles per mm", (0.0, reach_per_mm)), series)
+        chart(title, ("cycles per mm", (0.0, reach_per_mm)), series)
     }
 
     fn over_field(&self, frequencies: [f64; 3]) -> LineChart {
@@ -262,6 +317,8 @@ fn round_frequencies(reach_per_mm: f64) -> [f64; 3] {
 mod tests {
     use std::f64::consts::PI;
 
+    use dioptric_diffraction::airy::bessel_j;
+
     use super::*;
     use crate::{AnalysisFields, AnalysisFilm, AnalysisRequest};
 
@@ -293,6 +350,30 @@ mod tests {
         let best = focus.iter().max_by(|a, b| a.1.total_cmp(&b.1)).unwrap();
         assert!(best.0.abs() < 1e-12, "{best:?}");
         assert_eq!((found.over_field.series.len(), found.over_frequency.series.len()), (6, 5));
+    }
+
+    #[test]
+    fn geometric_modulation_of_defocus_is_that_of_an_even_disc() {
+        let lens = Lens::thin(50.0, 5.0).unwrap();
+        let request = AnalysisRequest {
+            fields: AnalysisFields::above_axis_deg(&[0.0]),
+            wavelengths_nm: vec![500.0],
+            main_wavelength_nm: None,
+            distance_mm: f64::INFINITY,
+            film: AnalysisFilm::FilmMm(50.5),
+            n_rings: 6,
+        };
+        let found = request.compute(&lens).unwrap().modulation(&lens, &[]).unwrap();
+        // Half a millimetre behind the focus of f/10.
+        let radius_mm = 0.5 / 20.0;
+        for line in &found.geometric.series[1..] {
+            for &(per_mm, modulation) in &line.points {
+                let x = TAU * per_mm * radius_mm;
+                let expected = if x == 0.0 { 1.0 } else { (2.0 * bessel_j(1, x) / x).abs() };
+                assert!((modulation - expected).abs() < 1e-9, "{per_mm}: {modulation} {expected}");
+            }
+        }
+        assert_eq!(found.charts()[1].0, "mtf_geometric");
     }
 
     #[test]
