@@ -24,8 +24,10 @@ const STEPS: usize = 60;
 const EACH: usize = 2;
 /// Steps of the film to each side of its place.
 const FOCUS_STEPS: i32 = 10;
-/// Rings of rays of a geometric modulation: as many as resolve a blur of some ten periods.
-const RINGS: usize = 24;
+/// Rings of rays of a geometric modulation: so many, and more for each period that the blur reaches from its middle.
+const FEWEST_RINGS: usize = 12;
+const RINGS_A_TURN: f64 = 2.0;
+const MOST_RINGS: usize = 120;
 /// Where a modulation counts as lost.
 const LOST: f64 = 0.1;
 /// The color of the diffraction limit.
@@ -160,50 +162,69 @@ impl Bench<'_> {
     }
 
     fn over_frequency(&self, places: &[FieldPlace], lights: &[FieldLight], reach_per_mm: f64) -> LineChart {
-        self.of_fields("Modulation over frequency", (places, lights), reach_per_mm, |i, f| lights[i].modulation(f))
+        let of_light = |light: &FieldLight| frequencies(reach_per_mm).map(|f| light.modulation(f)).collect();
+        let values = lights.iter().map(of_light).collect();
+        self.of_fields("Modulation over frequency", (places, lights), reach_per_mm, values)
     }
 
     /// Returns the modulation of the rays of each field, all wavelengths together.
     fn geometric(&self, places: &[FieldPlace], lights: &[FieldLight], reach_per_mm: f64) -> LineChart {
-        let film_mm = self.analysis.film_distance_mm;
-        let rays_of = |place: &FieldPlace| -> Vec<(DVec2, f64)> {
-            let point = Field::of_place(place).point(&self.reference, self.dioptres);
-            let lit = self.lenses.iter().zip(&self.weights).filter_map(|(lens, weight)| {
-                let light = PupilLight::to_film(lens, &point, film_mm, PupilRule::of_rings(RINGS))?;
-                Some(light.on_film(lens, film_mm).map(|(at_mm, share)| (at_mm, share * weight)).collect::<Vec<_>>())
-            });
-            lit.flatten().collect()
+        let of_field = |(place, light): (&FieldPlace, &FieldLight)| {
+            let rays = self.rays(place, reach_per_mm);
+            let total: f64 = rays.iter().map(|(_, share)| share).sum();
+            let of_direction = |direction: f64| {
+                let step_per_mm = DVec2::from_angle(direction) * (reach_per_mm / STEPS as f64);
+                let turn = |(at_mm, share): &(DVec2, f64)| {
+                    (DVec2::new(*share, 0.0), DVec2::from_angle(TAU * step_per_mm.dot(*at_mm)))
+                };
+                let mut waves: Vec<(DVec2, DVec2)> = rays.iter().map(turn).collect();
+                let at_step = |_| {
+                    let sum: DVec2 = waves.iter().map(|(wave, _)| *wave).sum();
+                    waves.iter_mut().for_each(|(wave, turn)| *wave = turn.rotate(*wave));
+                    sum.length() / total
+                };
+                (0..=STEPS).map(at_step).collect::<Vec<f64>>()
+            };
+            let [tangential, sagittal] = light.directions().map(of_direction);
+            tangential.into_iter().zip(sagittal).map(|(t, s)| [t, s]).collect()
         };
-        let rays: Vec<Vec<(DVec2, f64)>> = places.par_iter().map(rays_of).collect();
-        let modulation = |i: usize, per_mm: f64| {
-            let total: f64 = rays[i].iter().map(|(_, share)| share).sum();
-            lights[i].directions().map(|direction| {
-                let turns_per_mm = DVec2::from_angle(direction) * per_mm;
-                let wave = |(at_mm, share): &(DVec2, f64)| *share * DVec2::from_angle(TAU * turns_per_mm.dot(*at_mm));
-                rays[i].iter().map(wave).sum::<DVec2>().length() / total
-            })
-        };
-        self.of_fields("Geometric modulation, by rays alone", (places, lights), reach_per_mm, modulation)
+        let values = places.par_iter().zip(lights).map(of_field).collect();
+        self.of_fields("Geometric modulation, by rays alone", (places, lights), reach_per_mm, values)
     }
 
-    /// Returns a chart over frequency of the modulations of each field, and the diffraction limit.
+    /// Returns where the rays of a field land at all wavelengths, mm, and their shares: as many as resolve their waves.
+    fn rays(&self, place: &FieldPlace, reach_per_mm: f64) -> Vec<(DVec2, f64)> {
+        let film_mm = self.analysis.film_distance_mm;
+        let point = Field::of_place(place).point(&self.reference, self.dioptres);
+        let of_lens = |(lens, weight): (&MonoLens, &f64)| {
+            let traced = |n_rings| PupilLight::to_film(lens, &point, film_mm, PupilRule::of_rings(n_rings));
+            let few = traced(FEWEST_RINGS)?;
+            let (centroid_mm, _) = few.moments(lens, film_mm);
+            let reach_mm = few.on_film(lens, film_mm).map(|(at_mm, _)| at_mm.distance(centroid_mm)).fold(0.0, f64::max);
+            let n_rings = FEWEST_RINGS + (RINGS_A_TURN * reach_mm * reach_per_mm).ceil() as usize;
+            let light = if n_rings > FEWEST_RINGS { traced(n_rings.min(MOST_RINGS))? } else { few };
+            Some(light.on_film(lens, film_mm).map(|(at_mm, share)| (at_mm, share * weight)).collect::<Vec<_>>())
+        };
+        self.lenses.iter().zip(&self.weights).filter_map(of_lens).flatten().collect()
+    }
+
+    /// Returns a chart of the modulations of each field over frequency, and the diffraction limit.
     fn of_fields(
         &self,
         title: &str,
         (places, lights): (&[FieldPlace], &[FieldLight]),
         reach_per_mm: f64,
-        modulation: impl Fn(usize, f64) -> [f64; 2],
+        values: Vec<Vec<[f64; 2]>>,
     ) -> LineChart {
-        let x: Vec<f64> = (0..=STEPS).map(|step| reach_per_mm * step as f64 / STEPS as f64).collect();
+        let x: Vec<f64> = frequencies(reach_per_mm).collect();
         let mut series = Vec::new();
         if let Some((limit, light)) = lights.iter().find_map(|light| Some((light.limit.as_ref()?, light))) {
             let points = x.iter().map(|&f| (f, limit.modulation(light.meridian_rad, f))).collect();
             let label = format!("diffraction limit at {:.0} nm", self.reference.wavelength_nm());
             series.push(Series { label: Some(label), color: LIMIT_COLOR.to_owned(), points, is_dashed: false });
         }
-        for (i, place) in places.iter().enumerate() {
-            let values: Vec<[f64; 2]> = x.iter().map(|&f| modulation(i, f)).collect();
-            series.extend(pair(Some(place.label()), i, &x, &values));
+        for (i, (place, values)) in places.iter().zip(&values).enumerate() {
+            series.extend(pair(Some(place.label()), i, &x, values));
         }
         chart(title, ("cycles per mm", (0.0, reach_per_mm)), series)
     }
@@ -253,6 +274,11 @@ impl Bench<'_> {
         let title = format!("Through focus at {} /mm, {:.0} nm", number(per_mm), self.reference.wavelength_nm());
         chart(&title, ("film moved from the lens, mm", (-reach_mm, reach_mm)), series)
     }
+}
+
+/// Returns the frequencies of a chart, cycles per mm.
+fn frequencies(reach_per_mm: f64) -> impl Iterator<Item = f64> {
+    (0..=STEPS).map(move |step| reach_per_mm * step as f64 / STEPS as f64)
 }
 
 /// Returns a round frequency up to which there is something to see, cycles per mm: where the sharpest field has lost its
