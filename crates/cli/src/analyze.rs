@@ -4,7 +4,7 @@ use std::{fmt::Write, fs};
 
 use anyhow::Context;
 use dioptric_analysis::{
-    AnalysisFields, AnalysisRequest, FieldPlace, FieldRow, LensAnalysis, LensDefaults, LensModulation, LensPageData,
+    AnalysisFields, AnalysisRequest, FieldPlace, FieldRow, LensAnalysis, LensDefaults, LensPageData,
 };
 use dioptric_pipeline::{Staged, parse_directions, parse_pairs};
 use dioptric_report::{AnalysisPlots, DRAWS_PNG, LensPage, chart_svg, write_drawing};
@@ -50,10 +50,8 @@ pub(crate) fn run(arguments: &LensAnalyzeArgs, common: &Common) -> anyhow::Resul
             fs::write(staged.path().join(format!("{name}.csv")), chart.to_csv()).with_context(cannot)?;
         }
         match &shown.modulation {
-            Ok(LensModulation { over_frequency, over_field, through_focus }) => {
-                for (name, chart) in
-                    [("mtf", over_frequency), ("mtf_over_field", over_field), ("mtf_through_focus", through_focus)]
-                {
+            Ok(modulation) => {
+                for (name, chart) in modulation.charts() {
                     write_drawing(&chart_svg(chart, 640.0, 420.0), staged.path(), name, PNG_SCALE)?;
                     fs::write(staged.path().join(format!("{name}.csv")), chart.to_csv()).with_context(cannot)?;
                 }

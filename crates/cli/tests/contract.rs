@@ -120,7 +120,9 @@ fn lens_analyze_has_its_keys_and_leaves_its_plots() {
     let page = fs::read_to_string(folder.path().join("plots/analysis.html")).unwrap();
     assert!(page.contains("Optical path differences") && page.contains("least spot on the axis"));
     assert!(page.contains("Prescription") && page.contains("Modulation over field") && page.contains("Glasses"));
-    for name in ["analysis", "spots", "opd", "distortion", "mtf", "mtf_over_field", "mtf_through_focus"] {
+    for name in
+        ["analysis", "spots", "opd", "distortion", "mtf", "mtf_geometric", "mtf_over_field", "mtf_through_focus"]
+    {
         let file = |extension: &str| fs::read(folder.path().join(format!("plots/{name}.{extension}"))).unwrap();
         assert!(file("svg").starts_with(b"<svg"), "{name}");
         if cfg!(feature = "png") {

@@ -5,11 +5,11 @@ use dioptric_analysis::LineChart;
 
 use crate::{chart_svg, panel::escaped};
 
-const STYLE: &str = include_str!("run/report.css");
-/// Size of a chart, px.
-const CHART_PX: (f64, f64) = (620.0, 380.0);
-/// Charts and tables that are wider than the window scroll in their card.
-const WIDE: &str = "main { max-width: 1480px; } section { overflow-x: auto; }";
+const STYLE: &str = include_str!("page.css");
+/// What its drawings can do where scripts run; without, they are all there too.
+const SCRIPT: &str = include_str!("page.js");
+/// Size of a chart, px: two stand side by side in a window of 1280.
+const CHART_PX: (f64, f64) = (560.0, 360.0);
 
 /// Returns a self-contained page; `body` is HTML, name and source are text.
 pub(crate) fn page(name: &str, source: &str, body: &str) -> String {
@@ -17,8 +17,8 @@ pub(crate) fn page(name: &str, source: &str, body: &str) -> String {
     format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>{name} – dioptric</title>\n\
-         <style>\n{STYLE}{WIDE}\n</style>\n</head>\n<body>\n\
-         <header>\n<h1>{name}</h1>\n<p>{source}</p>\n</header>\n<main>\n{body}</main>\n</body>\n</html>\n"
+         <style>\n{STYLE}</style>\n</head>\n<body>\n\
+         <header>\n<h1>{name}</h1>\n<p>{source}</p>\n</header>\n<main>\n{body}</main>\n<script>\n{SCRIPT}</script>\n</body>\n</html>\n"
     )
 }
 
@@ -32,8 +32,12 @@ pub(crate) fn note(words: &str) -> String {
 
 /// Returns charts two by two, or one under the other where the window is narrow.
 pub(crate) fn charts<'a>(charts: impl IntoIterator<Item = &'a LineChart>) -> String {
-    let drawn: String = charts.into_iter().map(|chart| chart_svg(chart, CHART_PX.0, CHART_PX.1)).collect();
-    format!("<div class=\"pair\">\n{drawn}</div>\n")
+    let card = |chart: &LineChart| {
+        let (svg, csv) = (chart_svg(chart, CHART_PX.0, CHART_PX.1), escaped(&chart.to_csv()));
+        format!("<div>\n{svg}<template>{csv}</template>\n</div>\n")
+    };
+    let drawn: String = charts.into_iter().map(card).collect();
+    format!("<div class=\"charts\">\n{drawn}</div>\n")
 }
 
 /// Returns lines of text as they are.

@@ -91,7 +91,7 @@ impl Panel {
         let down = |value: f64| h * (y_range.1 - value) / (y_range.1 - y_range.0);
         let _ = writeln!(
             svg,
-            "<svg x=\"{x:.1}\" y=\"{y:.1}\" width=\"{width:.1}\" height=\"{height:.1}\" font-size=\"10\">"
+            "<svg x=\"{x:.1}\" y=\"{y:.1}\" width=\"{width:.1}\" height=\"{height:.1}\" font-size=\"11\">"
         );
         let mut text = |x: f64, y: f64, anchor: &str, more: &str, words: &str| {
             let words = escaped(words);
@@ -100,7 +100,7 @@ impl Panel {
                 "<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\" fill=\"#333\" {more}>{words}</text>"
             );
         };
-        text(left + 0.5 * w, top - 7.0, "middle", "font-size=\"11.5\" font-weight=\"bold\"", &self.title);
+        text(left + 0.5 * w, top - 7.0, "middle", "font-size=\"12\" font-weight=\"bold\"", &self.title);
         text(left + 0.5 * w, top + h + 28.0, "middle", "", &self.x_label);
         let turn = format!("transform=\"rotate(-90 11 {:.1})\"", top + 0.5 * h);
         text(11.0, top + 0.5 * h, "middle", &turn, &self.y_label);
@@ -116,8 +116,9 @@ impl Panel {
         // A nested drawing cuts off what lies outside the frame.
         let _ = writeln!(
             svg,
-            "<svg x=\"{left:.1}\" y=\"{top:.1}\" width=\"{w:.1}\" height=\"{h:.1}\">\n\
-             <path d=\"{grid}\" stroke=\"#e4e4e4\" stroke-width=\"0.7\"/>"
+            "<svg x=\"{left:.1}\" y=\"{top:.1}\" width=\"{w:.1}\" height=\"{h:.1}\" {}>\n\
+             <path d=\"{grid}\" stroke=\"#e4e4e4\" stroke-width=\"0.7\"/>",
+            axes_of((x_range, y_range), [&self.title, &self.x_label, &self.y_label])
         );
         let mut axes = String::new();
         if x_range.0 < 0.0 && x_range.1 > 0.0 {
@@ -185,6 +186,15 @@ impl Mark {
         let color = &self.color;
         let _ = writeln!(svg, "<path d=\"{path}\" fill=\"{color}\" shape-rendering=\"crispEdges\"/>");
     }
+}
+
+/// Returns what a page's script knows of a plot: the ranges of its axes, its title and their labels.
+pub(crate) fn axes_of((x, y): ((f64, f64), (f64, f64)), words: [&str; 3]) -> String {
+    let [title, x_label, y_label] = words.map(escaped);
+    format!(
+        "data-x=\"{} {}\" data-y=\"{} {}\" data-title=\"{title}\" data-x-label=\"{x_label}\" data-y-label=\"{y_label}\"",
+        x.0, x.1, y.0, y.1
+    )
 }
 
 pub(crate) fn escaped(text: &str) -> String {

@@ -2,12 +2,12 @@
 
 use std::fmt::Write;
 
-use dioptric_analysis::{Corner, LineChart, Series};
+use dioptric_analysis::{Corner, LineChart, Scale, Series};
 
 use crate::{
     axis::Axis,
     lettering::{FONT, Weight, width_px},
-    panel::{Mark, MarkKind, escaped},
+    panel::{Mark, MarkKind, axes_of, escaped},
 };
 
 /// Sizes of title, axis labels and the rest, px.
@@ -89,8 +89,12 @@ impl Frame {
         };
         let middle = (left + 0.5 * width, top + 0.5 * height);
         let (label, x) = (format!(" font-size=\"{LABEL_PX}\""), self.y_label_px);
-        let title = format!(" font-size=\"{TITLE_PX}\" font-weight=\"600\"");
-        text((middle.0, 8.0 + TITLE_PX), "middle", &title, &chart.title);
+        // A long title is written smaller, as far as it can be read, and stays within the chart.
+        let (wide, room) = (width_px(&chart.title, TITLE_PX, Weight::Bold), left + width);
+        let title_px = (TITLE_PX * room / wide).clamp(WORD_PX, TITLE_PX);
+        let half = 0.5 * wide * title_px / TITLE_PX;
+        let title = format!(" font-size=\"{title_px:.1}\" font-weight=\"600\"");
+        text((middle.0.min(room - half).max(half), 8.0 + TITLE_PX), "middle", &title, &chart.title);
         text((middle.0, top + height + 36.0), "middle", &label, &chart.x_label);
         let turned = format!("{label} transform=\"rotate(-90 {x:.1} {:.1})\" dominant-baseline=\"central\"", middle.1);
         text((x, middle.1), "middle", &turned, &chart.y_label);
@@ -108,13 +112,19 @@ impl Frame {
         // A nested drawing cuts off what lies outside the frame.
         let _ = writeln!(
             svg,
-            "<svg x=\"{left:.1}\" y=\"{top:.1}\" width=\"{width:.1}\" height=\"{height:.1}\">\n\
-             <path d=\"{grid}\" stroke=\"#e2e5ea\" stroke-width=\"0.8\"/>"
+            "<svg x=\"{left:.1}\" y=\"{top:.1}\" width=\"{width:.1}\" height=\"{height:.1}\" {}{}>\n\
+             <path d=\"{grid}\" stroke=\"#e2e5ea\" stroke-width=\"0.8\"/>",
+            axes_of((chart.x_range, chart.y_range), [&chart.title, &chart.x_label, &chart.y_label]),
+            if chart.scale == Scale::Logarithmic { " data-log=\"\"" } else { "" }
         );
+        let mut name = "";
         for series in &chart.series {
+            name = series.label.as_deref().unwrap_or(name);
+            let _ = writeln!(svg, "<g data-name=\"{}\">", escaped(name));
             let points = series.points.iter().map(|point| self.place(*point)).collect();
             let kind = if series.is_dashed { MarkKind::Dashed } else { MarkKind::Line };
             Mark { color: series.color.clone(), kind, points }.draw(&|x| x, &|y| y, svg);
+            svg.push_str("</g>\n");
         }
         let _ = writeln!(
             svg,
@@ -220,7 +230,6 @@ fn wide(words: &str) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dioptric_analysis::Scale;
 
     fn chart(points: Vec<(f64, f64)>) -> LineChart {
         LineChart {

@@ -3,7 +3,11 @@
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 use dioptric_diffraction::{TransferFunction, TransferQuality};
-use dioptric_optics::{Lens, MonoLens, glam::DVec2};
+use dioptric_optics::{
+    Lens, MonoLens,
+    analysis::{PupilLight, PupilRule},
+    glam::DVec2,
+};
 use rayon::prelude::*;
 
 use super::afocal::AfocalView;
@@ -20,6 +24,10 @@ const STEPS: usize = 60;
 const EACH: usize = 2;
 /// Steps of the film to each side of its place.
 const FOCUS_STEPS: i32 = 10;
+/// Rings of rays of a geometric modulation: so many, and more for each period that the blur reaches from its middle.
+const FEWEST_RINGS: usize = 12;
+const RINGS_A_TURN: f64 = 2.0;
+const MOST_RINGS: usize = 120;
 /// Where a modulation counts as lost.
 const LOST: f64 = 0.1;
 /// The color of the diffraction limit.
@@ -33,10 +41,24 @@ const LIMIT_COLOR: &str = "#888888";
 pub struct LensModulation {
     /// Over frequency, of each field; and of a lens without aberrations with the pupil of the first, at the reference wavelength.
     pub over_frequency: LineChart,
+    /// The same by rays alone, as if light had no wavelength.
+    pub geometric: LineChart,
     /// Over field, at three frequencies.
     pub over_field: LineChart,
     /// As the film moves, at the middle one of these and the reference wavelength.
     pub through_focus: LineChart,
+}
+
+impl LensModulation {
+    /// Returns the charts, each with the name of its file.
+    pub fn charts(&self) -> [(&'static str, &LineChart); 4] {
+        [
+            ("mtf", &self.over_frequency),
+            ("mtf_geometric", &self.geometric),
+            ("mtf_over_field", &self.over_field),
+            ("mtf_through_focus", &self.through_focus),
+        ]
+    }
 }
 
 impl LensAnalysis {
@@ -67,12 +89,13 @@ impl LensAnalysis {
         let frequencies = round_frequencies(reach_per_mm);
         let charts = [
             bench.over_frequency(&fields, &at_fields, reach_per_mm),
+            bench.geometric(&fields, &at_fields, reach_per_mm),
             bench.over_field(frequencies),
             bench.through_focus(&fields, frequencies[1]),
         ];
-        let [over_frequency, over_field, through_focus] =
+        let [over_frequency, geometric, over_field, through_focus] =
             if self.afocal.is_some() { charts.map(AfocalView::chart_in_angles) } else { charts };
-        Ok(LensModulation { over_frequency, over_field, through_focus })
+        Ok(LensModulation { over_frequency, geometric, over_field, through_focus })
     }
 }
 
@@ -139,18 +162,71 @@ impl Bench<'_> {
     }
 
     fn over_frequency(&self, places: &[FieldPlace], lights: &[FieldLight], reach_per_mm: f64) -> LineChart {
-        let x: Vec<f64> = (0..=STEPS).map(|step| reach_per_mm * step as f64 / STEPS as f64).collect();
+        let of_light = |light: &FieldLight| frequencies(reach_per_mm).map(|f| light.modulation(f)).collect();
+        let values = lights.iter().map(of_light).collect();
+        self.of_fields("Modulation over frequency", (places, lights), reach_per_mm, values)
+    }
+
+    /// Returns the modulation of the rays of each field, all wavelengths together.
+    fn geometric(&self, places: &[FieldPlace], lights: &[FieldLight], reach_per_mm: f64) -> LineChart {
+        let of_field = |(place, light): (&FieldPlace, &FieldLight)| {
+            let rays = self.rays(place, reach_per_mm);
+            let total: f64 = rays.iter().map(|(_, share)| share).sum();
+            let of_direction = |direction: f64| {
+                let step_per_mm = DVec2::from_angle(direction) * (reach_per_mm / STEPS as f64);
+                let turn = |(at_mm, share): &(DVec2, f64)| {
+                    (DVec2::new(*share, 0.0), DVec2::from_angle(TAU * step_per_mm.dot(*at_mm)))
+                };
+                let mut waves: Vec<(DVec2, DVec2)> = rays.iter().map(turn).collect();
+                let at_step = |_| {
+                    let sum: DVec2 = waves.iter().map(|(wave, _)| *wave).sum();
+                    waves.iter_mut().for_each(|(wave, turn)| *wave = turn.rotate(*wave));
+                    sum.length() / total
+                };
+                (0..=STEPS).map(at_step).collect::<Vec<f64>>()
+            };
+            let [tangential, sagittal] = light.directions().map(of_direction);
+            tangential.into_iter().zip(sagittal).map(|(t, s)| [t, s]).collect()
+        };
+        let values = places.par_iter().zip(lights).map(of_field).collect();
+        self.of_fields("Geometric modulation, by rays alone", (places, lights), reach_per_mm, values)
+    }
+
+    /// Returns where the rays of a field land at all wavelengths, mm, and their shares: as many as resolve their waves.
+    fn rays(&self, place: &FieldPlace, reach_per_mm: f64) -> Vec<(DVec2, f64)> {
+        let film_mm = self.analysis.film_distance_mm;
+        let point = Field::of_place(place).point(&self.reference, self.dioptres);
+        let of_lens = |(lens, weight): (&MonoLens, &f64)| {
+            let traced = |n_rings| PupilLight::to_film(lens, &point, film_mm, PupilRule::of_rings(n_rings));
+            let few = traced(FEWEST_RINGS)?;
+            let (centroid_mm, _) = few.moments(lens, film_mm);
+            let reach_mm = few.on_film(lens, film_mm).map(|(at_mm, _)| at_mm.distance(centroid_mm)).fold(0.0, f64::max);
+            let n_rings = FEWEST_RINGS + (RINGS_A_TURN * reach_mm * reach_per_mm).ceil() as usize;
+            let light = if n_rings > FEWEST_RINGS { traced(n_rings.min(MOST_RINGS))? } else { few };
+            Some(light.on_film(lens, film_mm).map(|(at_mm, share)| (at_mm, share * weight)).collect::<Vec<_>>())
+        };
+        self.lenses.iter().zip(&self.weights).filter_map(of_lens).flatten().collect()
+    }
+
+    /// Returns a chart of the modulations of each field over frequency, and the diffraction limit.
+    fn of_fields(
+        &self,
+        title: &str,
+        (places, lights): (&[FieldPlace], &[FieldLight]),
+        reach_per_mm: f64,
+        values: Vec<Vec<[f64; 2]>>,
+    ) -> LineChart {
+        let x: Vec<f64> = frequencies(reach_per_mm).collect();
         let mut series = Vec::new();
         if let Some((limit, light)) = lights.iter().find_map(|light| Some((light.limit.as_ref()?, light))) {
             let points = x.iter().map(|&f| (f, limit.modulation(light.meridian_rad, f))).collect();
             let label = format!("diffraction limit at {:.0} nm", self.reference.wavelength_nm());
             series.push(Series { label: Some(label), color: LIMIT_COLOR.to_owned(), points, is_dashed: false });
         }
-        for (i, (place, light)) in places.iter().zip(lights).enumerate() {
-            let values: Vec<[f64; 2]> = x.iter().map(|&f| light.modulation(f)).collect();
-            series.extend(pair(Some(place.label()), i, &x, &values));
+        for (i, (place, values)) in places.iter().zip(&values).enumerate() {
+            series.extend(pair(Some(place.label()), i, &x, values));
         }
-        chart("Modulation over frequency", ("cycles per mm", (0.0, reach_per_mm)), series)
+        chart(title, ("cycles per mm", (0.0, reach_per_mm)), series)
     }
 
     fn over_field(&self, frequencies: [f64; 3]) -> LineChart {
@@ -198,6 +274,11 @@ impl Bench<'_> {
         let title = format!("Through focus at {} /mm, {:.0} nm", number(per_mm), self.reference.wavelength_nm());
         chart(&title, ("film moved from the lens, mm", (-reach_mm, reach_mm)), series)
     }
+}
+
+/// Returns the frequencies of a chart, cycles per mm.
+fn frequencies(reach_per_mm: f64) -> impl Iterator<Item = f64> {
+    (0..=STEPS).map(move |step| reach_per_mm * step as f64 / STEPS as f64)
 }
 
 /// Returns a round frequency up to which there is something to see, cycles per mm: where the sharpest field has lost its
@@ -262,6 +343,8 @@ fn round_frequencies(reach_per_mm: f64) -> [f64; 3] {
 mod tests {
     use std::f64::consts::PI;
 
+    use dioptric_diffraction::airy::bessel_j;
+
     use super::*;
     use crate::{AnalysisFields, AnalysisFilm, AnalysisRequest};
 
@@ -293,6 +376,30 @@ mod tests {
         let best = focus.iter().max_by(|a, b| a.1.total_cmp(&b.1)).unwrap();
         assert!(best.0.abs() < 1e-12, "{best:?}");
         assert_eq!((found.over_field.series.len(), found.over_frequency.series.len()), (6, 5));
+    }
+
+    #[test]
+    fn geometric_modulation_of_defocus_is_that_of_an_even_disc() {
+        let lens = Lens::thin(50.0, 5.0).unwrap();
+        let request = AnalysisRequest {
+            fields: AnalysisFields::above_axis_deg(&[0.0]),
+            wavelengths_nm: vec![500.0],
+            main_wavelength_nm: None,
+            distance_mm: f64::INFINITY,
+            film: AnalysisFilm::FilmMm(50.5),
+            n_rings: 6,
+        };
+        let found = request.compute(&lens).unwrap().modulation(&lens, &[]).unwrap();
+        // Half a millimetre behind the focus of f/10.
+        let radius_mm = 0.5 / 20.0;
+        for line in &found.geometric.series[1..] {
+            for &(per_mm, modulation) in &line.points {
+                let x = TAU * per_mm * radius_mm;
+                let expected = if x == 0.0 { 1.0 } else { (2.0 * bessel_j(1, x) / x).abs() };
+                assert!((modulation - expected).abs() < 1e-9, "{per_mm}: {modulation} {expected}");
+            }
+        }
+        assert_eq!(found.charts()[1].0, "mtf_geometric");
     }
 
     #[test]

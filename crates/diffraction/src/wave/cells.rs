@@ -160,7 +160,8 @@ impl PupilCells {
             let (Some(along_x), Some(along_y)) = (slopes(DVec2::X)?, slopes(DVec2::Y)?) else { return Ok(None) };
             for ((x, y), area) in along_x.iter().zip(&along_y).zip(&self.areas_mm2[nodes.clone()]) {
                 let jacobian = x.perp_dot(*y);
-                if !(jacobian * *first.get_or_insert(jacobian) > 0.0) {
+                let is_one_to_one = jacobian * *first.get_or_insert(jacobian) > 0.0;
+                if !is_one_to_one {
                     return Ok(None);
                 }
                 areas.push(jacobian.abs() * area);

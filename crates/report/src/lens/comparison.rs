@@ -37,17 +37,12 @@ impl LensComparisonPage<'_> {
         body += &section("Curves of both", &(curves + &note(&words)));
         let modulations = self.pages.map(|page| page.shown.modulation.as_ref().ok());
         if let [Some(one), Some(other)] = modulations {
-            let pairs = [
-                (&one.over_frequency, &other.over_frequency),
-                (&one.over_field, &other.over_field),
-                (&one.through_focus, &other.through_focus),
-            ];
+            let pairs = one.charts().into_iter().zip(other.charts()).map(|((_, one), (_, other))| (one, other));
             let named = |chart: &LineChart, name: &str| LineChart {
                 title: format!("{name}: {}", chart.title),
                 ..chart.clone()
             };
             let charts: Vec<LineChart> = pairs
-                .into_iter()
                 .flat_map(|(one, other)| {
                     let reach = one.x_range.1.max(other.x_range.1);
                     let wide = |chart: LineChart| LineChart {

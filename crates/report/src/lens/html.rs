@@ -34,10 +34,10 @@ impl LensPage<'_> {
         body += &section("First order", &self.first_order());
         body += &section("Third order", &self.third_order());
         if let Ok(modulation) = &self.shown.modulation {
-            let charts = page::charts([&modulation.over_frequency, &modulation.over_field, &modulation.through_focus]);
+            let charts = page::charts(modulation.charts().map(|(_, chart)| chart));
             let words = "Tangential (solid): lines across the plane of axis and field, a wave along the radius. Sagittal \
                          (dashed): lines along it. By the waves of all wavelengths together; where the blur is too large for \
-                         that, by HURB.";
+                         that, by HURB. Geometric: by rays alone, which leave more than the diffraction limit where a lens is good.";
             body += &section("Modulation", &(charts + &note(words)));
         }
         let curves = page::charts(self.shown.curves.0.iter().map(|(_, chart)| chart));

@@ -2,14 +2,14 @@
 
 use std::fmt::Write;
 
-use dioptric_analysis::{LineChart, PixelPlace, Run, RunCharts, RunPlaces, RunReport, RunTimes};
+use dioptric_analysis::{PixelPlace, Run, RunCharts, RunPlaces, RunReport, RunTimes};
 use dioptric_sensor::WhiteBalance;
 
-use crate::{PsfMosaic, chart_svg, panel::escaped};
-
-const STYLE: &str = include_str!("report.css");
-/// Width and height of a plot, pixels.
-const CHART: (f64, f64) = (560.0, 340.0);
+use crate::{
+    PsfMosaic,
+    page::{self, section},
+    panel::escaped,
+};
 
 /// Everything that the page shows.
 pub(super) struct Page<'a> {
@@ -41,8 +41,6 @@ pub(super) struct Pictures {
 /// Returns the page.
 pub(super) fn write_page(page: &Page<'_>, pictures: &Pictures) -> String {
     let report = page.report;
-    let name = escaped(&report.camera.name);
-    let head = [&report.lens.lens, &report.sensor.sensor, &report.scene.name].map(|words| escaped(words)).join(" · ");
     // A picture of few pixels is shown larger, so that they can be seen.
     let small = if report.film.columns < 240 { " class=\"small\"" } else { "" };
     let body = [
@@ -63,28 +61,12 @@ pub(super) fn write_page(page: &Page<'_>, pictures: &Pictures) -> String {
             escaped(&page.run.capture.camera.to_ron())
         ),
     ];
-    format!(
-        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
-         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>{name} – dioptric</title>\n\
-         <style>\n{STYLE}</style>\n</head>\n<body>\n<header>\n<h1>{name}</h1>\n<p>{head} · dioptric {}</p>\n</header>\n\
-         <main>\n{}</main>\n</body>\n</html>\n",
-        report.dioptric,
-        body.concat()
-    )
-}
-
-fn section(title: &str, inside: &str) -> String {
-    format!("<section>\n<h2>{title}</h2>\n{inside}</section>\n")
+    let head = [&report.lens.lens, &report.sensor.sensor, &report.scene.name].map(String::as_str).join(" · ");
+    page::page(&report.camera.name, &format!("{head} · dioptric {}", report.dioptric), &body.concat())
 }
 
 fn note(words: &str) -> String {
     format!("<p class=\"note\">{words}</p>\n")
-}
-
-/// Returns drawings side by side.
-fn pair(charts: [&LineChart; 2]) -> String {
-    let [left, right] = charts.map(|chart| chart_svg(chart, CHART.0, CHART.1));
-    format!("<div class=\"pair\">\n{left}{right}</div>\n")
 }
 
 /// Returns a table with its first column to the left and the others to the right.
@@ -178,7 +160,7 @@ fn spreads(page: &Page<'_>, (mosaic, src): &(PsfMosaic, String)) -> String {
          to the left.",
         page.report.film.pitch_um, page.report.lens.first_order.wavelength_nm
     ));
-    html + &pair([&page.charts.lsf, &page.charts.mtf])
+    html + &page::charts([&page.charts.lsf, &page.charts.mtf])
 }
 
 fn field(page: &Page<'_>) -> String {
@@ -193,7 +175,7 @@ fn field(page: &Page<'_>) -> String {
     });
     let words = "Shares of the light that enters the disc of the front rim from a point at the distance in focus. \
                  Vignetting is what is left of the light that the stop alone would pass.";
-    pair([&page.charts.illumination, &page.charts.distortion]) + &table(&heads, rows) + &note(words)
+    page::charts([&page.charts.illumination, &page.charts.distortion]) + &table(&heads, rows) + &note(words)
 }
 
 fn irradiance(page: &Page<'_>, pictures: &Pictures) -> String {
@@ -205,7 +187,7 @@ fn irradiance(page: &Page<'_>, pictures: &Pictures) -> String {
     if !pictures.depth.is_empty() {
         html += &figure(&pictures.depth, "depth of the scene, near is bright");
     }
-    html + "</div>\n" + &pair([&page.charts.spectrum, &page.charts.histogram])
+    html + "</div>\n" + &page::charts([&page.charts.spectrum, &page.charts.histogram])
 }
 
 fn sensor(report: &RunReport, pictures: &Pictures) -> String {

@@ -33,7 +33,7 @@ pub(in crate::ui) fn show(ui: &mut Ui, answer: &LensAnswer) {
         row(ui, "Over the field", |ui| curves(ui, analysis, width));
         if let Some(modulation) = &answer.modulation {
             row(ui, "Modulation", |ui| {
-                for chart in [&modulation.over_frequency, &modulation.over_field, &modulation.through_focus] {
+                for (_, chart) in modulation.charts() {
                     ui.allocate_ui(vec2(width, HEIGHT), |ui| line_chart(ui, chart));
                 }
             });
