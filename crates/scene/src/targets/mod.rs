@@ -217,6 +217,14 @@ impl TargetLight {
             Self::Illuminant(illuminant) => illuminant.spectrum(),
         }
     }
+
+    /// Returns the relative spectral power in each band.
+    fn on_bands(&self, grid: &WavelengthGrid) -> Vec<f64> {
+        match self {
+            Self::EqualEnergy | Self::EqualPhotons => self.spectrum().sample_held(grid),
+            Self::Illuminant(illuminant) => illuminant.on_bands(grid),
+        }
+    }
 }
 
 /// A flat target that faces the camera.
