@@ -75,6 +75,19 @@ fn read_light(path: &Path) -> Result<Illuminant, PipelineError> {
             comment.trim_start_matches('#').trim()
         )));
     }
+    // A power a frequency, or in decibels, is none a nanometre.
+    let is_other = |name: &String| {
+        let lower = name.to_lowercase();
+        ["dbm", "decibel", "log("].iter().any(|of| lower.contains(of))
+            || lower.ends_with("hz")
+            || lower.contains("hz-1")
+            || lower.contains("hz^-1")
+    };
+    if let Some(name) = names.get(1).filter(|name| is_other(name)) {
+        return Err(unreadable(format!(
+            "its column '{name}' is no power a nanometre, expected such (W/nm) or photons"
+        )));
+    }
     if counts_photons {
         values.iter_mut().zip(&wavelengths_nm).for_each(|(value, nm)| *value /= nm);
     }
@@ -111,6 +124,9 @@ mod tests {
             ("nm, a, b\n400, 1, 2\n700, 1, 2\n", "3 columns"),
             ("waves (zorp), a\n400, 1\n700, 1\n", "'zorp'"),
             ("400, 1\n500; 2\n", "line 2"),
+            ("nm,dBm\n400, -1\n500, -2\n", "'dBm' is no power"),
+            ("nm,W m-2 Hz-1\n400, 1\n500, 2\n", "Hz-1' is no power"),
+            ("Light in photons\nnm, a\n400, 1\n500, 2\n", "photons"),
             ("400, 1\n400, 2\n", "400"),
         ] {
             let message = read(text).unwrap_err().to_string();

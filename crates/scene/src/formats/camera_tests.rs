@@ -123,6 +123,10 @@ fn other_programs_are_read() {
     let ros = "image_width: 640\nimage_height: 480\ncamera_matrix:\n  rows: 3\n  cols: 3\n  data: [525, 0, 319.5, 0, \
                526, 239.5, 0, 0, 1]\ndistortion_model: equidistant\ndistortion_coefficients:\n  rows: 1\n  cols: 4\n  \
                data: [0.1, 0, 0.2, 0]\nrectification_matrix:\n  rows: 3\n  cols: 3\n  data: [1, 0, 0, 0, 1, 0, 0, 0, 1]\n";
+    // As PyYAML sorts and writes it.
+    let dumped = "camera_matrix:\n  cols: 3\n  data:\n  - 525.0\n  - 0\n  - 319.5\n  - 0\n  - 526.0\n  - 239.5\n  - 0\n  - 0\n  - 1\n  \
+                  rows: 3\nimage_height: 480\nimage_width: 640\n";
+    same(dumped, None);
     let fisheye = Distortion::Fisheye([0.1, 0.0, 0.2, 0.0]);
     assert_eq!(same(ros, None), fisheye);
     assert_eq!(same("1 OPENCV_FISHEYE 640 480 525 526 320 240 0.1 0 0.2 0", None), fisheye);

@@ -174,6 +174,10 @@ fn yaml_entries(text: &str) -> Result<Vec<(String, String)>, String> {
         }
         let entry = match (key.trim(), &matrix) {
             ("rows" | "cols" | "dt", Some(_)) => continue,
+            // Behind its data, as PyYAML sorts keys.
+            ("rows" | "cols" | "dt", None) if entries.last().is_some_and(|(_, own)| own.ends_with(']')) => continue,
+            // A list with an item a line follows.
+            ("data", Some(_)) if value.is_empty() => continue,
             ("data", Some(name)) => {
                 let name = name.clone();
                 matrix = None;

@@ -8,7 +8,7 @@ use super::{
     contents::{MATLAB_OR_HDF5, is_of},
     exr_depth_file::{DepthChannel, read_depth_exr},
     gray_picture::{GrayPicture, read_gray},
-    length_unit::{length_in_name, length_m},
+    length_unit::{length_in_name, length_m, words_of_name},
     mat::{Plane, read_plane},
     npy::{NpyArray, read_npy},
     npz::read_npz_plane,
@@ -127,52 +127,55 @@ pub(super) fn depth_numbers(path: &Path, told: Option<&str>) -> Result<Noted<Dep
     Ok(Noted::new(numbers, notes))
 }
 
-/// Returns the words of a name, as `inv`, `depth` and `mm` of `invDepth_mm`, in small letters.
-fn words_of(name: &str) -> Vec<String> {
-    let mut apart = String::new();
-    for c in name.chars() {
-        // A capital behind a small letter begins a word.
-        if c.is_uppercase() && apart.ends_with(char::is_lowercase) {
-            apart.push(' ');
-        }
-        apart.push(c);
-    }
-    apart.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty()).map(str::to_lowercase).collect()
-}
-
 /// Whether distances are counted from the camera by the name of their file, their array or channel, or the words that the file has for it.
 fn is_radial(stem: &str, name: &str, called: &str) -> bool {
     const RAYS: [&str; 7] = ["ray", "rays", "radial", "euclidean", "slant", "sight", "range"];
     const DISTANCES: [&str; 3] = ["distance", "distances", "dist"];
     let last = name.rsplit('/').next().unwrap_or(name);
-    let ([stem, name], lower) = ([stem, last].map(words_of), called.to_lowercase());
-    let called = words_of(called);
+    let ([stem, name], lower) = ([stem, last].map(words_of_name), called.to_lowercase());
+    let called = words_of_name(called);
     let is_in = |words: &[String], known: &[&str]| words.iter().any(|own| known.contains(&own.as_str()));
     let is_last = |words: &[String], known: &[&str]| words.last().is_some_and(|own| known.contains(&own.as_str()));
-    if is_in(&called, &["axis", "axial", "planar", "perpendicular"]) || is_in(&name, &["axial", "planar"]) {
+    let says = |words: &[String], known: &[&str]| words.windows(known.len()).any(|own| own == known);
+    let is_axial = |words: &[String]| is_in(words, &["axial", "planar"]) || says(words, &["image", "plane"]);
+    if is_in(&called, &["axis", "perpendicular"]) || [&stem, &name, &called].into_iter().any(|own| is_axial(own)) {
         return false;
     }
     is_in(&name, &RAYS)
         || is_in(&name, &DISTANCES)
         || is_in(&called, &RAYS)
         || ["distance from ", "distance to "].iter().any(|start| lower.contains(start))
+        // AirSim's.
+        || [&stem, &name].into_iter().any(|own| says(own, &["depth", "perspective"]))
         // Files may be called after what they show.
         || is_in(&stem, &["radial", "euclidean"])
+        || [["to", "camera"], ["from", "camera"], ["ray", "length"], ["ray", "depth"], ["depth", "ray"]]
+            .iter()
+            .any(|own| says(&stem, own))
         || is_last(&stem, &DISTANCES)
         || is_last(&stem, &["range"])
 }
 
 /// Returns what is asked for where words speak of what is no length.
 fn lacks_length(words: &str) -> Option<&'static str> {
-    let (lower, own) = (words.to_lowercase(), words_of(words));
+    let (lower, own) = (words.to_lowercase(), words_of_name(words));
     let has = |word: &str| own.iter().any(|own| own == word);
     if has("mist") {
         return Some(
             "its name says that it is a mist, whose numbers are no lengths: expected the pass of depth (Z), or --depth-unit or --depth-kind",
         );
     }
-    let is_inverse = lower.contains("inverse") || ["inv", "idepth", "invdepth", "reciprocal"].into_iter().any(has);
-    (lower.contains("disparit") || has("disp") || is_inverse).then_some(
+    let of_depth = own.iter().any(|own| own.contains("depth"));
+    let is_other = ["log", "relative", "rel", "norm", "normalized", "normalised"].into_iter().any(has) && of_depth;
+    if is_other || ["diopter", "diopters", "dioptre", "dioptres"].into_iter().any(has) {
+        return Some(
+            "its name or words say that its numbers are no lengths, but logarithms, shares or dioptres: expected --depth-unit or --depth-kind, as \
+             inverse of dioptres",
+        );
+    }
+    const INVERSE: [&str; 5] = ["inv", "idepth", "invdepth", "depthinv", "reciprocal"];
+    let is_inverse = lower.contains("inverse") || INVERSE.into_iter().any(has);
+    (lower.contains("disparit") || has("disp") || has("dispmap") || is_inverse).then_some(
         "its name or words say that it holds disparities or inverse distances: expected --depth-kind, as disparity:BASELINE_M or inverse",
     )
 }

@@ -27,7 +27,7 @@ pub(super) fn in_nm(unit: &str, numbers: &[f64]) -> Option<Vec<f64>> {
         }
         "mm" | "millimeters" | "millimeter" | "millimetres" | "millimetre" => times(1e6),
         "m" | "meters" | "meter" | "metres" | "metre" => times(1e9),
-        "angstroms" | "angstrom" | "ångström" | "å" | "a" => times(0.1),
+        "angstroms" | "angstrom" | "ångström" | "å" | "aa" | "a" => times(0.1),
         "wavenumber" | "cm-1" | "cm^-1" | "cm⁻¹" | "1/cm" => over(1e7),
         "hz" => over(NM_PER_S),
         "ghz" => over(1e-9 * NM_PER_S),
@@ -60,7 +60,11 @@ pub(super) fn listed_nm(name: &str, unit: Option<&str>, numbers: &[f64]) -> Resu
 }
 
 fn list_of(name: &str, unit: Option<&str>, numbers: &[f64], or: &str) -> Result<Option<Vec<f64>>, String> {
-    let Some(unit) = unit else {
+    // A letter that may also tell one camera from another.
+    let last = name.trim_end_matches([']', ')']).rsplit(['_', '[', '(', ' ']).next();
+    let is_angstrom =
+        last == Some("A") && numbers.iter().all(|number| (1500.0..PLAUSIBLE_NM.end() * 10.0).contains(number));
+    let Some(unit) = unit.or(is_angstrom.then_some("A")) else {
         if are_counted(numbers) {
             return Ok(None);
         }
@@ -92,7 +96,17 @@ fn list_of(name: &str, unit: Option<&str>, numbers: &[f64], or: &str) -> Result<
 pub(super) fn unit_in(name: &str) -> Option<&str> {
     // Single letters are in too many names.
     let is_unit = |word: &&str| (word.chars().count() > 1 || *word == "Å") && in_nm(word, &[]).is_some();
-    Some(name.trim()).filter(is_unit).or_else(|| name.rsplit(['/', '_', ' ', '-', ',', '\t']).find(is_unit))
+    const BETWEEN: [char; 11] = ['/', '_', ' ', '-', ',', '\t', '[', ']', '(', ')', '.'];
+    // A capital behind a small letter begins a word.
+    let behind = |word: &&str| {
+        let starts = word.char_indices().zip(word.chars().skip(1));
+        let starts = starts.filter(|((_, a), b)| a.is_lowercase() && b.is_uppercase());
+        starts.last().map(|((at, a), _)| at + a.len_utf8())
+    };
+    Some(name.trim())
+        .filter(is_unit)
+        .or_else(|| name.rsplit(BETWEEN).find(is_unit))
+        .or_else(|| name.rsplit(BETWEEN).find_map(|word| Some(&word[behind(&word)?..]).filter(is_unit)))
 }
 
 /// Returns the wavelengths, nm, of the column of a table, as the unit in its name says (`wavelength_nm`, `Wavelength (µm)`, `cm^-1`) or, where
@@ -184,6 +198,11 @@ mod tests {
             ("wavenumber (1/cm)", 20_000.0),
             ("Wavelength Å", 5000.0),
             ("Wavelength angstrom", 5000.0),
+            ("wavelengthAngstrom", 5000.0),
+            ("wavelengths_A", 5000.0),
+            ("wavelengths_A", 500.0),
+            ("wavelength_AA", 5000.0),
+            ("wavelength[A]", 5000.0),
             ("wavelength", 0.5),
             ("", 500.0),
         ] {

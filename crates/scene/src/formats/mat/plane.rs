@@ -7,7 +7,7 @@ use ndarray::Array2;
 use super::{
     super::{
         axes,
-        length_unit::{length_in_name, length_in_words, length_m},
+        length_unit::{length_in_name, length_in_words, length_m, words_of_name},
         stated::{Noted, note_of},
         unusable::unreadable,
     },
@@ -24,8 +24,11 @@ pub(in super::super) const DEPTHS: [&str; 9] =
 
 /// Whether an array is called so, or so with a unit of length behind, as `depth_mm`.
 pub(in super::super) fn is_called(name: &str, wanted: &str) -> bool {
-    let bare = length_in_name(name).and_then(|_| name.rsplit_once(['_', '-', ' ', '.'])).map(|(bare, _)| bare);
-    [Some(name), bare].into_iter().flatten().any(|own| own.eq_ignore_ascii_case(wanted))
+    let bare = || {
+        let words = words_of_name(name);
+        words.into_iter().filter(|word| length_m(word).is_none() && word != "in").collect::<Vec<_>>().join("_")
+    };
+    name.eq_ignore_ascii_case(wanted) || length_in_name(name).is_some() && bare() == wanted
 }
 
 /// A plane of numbers.
