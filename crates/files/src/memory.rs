@@ -55,9 +55,10 @@ pub fn file_bytes(length: u64) -> u64 {
 /// More memory than a file may take.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "it would take {} of memory and may take {}: allow it more (--memory, in Python memory=)",
+    "it would take {} of memory and may take {}: allow the program {} MiB or more (--memory, in Python memory=)",
     shown(*bytes),
-    shown(*limit)
+    shown(*limit),
+    bytes.saturating_add(PROGRAM_BYTES).div_ceil(1 << 20)
 )]
 pub struct TooLarge {
     /// What it would take, bytes.
@@ -116,7 +117,8 @@ mod tests {
         let refused = check(500 << 20, 1 << 40).unwrap_err();
         assert_eq!(
             refused.to_string(),
-            "it would take 500.0 MiB of memory and may take 464.0 MiB: allow it more (--memory, in Python memory=)"
+            "it would take 500.0 MiB of memory and may take 464.0 MiB: allow the program 548 MiB or more (--memory, in \
+             Python memory=)"
         );
         allow(None);
         // A small file gets little, a large one what the machine has to give.

@@ -46,18 +46,20 @@ fn has_zeros_at(bytes: &[u8], place: usize) -> bool {
 /// Returns a table with commas between its columns and points in its numbers, line by line, where semicolons or tabs stand between them
 /// (then commas may be in the numbers), as spreadsheets of half the world write it.
 pub fn with_commas(table: &str) -> Cow<'_, str> {
-    let is_comment = |line: &str| line.starts_with('#') || line.is_empty();
     // What Excel puts first.
     let (named, rest) = match table.split_once('\n') {
         Some((first, rest)) if first.trim_end().len() == 5 && first.starts_with("sep=") => (first.chars().nth(4), rest),
         _ => (None, table),
     };
+    let untitled = without_title(rest);
+    let rest = untitled.as_ref();
     let is_between = |sign: char| {
         let mut lines = rest.lines().map(str::trim).filter(|line| !is_comment(line)).peekable();
         lines.peek().is_some() && lines.all(|line| line.contains(sign))
     };
     let Some(between) = [';', '\t'].into_iter().find(|sign| is_between(*sign)) else {
-        return if named.is_some() { format!("#\n{rest}").into() } else { table.into() };
+        let table = without_last_sign(rest);
+        return if named.is_some() { format!("#\n{table}").into() } else { table.into_owned().into() };
     };
     let cell = |cell: &str| {
         let number = cell.trim().replace(',', ".");
@@ -72,7 +74,45 @@ pub fn with_commas(table: &str) -> Cow<'_, str> {
         false => line.split(between).map(cell).collect::<Vec<_>>().join(","),
     };
     let start = if named.is_some() { "#\n" } else { "" };
-    (start.to_owned() + &rest.lines().map(line).collect::<Vec<_>>().join("\n")).into()
+    let table = start.to_owned() + &rest.lines().map(line).collect::<Vec<_>>().join("\n");
+    without_last_sign(&table).into_owned().into()
+}
+
+/// Whether a line of a table is none of it.
+fn is_comment(line: &str) -> bool {
+    line.starts_with('#') || line.is_empty()
+}
+
+/// Makes a comment of a title, as spreadsheets have it: a first line without what stands between cells, before names of columns.
+fn without_title(table: &str) -> Cow<'_, str> {
+    let mut lines = table.lines().filter(|line| !is_comment(line.trim()));
+    let (Some(title), Some(names)) = (lines.next(), lines.next()) else { return table.into() };
+    let Some(between) = [';', '\t', ','].into_iter().find(|sign| names.contains(*sign)) else { return table.into() };
+    let first = names.split(between).next().unwrap_or_default().trim().replace(',', ".");
+    let is_title = !title.trim_end_matches(between).contains(between)
+        && first.parse::<f64>().is_err()
+        && lines.next().is_some_and(|line| line.contains(between));
+    if is_title { table.replacen(title, &format!("# {title}"), 1).into() } else { table.into() }
+}
+
+/// Takes the comma off the ends of lines where all end in one, or all but the first, which has as many cells without.
+fn without_last_sign(table: &str) -> Cow<'_, str> {
+    let n_signs = |line: &str| line.matches(',').count();
+    let mut lines = table.lines().map(str::trim).filter(|line| !is_comment(line));
+    let Some(first) = lines.next() else { return table.into() };
+    let mut lines = lines.peekable();
+    let is_last = |line: &str| line.ends_with(',') && (first.ends_with(',') || n_signs(line) > n_signs(first));
+    if lines.peek().is_none() || !lines.all(is_last) {
+        return table.into();
+    }
+    let line = |line: &str| match is_comment(line.trim()) {
+        true => line.to_owned(),
+        false => {
+            let line = line.trim_end();
+            line.strip_suffix(',').unwrap_or(line).to_owned()
+        }
+    };
+    table.lines().map(line).collect::<Vec<_>>().join("\n").into()
 }
 
 #[cfg(test)]
@@ -109,8 +149,23 @@ mod tests {
         }
         assert_eq!(with_commas("sep=;\nnm;a, b\n450;0,5\n"), "#\nnm,\"a, b\"\n450,0.5");
         assert_eq!(with_commas("sep=,\nnm,a\n450,0.5\n"), "#\nnm,a\n450,0.5\n");
-        for table in ["nm,a;b\n450,0.5\n", "450\n", "", "nm a\n450 0.5\n"] {
+        for table in [
+            "nm,a;b\n450,0.5\n",
+            "450\n",
+            "",
+            "nm a\n450 0.5\n",
+            "nm\n450,1\n550,2\n",
+            "a,b\n1,2\n3,\n",
+            "a,b\n1,\n3,\n",
+        ] {
             assert_eq!(with_commas(table), table);
+        }
+        // A title, and signs at the ends of lines.
+        for table in ["My skin\nnm;a;\n450;0,5;\n550;1e-3;\n", "My skin,,\nnm,a\n450,0.5,\n550,1e-3,\n"] {
+            assert_eq!(
+                with_commas(table).trim_end_matches(',').replace(",,\n", "\n"),
+                "# My skin\nnm,a\n450,0.5\n550,1e-3"
+            );
         }
     }
 }

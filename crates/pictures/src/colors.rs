@@ -14,7 +14,7 @@ use moxcms::{
 
 use crate::{
     bmp::{BmpColors, colors_of_bmp},
-    exif::{Exif, TiffFields},
+    exif::Exif,
     open::{PictureFile, open},
 };
 
@@ -67,11 +67,12 @@ impl StatedColors {
         if jpeg.n_colors == Some(4) {
             return Err("holds inks (CMYK), expected gray or red, green and blue; convert it to sRGB".to_owned());
         }
-        // Whoever reads the picture says what is wrong with it.
-        let Ok(mut decoder) = reader.into_decoder() else { return Ok(None) };
-        let own = decoder.icc_profile().ok().flatten();
-        let own = if own.is_none() && format == Some(ImageFormat::Tiff) { profile_of_tiff(path)? } else { own };
-        let profile = own.filter(|profile| !profile.is_empty());
+        let of_tiff = if format == Some(ImageFormat::Tiff) { profile_of_tiff(path)? } else { None };
+        // Whoever reads the picture says what is wrong with it; one of gray floats is read elsewhere.
+        let Ok(mut decoder) = reader.into_decoder() else {
+            return of_tiff.map_or(Ok(None), |profile| Self::of_icc(&profile));
+        };
+        let profile = of_tiff.or_else(|| decoder.icc_profile().ok().flatten()).filter(|profile| !profile.is_empty());
         match profile {
             Some(profile) => Self::of_icc(&profile),
             None if jpeg.states_profile => Err(damaged("an ICC profile")),
@@ -369,16 +370,13 @@ fn of_code_points(points: &png::CodingIndependentCodePoints) -> Result<Option<St
 
 /// Returns the profile of a TIFF file, whose field is of bytes, or of bytes of no kind.
 fn profile_of_tiff(path: &Path) -> Result<Option<Vec<u8>>, String> {
-    const ICC_PROFILE: usize = 34_675;
-    let mut bytes = vec![];
-    let read = PictureFile::open(path).and_then(|mut file| file.read_to_end(&mut bytes));
-    let Some(fields) = TiffFields::new(&bytes).filter(|_| read.is_ok()) else { return Ok(None) };
-    let Some(count) = fields.first_directory().and_then(|first| fields.field(first, ICC_PROFILE)) else {
-        return Ok(None);
-    };
-    let place = fields.number(count, 4).zip(fields.number(count + 4, 4));
-    let profile = place.and_then(|(n, place)| bytes.get(place..place.checked_add(n)?));
-    profile.map(|own| Some(own.to_vec())).ok_or_else(|| damaged("an ICC profile"))
+    let decoder = PictureFile::open(path).ok().and_then(|file| tiff::decoder::Decoder::new(BufReader::new(file)).ok());
+    let Some(decoder) = decoder else { return Ok(None) };
+    let mut limits = tiff::decoder::Limits::default();
+    limits.ifd_value_size = 1 << 26;
+    let mut decoder = decoder.with_limits(limits);
+    let profile = decoder.find_tag(tiff::tags::Tag::IccProfile).map_err(|_| damaged("an ICC profile"))?;
+    profile.map(|own| own.into_u8_vec().map_err(|_| damaged("an ICC profile"))).transpose()
 }
 
 /// What stands in a JPEG file before its pixels.

@@ -1,11 +1,15 @@
 //! What cameras write beside their pictures: Exif data (CIPA DC-008), whose fields are those of TIFF.
 
-use std::path::Path;
+use std::{io::BufReader, path::Path};
 
-use image::ImageDecoder;
+use image::{ImageDecoder, ImageFormat};
+use tiff::{
+    decoder::{Decoder, ifd::Value},
+    tags::{IfdPointer, Tag},
+};
 
 use crate::{
-    open::open,
+    open::{PictureFile, open},
     xmp::{number_of, xmp_properties},
 };
 
@@ -40,6 +44,26 @@ impl<'a> TiffFields<'a> {
     /// Returns the directory that a field of another leads to.
     fn directory(&self, directory: usize, tag: usize) -> Option<usize> {
         self.number(self.field(directory, tag)? + 4, 4)
+    }
+
+    /// Whether all fields of a directory are there, and what those lead to that count here.
+    fn is_whole(&self, directory: usize) -> bool {
+        const RATIONAL: usize = 5;
+        const COUNTED: [u16; 5] = [FOCAL, FOCAL_ON_FILM, SUBJECT_DISTANCE, GAMMA, EXIF_DIRECTORY];
+        let Some(n) = self.number(directory, 2) else { return false };
+        (0..n).map(|i| directory + 2 + 12 * i).all(|at| {
+            let (Some(tag), Some(kind), Some(place)) =
+                (self.number(at, 2), self.number(at + 2, 2), self.number(at + 8, 4))
+            else {
+                return false;
+            };
+            let n_bytes = match kind {
+                RATIONAL => 8,
+                _ if tag == EXIF_DIRECTORY.into() => 2,
+                _ => 0,
+            };
+            n_bytes == 0 || COUNTED.iter().all(|own| usize::from(*own) != tag) || self.number(place, n_bytes).is_some()
+        })
     }
 
     /// Returns the number of a field of a whole number or of a ratio.
@@ -78,20 +102,33 @@ pub struct Exif {
     pub gamma: Option<f64>,
     /// Its `ColorSpace` where that is not 1, sRGB, and no profile says what its colors are: 65 535 is uncalibrated.
     pub other_colors: Option<u16>,
+    /// Whether there are such data, but no whole ones.
+    pub is_damaged: bool,
     is_adobe_rgb: bool,
 }
+
+/// The fields of Exif data that count here.
+const FOCAL: u16 = 0x920A;
+const FOCAL_ON_FILM: u16 = 0xA405;
+const SUBJECT_DISTANCE: u16 = 0x9206;
+const GAMMA: u16 = 0xA500;
+const COLOR_SPACE: u16 = 0xA001;
+const EXIF_DIRECTORY: u16 = 0x8769;
 
 /// The diagonal of a frame of 36 mm × 24 mm, mm.
 const FILM_DIAGONAL_MM: f64 = 43.266_615;
 
 impl Exif {
-    /// Returns what the Exif data of a PNG, JPEG or WebP file state, or else its XMP data, as those of a TIFF; nothing of other files.
+    /// Returns what the Exif data of a PNG, JPEG, TIFF or WebP file state, or else its XMP data; nothing of other files.
     pub fn of(path: &Path) -> Self {
-        let decoder = open(path).ok().and_then(|reader| reader.into_decoder().ok());
-        let Some(mut decoder) = decoder else { return Self::default() };
+        let Ok(reader) = open(path) else { return Self::default() };
+        let is_tiff = reader.format() == Some(ImageFormat::Tiff);
+        let of_fields = if is_tiff { Self::of_tiff(path) } else { None };
+        // What of a TIFF file is no picture has fields all the same.
+        let Ok(mut decoder) = reader.into_decoder() else { return of_fields.unwrap_or_default() };
         let has_profile = decoder.icc_profile().ok().flatten().is_some_and(|profile| !profile.is_empty());
         let bytes = decoder.exif_metadata().ok().flatten();
-        let own = bytes.map_or_else(Self::default, |bytes| Self::of_bytes(&bytes));
+        let own = of_fields.or_else(|| bytes.map(|bytes| Self::of_bytes(&bytes))).unwrap_or_default();
         let xmp = decoder.xmp_metadata().ok().flatten();
         let own = own.or(&xmp.map_or_else(Self::default, |bytes| Self::of_xmp(&bytes)));
         Self { other_colors: own.other_colors.filter(|_| !has_profile), ..own }
@@ -99,25 +136,62 @@ impl Exif {
 
     /// Returns what Exif data of these bytes state.
     pub(crate) fn of_bytes(bytes: &[u8]) -> Self {
-        const EXIF_DIRECTORY: usize = 0x8769;
         const INTEROPERABILITY_DIRECTORY: usize = 0xA005;
-        let Some(fields) = TiffFields::new(bytes) else { return Self::default() };
-        let Some(first) = fields.first_directory() else { return Self::default() };
-        let own = fields.directory(first, EXIF_DIRECTORY);
+        let damaged = Self { is_damaged: true, ..Self::default() };
+        let Some(fields) = TiffFields::new(bytes) else { return damaged };
+        let Some(first) = fields.first_directory() else { return damaged };
+        let own = fields.directory(first, EXIF_DIRECTORY.into());
         // Some writers put all fields into the first directory.
-        let number = |tag| own.and_then(|own| fields.value(own, tag)).or_else(|| fields.value(first, tag));
-        let above_0 = |tag| number(tag).filter(|v| v.is_finite() && *v > 0.0);
-        // No sRGB (`ColorSpace` 65535), and interoperability R03 (DCF 2.0, 2010, 4.2); or 2, as many cameras have it.
-        let color_space = number(0xA001);
+        let number =
+            |tag: u16| own.and_then(|own| fields.value(own, tag.into())).or_else(|| fields.value(first, tag.into()));
+        // Interoperability R03 (DCF 2.0, 2010, 4.2).
         let interoperability = own.and_then(|own| fields.directory(own, INTEROPERABILITY_DIRECTORY));
         let index = interoperability.and_then(|directory| fields.field(directory, 1));
         let is_r03 = index.is_some_and(|at| bytes.get(at + 4..at + 7) == Some(b"R03"));
+        let is_whole = fields.is_whole(first) && own.is_none_or(|own| fields.is_whole(own));
+        Self { is_damaged: !is_whole, ..Self::of_numbers(number, is_r03) }
+    }
+
+    /// Returns what the fields of a TIFF file state that are those of Exif, and those that it leads to; `None` where it has neither.
+    fn of_tiff(path: &Path) -> Option<Self> {
+        let mut decoder = Decoder::new(BufReader::new(PictureFile::open(path).ok()?)).ok()?;
+        let number = |value: Option<Value>| match value? {
+            Value::Rational(over, under) => (under > 0).then(|| f64::from(over) / f64::from(under)),
+            Value::Float(number) => Some(number.into()),
+            Value::Double(number) => Some(number),
+            whole => whole.into_u32().ok().map(f64::from),
+        };
+        let wanted = [FOCAL, FOCAL_ON_FILM, SUBJECT_DISTANCE, GAMMA, COLOR_SPACE];
+        let mut found = wanted.map(|tag| number(decoder.find_tag(Tag::Unknown(tag)).ok().flatten()));
+        let mut is_damaged = false;
+        if let Ok(Some(place)) = decoder.find_tag_unsigned::<u64>(Tag::Unknown(EXIF_DIRECTORY)) {
+            match decoder.read_directory(IfdPointer(place)) {
+                Ok(directory) => {
+                    let mut fields = decoder.read_directory_tags(&directory);
+                    for (tag, own) in wanted.into_iter().zip(&mut found) {
+                        let field = fields.find_tag(Tag::Unknown(tag));
+                        is_damaged |= field.is_err();
+                        *own = number(field.ok().flatten()).or(*own);
+                    }
+                }
+                Err(_) => is_damaged = true,
+            }
+        }
+        let of = |tag: u16| wanted.into_iter().zip(found).find(|(own, _)| *own == tag).and_then(|(_, own)| own);
+        (is_damaged || found.iter().any(Option::is_some)).then(|| Self { is_damaged, ..Self::of_numbers(of, false) })
+    }
+
+    fn of_numbers(number: impl Fn(u16) -> Option<f64>, is_r03: bool) -> Self {
+        let above_0 = |tag| number(tag).filter(|v| v.is_finite() && *v > 0.0);
+        // No sRGB (`ColorSpace` 65535), and interoperability R03; or 2, as many cameras have it.
+        let color_space = number(COLOR_SPACE);
         Self {
-            focal_mm: above_0(0x920A),
-            focal_on_film_mm: above_0(0xA405),
-            subject_distance_m: above_0(0x9206),
-            gamma: above_0(0xA500),
+            focal_mm: above_0(FOCAL),
+            focal_on_film_mm: above_0(FOCAL_ON_FILM),
+            subject_distance_m: above_0(SUBJECT_DISTANCE),
+            gamma: above_0(GAMMA),
             other_colors: color_space.filter(|own| *own != 1.0).map(|own| own as u16),
+            is_damaged: false,
             is_adobe_rgb: color_space == Some(2.0) || color_space == Some(65_535.0) && is_r03,
         }
     }
@@ -136,6 +210,7 @@ impl Exif {
             subject_distance_m: number("SubjectDistance"),
             gamma: number("Gamma"),
             other_colors: number("ColorSpace").filter(|own| *own != 1.0).map(|own| own as u16),
+            is_damaged: false,
             is_adobe_rgb: false,
         }
     }
@@ -148,6 +223,7 @@ impl Exif {
             subject_distance_m: self.subject_distance_m.or(other.subject_distance_m),
             gamma: self.gamma.or(other.gamma),
             other_colors: self.other_colors.or(other.other_colors),
+            is_damaged: self.is_damaged,
             is_adobe_rgb: self.is_adobe_rgb,
         }
     }
@@ -208,8 +284,9 @@ mod tests {
                 let exif = Exif::of_bytes(&bytes);
                 assert_eq!((exif.other_colors, exif.is_adobe_rgb()), (other, is_adobe), "{space}");
             }
+            assert!(!exif.is_damaged);
             for end in 0..bytes.len() {
-                Exif::of_bytes(&bytes[..end]);
+                assert!(Exif::of_bytes(&bytes[..end]).is_damaged, "{end}");
             }
         }
     }

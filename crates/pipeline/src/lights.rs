@@ -44,6 +44,7 @@ fn read_light(path: &Path) -> Result<Illuminant, PipelineError> {
         .comment(Some(b'#'))
         .trim(csv::Trim::All)
         .from_reader(text.as_bytes());
+    let has = |text: &str, words: &[&str]| words.iter().any(|of| text.to_lowercase().contains(of));
     let (mut names, mut wavelengths_nm, mut values) = (Vec::<String>::new(), Vec::new(), Vec::new());
     for (number, record) in reader.records().enumerate() {
         let record = record.map_err(|e| unreadable(e.to_string()))?;
@@ -66,11 +67,28 @@ fn read_light(path: &Path) -> Result<Illuminant, PipelineError> {
     }
     let wavelengths_nm =
         wavelengths_of_column(names.first().map_or("", String::as_str), &wavelengths_nm).map_err(unreadable)?;
-    if names
-        .get(1)
-        .map(|name| name.to_lowercase())
-        .is_some_and(|name| ["photon", "quanta", "mol"].iter().any(|of| name.contains(of)))
-    {
+    let counts_photons = names.get(1).is_some_and(|name| has(name, &["photon", "quanta", "mol"]));
+    let is_comment = |line: &&str| line.starts_with('#') && has(line, &["photon", "quanta"]);
+    if let Some(comment) = text.lines().find(is_comment).filter(|_| !counts_photons) {
+        return Err(unreadable(format!(
+            "it says '{}': expected the name of its second column to say whether its numbers are photons or watts",
+            comment.trim_start_matches('#').trim()
+        )));
+    }
+    // A power a frequency, or in decibels, is none a nanometre.
+    let is_other = |name: &String| {
+        let lower = name.to_lowercase();
+        ["dbm", "decibel", "log("].iter().any(|of| lower.contains(of))
+            || lower.ends_with("hz")
+            || lower.contains("hz-1")
+            || lower.contains("hz^-1")
+    };
+    if let Some(name) = names.get(1).filter(|name| is_other(name)) {
+        return Err(unreadable(format!(
+            "its column '{name}' is no power a nanometre, expected such (W/nm) or photons"
+        )));
+    }
+    if counts_photons {
         values.iter_mut().zip(&wavelengths_nm).for_each(|(value, nm)| *value /= nm);
     }
     let mut order: Vec<usize> = (0..values.len()).collect();
@@ -106,6 +124,9 @@ mod tests {
             ("nm, a, b\n400, 1, 2\n700, 1, 2\n", "3 columns"),
             ("waves (zorp), a\n400, 1\n700, 1\n", "'zorp'"),
             ("400, 1\n500; 2\n", "line 2"),
+            ("nm,dBm\n400, -1\n500, -2\n", "'dBm' is no power"),
+            ("nm,W m-2 Hz-1\n400, 1\n500, 2\n", "Hz-1' is no power"),
+            ("Light in photons\nnm, a\n400, 1\n500, 2\n", "photons"),
             ("400, 1\n400, 2\n", "400"),
         ] {
             let message = read(text).unwrap_err().to_string();

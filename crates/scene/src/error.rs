@@ -111,7 +111,7 @@ pub enum SceneError {
     },
     /// Depth that was not measured at some places, of which nobody says what it is.
     #[error(
-        "{}: the depth at row {row}, column {column} was not measured (0, no number, or one that stands for none), as at \
+        "{}: the depth at row {row}, column {column} was not measured (no number above 0, or one that stands for none), as at \
          {n_unmeasured} of {n_samples} samples: expected numbers above 0, or a choice of what is there (--fill-depth far, beside or METRES)",
         file.display()
     )]

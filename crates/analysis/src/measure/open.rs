@@ -98,10 +98,12 @@ pub fn notes_on_picture(path: &Path, curve: CodeCurve) -> Vec<String> {
 /// Returns which colors of a picture's file are used when it is measured.
 fn notes_on_colors(path: &Path, curve: CodeCurve) -> Vec<String> {
     let mut notes = vec![];
-    if let Ok(Some(colors)) = StatedColors::of(path) {
+    let decoder = ImageReader::open(path).ok().and_then(|r| r.with_guessed_format().ok()?.into_decoder().ok());
+    let kind = decoder.map(|decoder| decoder.color_type());
+    // Gray floats are of no kind of picture's.
+    let are_floats = matches!(kind, None | Some(ColorType::Rgb32F | ColorType::Rgba32F));
+    if let Ok(Some(colors)) = if are_floats { StatedColors::of_floats(path) } else { StatedColors::of(path) } {
         let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
-        let decoder = ImageReader::open(path).ok().and_then(|r| r.with_guessed_format().ok()?.into_decoder().ok());
-        let kind = decoder.map(|decoder| decoder.color_type());
         let used = match (kind, curve) {
             (Some(ColorType::L16 | ColorType::La16), CodeCurve::ByFile) => {
                 "its 16-bit gray is taken as linear, not by what it states"
@@ -109,9 +111,7 @@ fn notes_on_colors(path: &Path, curve: CodeCurve) -> Vec<String> {
             (Some(kind), CodeCurve::Linear | CodeCurve::Srgb) if !kind.has_color() => {
                 "its codes become light as the command line says, not by what it states"
             }
-            (Some(ColorType::Rgb32F | ColorType::Rgba32F), _) => {
-                "its floating-point samples are taken as linear, in the primaries that it states"
-            }
+            (_, CodeCurve::ByFile) if are_floats => "its numbers become light by what it states",
             (_, CodeCurve::ByFile) => "its codes become light by what it states",
             (_, CodeCurve::Linear | CodeCurve::Srgb) => {
                 "its codes become light as the command line says, its primaries are those that it states"
@@ -166,12 +166,18 @@ impl MeasuredPicture {
             CodeCurve::ByFile => top.is_some_and(|top| top == u16::from(u8::MAX) || planes.len() > 1),
         };
         // Whatever the curve, the primaries are the file's.
-        let needs_colors = planes.len() > 1 || (curve == CodeCurve::ByFile && is_coded);
+        let is_by_file = curve == CodeCurve::ByFile && (is_coded || top.is_none());
+        let needs_colors = planes.len() > 1 || is_by_file;
         let colors = if needs_colors { colors.map_err(wrong)? } else { None };
         let scale = top.map_or(1.0, |top| 1.0 / f32::from(top));
-        let own_curve = colors.as_ref().filter(|_| curve == CodeCurve::ByFile && is_coded);
+        let own_curve = colors.as_ref().filter(|_| is_by_file);
         let light = |channel: usize, v: f32| match (is_coded, own_curve) {
-            (false, _) => v * scale,
+            (false, Some(own)) => {
+                let mut light = [v * scale];
+                own.make_light(channel.min(2), &mut light);
+                light[0]
+            }
+            (false, None) => v * scale,
             (true, None) => srgb_decode(f64::from(v * scale)) as f32,
             (true, Some(own)) => own.light(channel.min(2), (v * scale * f32::from(u16::MAX)).round() as u16) as f32,
         };

@@ -211,13 +211,16 @@ fn listing(folder: &Path) -> Result<Listing, SceneError> {
     Ok(Listing { pictures, unused, files })
 }
 
-/// Returns the middle of the range of wavelengths that a stem ends in, as `b_445-455`: none wider than a filter's.
+/// Returns the middle of the range of wavelengths that a stem ends in, as `b_445-455`, `b_445nm_455` or `b_445to455`: none wider than a filter's.
 fn middle_of_range(stem: &str) -> Option<f64> {
     const MOST_NM: f64 = 100.0;
-    let (before, last) = stem.rsplit_once('-')?;
-    let first = before.rsplit(|c: char| !c.is_ascii_digit() && c != '.').next()?;
-    let (first, last) = (first.parse::<f64>().ok()?, last.parse::<f64>().ok()?);
-    (are_wavelengths(&[first, last]) && last > first && last - first <= MOST_NM).then_some(0.5 * (first + last))
+    let range = |sign: &&str| {
+        let (before, last) = stem.rsplit_once(*sign)?;
+        let first = before.rsplit(|c: char| !c.is_ascii_digit() && c != '.').next()?;
+        let (first, last) = (first.parse::<f64>().ok()?, last.parse::<f64>().ok()?);
+        (are_wavelengths(&[first, last]) && last > first && last - first <= MOST_NM).then_some(0.5 * (first + last))
+    };
+    ["-", "to", "_to_", "nm_", "nm-", "nmto", "nm_to_"].iter().find_map(range)
 }
 
 /// Returns the number that a stem ends in, before an optional `nm`.
@@ -241,9 +244,11 @@ fn wavelengths_of(folder: &Path, pictures: &[(f64, PathBuf)]) -> Result<Vec<f64>
         let is_separator = |c: char| c.is_whitespace() || c == ',' || c == ';';
         let text = text::with_commas(&text);
         let numbers: Vec<f64> = text.split(is_separator).filter_map(|word| word.parse().ok()).collect();
-        let words = text.split(|c| "()[]#:=;,".contains(c) || char::is_whitespace(c));
-        // Beside numbers alone a letter is a unit, too.
-        let unit = words.clone().find_map(unit_in).or_else(|| words.clone().find(|word| *word == "A"));
+        let unit = text.split(|c| "()[]#:=;,".contains(c) || char::is_whitespace(c)).find_map(unit_in);
+        // A single letter, behind every number, of which none is another's.
+        let are_angstroms =
+            text.split(is_separator).any(|word| word == "A") && numbers.iter().all(|own| *own >= 1500.0);
+        let unit = unit.or(are_angstroms.then_some("A"));
         let own = listed_nm("wavelengths", unit, &numbers).map_err(|reason| unreadable(&list, reason))?;
         return own.ok_or_else(|| unreadable(&list, "its numbers count bands: expected wavelengths in nm"));
     }
@@ -372,10 +377,16 @@ mod tests {
 
     #[test]
     fn ranges_and_units_of_wavelengths_are_obeyed() {
-        let folder = folder_of(&["b_445-455nm.png", "b_555-565nm.png"]);
-        assert_eq!(read_band_folder(folder.path(), None).unwrap().grid().centers_nm(), [450.0, 560.0]);
+        for names in [
+            ["b_445-455nm.png", "b_555-565nm.png"],
+            ["b_445nm_455nm.png", "b_555nm_565nm.png"],
+            ["photo_445to455nm.png", "photo_555to565nm.png"],
+        ] {
+            let folder = folder_of(&names);
+            assert_eq!(read_band_folder(folder.path(), None).unwrap().grid().centers_nm(), [450.0, 560.0], "{names:?}");
+        }
         let folder = folder_of(&["b_1.png", "b_2.png"]);
-        for text in ["Angstrom\n4500\n5600\n", "# um\n0,45;0,56", "wavelength (nm)\n450\n560\n"] {
+        for text in ["Angstrom\n4500\n5600\n", "4500 A\n5600 A\n", "# um\n0,45;0,56", "wavelength (nm)\n450\n560\n"] {
             fs::write(folder.path().join("wavelengths.txt"), text).unwrap();
             let image = read_band_folder(folder.path(), None).unwrap();
             assert_eq!(image.grid().centers_nm(), [450.0, 560.0], "{text}");

@@ -23,7 +23,7 @@ use super::{
 use crate::SceneError;
 
 /// What camera data are read as.
-const EXPECTED: &str = "expected JSON, YAML, a matrix of 3 × 3 numbers, or a line of COLMAP's cameras.txt (colmap model_converter --output_type \
+const EXPECTED: &str = "expected JSON, YAML or XML of OpenCV, a matrix of 3 × 3 numbers, or a line of COLMAP's cameras.txt (colmap model_converter --output_type \
                         TXT): number, model, width, height, parameters";
 /// Lines of YAML of ROS, the matrix of its messages.
 const YAML: [&str; 2] = ["k:", "K:"];
@@ -57,7 +57,11 @@ impl CameraFile {
         })?;
         let data = match text.trim_start() {
             text if text.starts_with('{') => of_json(path, text, picture),
-            text if text.starts_with("%YAML") || text.lines().any(|line| YAML.contains(&line.trim())) || {
+            text if text.starts_with('[') => Err(
+                "it is a list of JSON, expected the object of one camera (with fx, fy, cx and cy, or intrinsic_matrix)"
+                    .to_owned(),
+            ),
+            text if text.starts_with(['%', '<']) || text.lines().any(|line| YAML.contains(&line.trim())) || {
                 text.contains("camera_matrix") || text.contains("intrinsics:")
             } =>
             {

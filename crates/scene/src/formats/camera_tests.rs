@@ -105,12 +105,28 @@ fn other_programs_are_read() {
         None,
     );
     assert_eq!(k, bent([0.1, -0.2, 0.0, 0.0, 0.3, 0.0, 0.0, 0.0]));
+    let matrix = |name: &str, data: &str| {
+        format!(
+            "<{name} type_id=\"opencv-matrix\">\n<rows>3</rows><cols>3</cols><dt>d</dt><data>\n{data}</data></{name}>\n"
+        )
+    };
+    let xml = [
+        "<?xml version=\"1.0\"?>\n<opencv_storage>\n<image_width>640</image_width>\n<image_height>480</image_height>\n",
+        &matrix("camera_matrix", "525. 0. 319.5 0.\n526. 239.5 0. 0. 1."),
+        &matrix("distortion_coefficients", "0.1 -0.2 0. 0. 0.3"),
+        "</opencv_storage>\n",
+    ];
+    assert_eq!(same(&xml.concat(), None), k);
     // The fourth coefficient of nerfstudio goes with r^8, that of OpenCV with r^2 below the line.
     let nerf = r#"{"w":640,"h":480,"fl_x":525,"fl_y":526,"cx":320,"cy":240,"k1":0.1,"k4":0.2}"#;
     assert_eq!(same(nerf, None), Distortion::Polynomial { k: [0.1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0], r8: 0.2 });
     let ros = "image_width: 640\nimage_height: 480\ncamera_matrix:\n  rows: 3\n  cols: 3\n  data: [525, 0, 319.5, 0, \
                526, 239.5, 0, 0, 1]\ndistortion_model: equidistant\ndistortion_coefficients:\n  rows: 1\n  cols: 4\n  \
                data: [0.1, 0, 0.2, 0]\nrectification_matrix:\n  rows: 3\n  cols: 3\n  data: [1, 0, 0, 0, 1, 0, 0, 0, 1]\n";
+    // As PyYAML sorts and writes it.
+    let dumped = "camera_matrix:\n  cols: 3\n  data:\n  - 525.0\n  - 0\n  - 319.5\n  - 0\n  - 526.0\n  - 239.5\n  - 0\n  - 0\n  - 1\n  \
+                  rows: 3\nimage_height: 480\nimage_width: 640\n";
+    same(dumped, None);
     let fisheye = Distortion::Fisheye([0.1, 0.0, 0.2, 0.0]);
     assert_eq!(same(ros, None), fisheye);
     assert_eq!(same("1 OPENCV_FISHEYE 640 480 525 526 320 240 0.1 0 0.2 0", None), fisheye);
@@ -185,7 +201,7 @@ fn camera_file_that_does_not_fit_is_refused_by_name() {
         (r#"{"width":741,"height":500,"intrinsic_matrix":[525.0,0,0,5,526.0,0,319.5,239.5,1]}"#, 500, 741, "skew"),
         (r#"{"K":[[525.0,0,319.5],[0,526.0,239.5],[0,0,0]]}"#, 500, 741, "skew"),
         ("{", 500, 741, "truncated"),
-        ("[3]", 500, 741, "expected JSON"),
+        ("[3]", 500, 741, "list of JSON"),
         ("1 FISHEYE 3 4 5", 500, 741, "FISHEYE"),
     ] {
         let read = read(text, rows, columns).and_then(|data| data.straightened(rows, columns));

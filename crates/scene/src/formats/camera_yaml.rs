@@ -1,4 +1,4 @@
-//! Camera data in YAML: of `OpenCV` and ROS, or of Kalibr.
+//! Camera data in YAML: of `OpenCV` and ROS, or of Kalibr; and in the XML of `OpenCV`.
 
 use std::path::Path;
 
@@ -7,12 +7,14 @@ use super::{
     camera_models::{HARMLESS, check_matrix, is_fisheye, unknown_model},
     distortion::Distortion,
     stated::{Stated, short},
+    unusable::TRUNCATED,
 };
 
 /// Reads YAML of a calibration of `OpenCV` or ROS (`camera_matrix`, `distortion_coefficients`, `image_width`, `image_height`), or of one camera of
-/// Kalibr (`intrinsics`, `distortion_coeffs`, `resolution`).
+/// Kalibr (`intrinsics`, `distortion_coeffs`, `resolution`); or the first in XML.
 pub(super) fn of_yaml(path: &Path, text: &str) -> Result<CameraFile, String> {
-    let mut keys = Stated::new("key", yaml_entries(text)?);
+    let entries = if text.starts_with('<') { xml_entries(text)? } else { yaml_entries(text)? };
+    let mut keys = Stated::new("key", entries);
     one_of_chain(&mut keys)?;
     let list = |text: String| -> Result<Vec<f64>, String> {
         let words = text.trim_matches(['[', ']']).split(',').map(str::trim).filter(|word| !word.is_empty());
@@ -106,6 +108,37 @@ fn one_of_chain(keys: &mut Stated<String>) -> Result<(), String> {
     }
 }
 
+/// Returns the elements of a file of `OpenCV` in XML with their texts, a matrix as the list of its data.
+fn xml_entries(text: &str) -> Result<Vec<(String, String)>, String> {
+    let (_, inner) = text.split_once("<opencv_storage>").ok_or("it is XML, but none of OpenCV (opencv_storage)")?;
+    let (mut rest, _) = inner.split_once("</opencv_storage>").ok_or(TRUNCATED)?;
+    let mut entries: Vec<(String, String)> = vec![];
+    while let Some((_, after)) = rest.split_once('<') {
+        if let Some(comment) = after.strip_prefix("!--") {
+            rest = comment.split_once("-->").map_or("", |(_, next)| next);
+            continue;
+        }
+        let (head, after) = after.split_once('>').ok_or(TRUNCATED)?;
+        let name = head.split([' ', '/', '\n']).next().unwrap_or_default();
+        let (body, next) = match after.split_once(&format!("</{name}>")) {
+            _ if head.ends_with('/') => ("", after),
+            Some(parts) => parts,
+            None => return Err(format!("the element '{}' is never closed", short(name))),
+        };
+        let data = body.split_once("<data>").map(|(_, data)| data.split("</data>").next().unwrap_or_default());
+        let value = match data {
+            Some(data) => format!("[{}]", data.split_whitespace().collect::<Vec<_>>().join(", ")),
+            None => body.trim().trim_matches('"').to_owned(),
+        };
+        if entries.iter().any(|(own, _)| own == name) {
+            return Err(format!("the element '{}' stands twice: expected it once", short(name)));
+        }
+        entries.push((name.to_owned(), value));
+        rest = next;
+    }
+    Ok(entries)
+}
+
 /// Returns the `key: value` lines, in which the `data: [...]` of a matrix belongs to the key above; lists may run over lines.
 fn yaml_entries(text: &str) -> Result<Vec<(String, String)>, String> {
     let mut entries: Vec<(String, String)> = vec![];
@@ -141,6 +174,10 @@ fn yaml_entries(text: &str) -> Result<Vec<(String, String)>, String> {
         }
         let entry = match (key.trim(), &matrix) {
             ("rows" | "cols" | "dt", Some(_)) => continue,
+            // Behind its data, as PyYAML sorts keys.
+            ("rows" | "cols" | "dt", None) if entries.last().is_some_and(|(_, own)| own.ends_with(']')) => continue,
+            // A list with an item a line follows.
+            ("data", Some(_)) if value.is_empty() => continue,
             ("data", Some(name)) => {
                 let name = name.clone();
                 matrix = None;

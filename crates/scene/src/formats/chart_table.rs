@@ -65,7 +65,7 @@ pub(super) fn read_chart(path: &Path) -> Result<Cube, SceneError> {
             "it has no line of numbers: expected wavelengths in nm and a reflectance a column".to_owned(),
         ));
     }
-    const OTHERS: [&str; 4] = ["absorb", "radian", "emission", "photon"];
+    const OTHERS: [&str; 7] = ["absorb", "radian", "emission", "photon", "w/m", "w m-2", "w/cm"];
     let is_other = |name: &&String| OTHERS.iter().any(|other| name.to_lowercase().contains(other));
     if let Some(other) = names.iter().find(is_other) {
         return Err(wrong(format!("its column '{}' says that it holds no reflectances, expected such", short(other))));
@@ -156,6 +156,7 @@ mod tests {
             ("", "it is empty"),
             ("# nothing\n", "no line of numbers"),
             ("nm,absorbance\n400,.2\n", "'absorbance' says that it holds no reflectances"),
+            ("nm,W/m2/nm\n400,.2\n", "'W/m2/nm' says that it holds no reflectances"),
             ("waves (zorp),a\n400,.2\n", "'zorp'"),
             ("nm,a\n400,0.1\n500\n", "line 3: 1 numbers"),
             ("nm,a\n400,0.1\n500,x\n", "line 3: '500,x'"),

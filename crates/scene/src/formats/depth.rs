@@ -265,11 +265,27 @@ mod tests {
             "disparity.tif",
             "inverse_depth.exr",
             "room.Mist.exr",
+            "log_depth.npy",
+            "dispmap_0001.npy",
+            "depthinv.tif",
+            "relative_depth.exr",
         ] {
             fs::copy(at("a").with_extension(name.rsplit('.').next().unwrap()), at(name)).unwrap();
             assert!(
                 read_depth(&at(name), DepthWords::default()).is_err_and(|e| e.to_string().contains("--depth-kind"))
             );
+        }
+        // Files are counted; what stands before the number says what they are.
+        for (name, kind, unit_m) in [
+            ("distance_to_camera_0001.npy", DepthKind::Radial, 1.0),
+            ("range_0001.exr", DepthKind::Radial, 1.0),
+            ("img_0_DepthPerspective.npy", DepthKind::Radial, 1.0),
+            ("distance_to_image_plane.tif", DepthKind::Axial, 1.0),
+            ("depth_mm_0001.npy", DepthKind::Axial, 1e-3),
+        ] {
+            fs::copy(at("a").with_extension(name.rsplit('.').next().unwrap()), at(name)).unwrap();
+            let depth = read_depth(&at(name), DepthWords::default()).unwrap();
+            assert_eq!((depth.kind, depth.unit), (kind, DepthUnit::Metres(unit_m)), "{name}");
         }
         let gray = image::GrayImage::from_pixel(4, 2, Luma([51]));
         save(&gray.into(), &at("b.png")).unwrap();
@@ -308,6 +324,8 @@ mod tests {
             ("range", "", DepthKind::Radial),
             ("distance", "planar depth", DepthKind::Axial),
             ("array_of_depth", "", DepthKind::Axial),
+            ("distance_to_image_plane", "", DepthKind::Axial),
+            ("DepthPerspective", "", DepthKind::Radial),
         ] {
             let found = read(name, words);
             assert!(found.as_ref().is_ok_and(|depth| depth.kind == kind), "{name}, {words}: {:?}", found.err());

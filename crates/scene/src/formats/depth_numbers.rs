@@ -9,6 +9,7 @@ use super::{
     depth_names::SaidOfDepth,
     exr_depth_file::{DepthChannel, read_depth_exr},
     gray_picture::{GrayPicture, read_gray},
+    length_unit::length_m,
     mat::{Plane, read_plane},
     npy::{NpyArray, read_npy},
     npz::read_npz_plane,
@@ -108,11 +109,14 @@ pub(super) fn depth_numbers(path: &Path, told: Option<&str>) -> Result<Noted<Dep
                     name_of(path)
                 ));
             }
+            let unit_m = page.unit.as_deref().map(str::trim).and_then(length_m);
+            notes.extend(page.note_of_unit(path).filter(|_| unit_m.is_none()));
+            called = page.called.clone();
             match page.depth_map.map(|tags| tags.depths(values.clone(), top)) {
                 Some(MappedDepths { values, kind, top, unit_m, lacks }) => {
                     DepthNumbers { kind, unit_m, lacks, ..of(values, top) }
                 }
-                None => of(values, top),
+                None => DepthNumbers { unit_m, ..of(values, top) },
             }
         }
     };

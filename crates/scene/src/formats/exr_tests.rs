@@ -378,7 +378,11 @@ fn unmeasured_depth_is_filled_when_asked() {
     }
     assert!(at_depth(channels(), Some(FillDepth::Metres(-1.0))).is_err());
     let negative = vec![("S0.500nm", flat(1.0)), ("Z", FlatSamples::F32(vec![-2.0, 2.0, 2.0, 4.0]))];
-    assert!(at_depth(negative, Some(FillDepth::Far)).unwrap_err().to_string().contains("-2 m"));
+    assert_eq!(at_depth(negative, Some(FillDepth::Far)).unwrap().require_depth().unwrap().z_m()[(0, 0)], 4.0);
+    let turned = vec![("S0.500nm", flat(1.0)), ("Z", FlatSamples::F32(vec![-2.0, -2.0, 2.0, -4.0]))];
+    for fill in [None, Some(FillDepth::Far)] {
+        assert!(at_depth(turned.clone(), fill).unwrap_err().to_string().contains("other sign"));
+    }
 }
 
 #[test]

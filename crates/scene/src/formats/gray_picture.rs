@@ -36,6 +36,8 @@ pub(super) fn read_gray(path: &Path, wanted: TiffAs, told: Option<&str>) -> Resu
         let mut notes = vec![];
         let file = read_tiff(path, wanted)?.told_in(&mut notes);
         let gray = of_tiff(path, file, told, &mut notes)?;
+        // Depths have lengths.
+        notes.extend(gray.page.note_of_unit(path).filter(|_| wanted != TiffAs::Depths));
         return Ok(Noted::new(gray, notes));
     }
     if told.is_some() {

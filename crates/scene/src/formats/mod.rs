@@ -75,6 +75,7 @@ mod tiff_bands;
 mod tiff_depth_map;
 mod tiff_directory;
 mod tiff_file;
+mod tiff_gdal;
 mod tiff_page;
 mod understood;
 mod unmeasured;

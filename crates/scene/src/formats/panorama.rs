@@ -19,8 +19,9 @@ use super::{
 };
 use crate::{SceneError, View};
 
-/// The most columns that a perspective view may have.
-const MOST_COLUMNS: usize = 65_536;
+/// The most columns that a perspective view may have: those of a small panorama, or so many times those of another.
+const MOST_COLUMNS: usize = 4096;
+const MOST_FINER: usize = 4;
 
 /// Puts what a camera sees in place of a picture of all directions, and of its distances: as many columns as rows, as fine on the axis as
 /// the picture is, or as the film needs.
@@ -65,14 +66,15 @@ pub(super) fn look(
     let bin = (1..=coarser.clamp(1, 64)).rev().find(divides).unwrap_or(1);
     let sphere = Sphere::new(path, kind, (rows / bin, columns / bin), stated)?;
     let half = (0.5 * fov_deg.to_radians()).tan();
-    let side = (2.0 * half / sphere.step()).ceil();
-    if !(side >= 1.0 && side <= MOST_COLUMNS as f64) {
-        let reason = format!(
-            "at {fov_deg}° it would have {side} columns, expected a field of view of which there are at most {MOST_COLUMNS}"
-        );
-        return Err(unreadable(path, reason));
+    let wanted = (2.0 * half / sphere.step()).ceil();
+    let most = MOST_COLUMNS.max(MOST_FINER * columns);
+    let side = (wanted as usize).clamp(1, most);
+    if wanted > most as f64 {
+        contents.notes.push(format!(
+            "{}: at {fov_deg}° a plane of {wanted} columns would be as fine on the axis as the panorama: it has {side}",
+            name_of(path)
+        ));
     }
-    let side = side as usize;
     let view = View::from_horizontal_fov_deg(fov_deg, side, side)?;
     let n_planes = match &contents.image {
         Image::Spectral(image) => image.grid().len(),

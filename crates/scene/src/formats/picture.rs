@@ -275,6 +275,8 @@ pub fn read_picture_samples(path: &Path) -> Result<Noted<PictureSamples>, SceneE
     let mut notes = notes_on_samples(path)?;
     let floats = if is_tiff(path) { float_planes(path)? } else { None };
     if let Some(planes) = floats {
+        // As of scenes: floats of a profile have its curve, be it that of sRGB.
+        let colors = StatedColors::of_floats(path);
         let planes = planes.told_in(&mut notes);
         let names: &[&str] = match planes.len() {
             1 => &["Y"],
@@ -342,7 +344,7 @@ pub fn notes_on_samples(path: &Path) -> Result<Vec<String>, SceneError> {
         .chain(parts)
         .chain(pages)
         .chain(colors)
-        .chain(note_on_exif(path, false))
+        .chain((!is_tiff(path)).then(|| note_on_exif(path, false)).flatten())
         .collect())
 }
 

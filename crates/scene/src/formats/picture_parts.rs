@@ -15,6 +15,7 @@ use image::{
 
 use super::{
     stated::{name_of, note_of, short, tells},
+    tiff_file::is_tiff,
     unusable::unreadable,
 };
 use crate::SceneError;
@@ -24,8 +25,8 @@ const USED_CHUNKS: [&[u8; 4]; 16] = [
     b"IHDR", b"PLTE", b"IDAT", b"IEND", b"tRNS", b"gAMA", b"cHRM", b"sRGB", b"iCCP", b"cICP", b"sBIT", b"bKGD",
     b"hIST", b"tIME", b"eXIf", b"sPLT",
 ];
-/// Those of them that say what the codes are.
-const COLOR_CHUNKS: [&[u8; 4]; 5] = [b"gAMA", b"cHRM", b"sRGB", b"iCCP", b"cICP"];
+/// Those of them that say what the codes are, and what cameras write: the first counts, before the pixels.
+const FIRST_CHUNKS: [&[u8; 4]; 6] = [b"gAMA", b"cHRM", b"sRGB", b"iCCP", b"cICP", b"eXIf"];
 /// Words of text chunks that change nothing (PNG, third edition, 11.3.3.1), and those of common programs.
 const USUAL_WORDS: [&str; 14] = [
     "Title",
@@ -53,7 +54,9 @@ const MOST_BYTES: u64 = 65_536;
 /// # Errors
 /// When the file cannot be opened, or is a JPEG file without an end, whose missing pixels decoders make up.
 pub(super) fn notes_on_parts(path: &Path) -> Result<Vec<String>, SceneError> {
-    Ok(note_of(path, "part", &unknown_parts(path)?).into_iter().chain(note_on_exif(path, true)).collect())
+    // What pages of a TIFF file state is said of them.
+    let exif = (!is_tiff(path)).then(|| note_on_exif(path, true)).flatten();
+    Ok(note_of(path, "part", &unknown_parts(path)?).into_iter().chain(exif).collect())
 }
 
 /// Returns what is said of colors that the Exif data state to be others than those that the codes are taken for.
@@ -80,6 +83,9 @@ pub(super) fn note_of_orientation(path: &Path) -> Option<String> {
 /// Returns what the Exif data state of light, and of geometry where that counts, that is not used.
 pub(super) fn note_on_exif(path: &Path, of_scene: bool) -> Option<String> {
     let exif = Exif::of(path);
+    if exif.is_damaged {
+        return Some(format!("{}: its Exif data are damaged: not all that they state is used", name_of(path)));
+    }
     let (mut columns, mut rows) = size_of(path).ok()?;
     if orientation_of(path).to_exif() > 4 {
         std::mem::swap(&mut columns, &mut rows);
@@ -125,12 +131,21 @@ pub(super) fn unknown_parts(path: &Path) -> Result<Vec<String>, SceneError> {
         [b'P', b'1'..=b'7', ..] => Ok(of_pnm(&start).into_iter().chain(behind_pnm(path)).collect()),
         _ => Ok(vec![]),
     };
-    let mut names = names.unwrap_or_default();
-    // The name of a profile that is within.
+    Ok(each_once(path, names.unwrap_or_default()))
+}
+
+/// Returns names of parts in their order, each once, without the name of a profile that is within.
+fn each_once(path: &Path, mut names: Vec<String>) -> Vec<String> {
     names.retain(|name| !name.starts_with("photoshop:ICCProfile") || !matches!(StatedColors::of(path), Ok(Some(_))));
     names.sort();
     names.dedup();
-    Ok(names)
+    names
+}
+
+/// Returns what is said of the Exif and XMP data of a page of a TIFF file.
+pub(super) fn notes_on_page(path: &Path, xmp: &[String], of_scene: bool) -> Vec<String> {
+    let names = xmp.iter().flat_map(|text| of_xmp(text.as_bytes())).collect();
+    note_of(path, "part", &each_once(path, names)).into_iter().chain(note_on_exif(path, of_scene)).collect()
 }
 
 /// What the names of parts call pixels that are not square.
@@ -344,15 +359,14 @@ fn of_png(file: &mut (impl Read + Seek)) -> std::io::Result<Vec<String>> {
             b"pHYs" if content.get(..4) != content.get(4..8) => names.push(format!("pHYs ({NOT_SQUARE})")),
             b"pHYs" => {}
             b"IEND" => break,
-            // The first counts, before the pixels.
-            kind if COLOR_CHUNKS.contains(&kind) && known.contains(kind) => {
+            kind if FIRST_CHUNKS.contains(&kind) && known.contains(kind) => {
                 names.push(format!("{} (twice, or behind the pixels)", String::from_utf8_lossy(kind)));
             }
             kind if USED_CHUNKS.contains(&kind) => {}
             kind => names.push(kind.iter().map(|byte| char::from(*byte)).collect()),
         }
         if kind == *b"IDAT" {
-            known.extend(COLOR_CHUNKS.map(|own| *own));
+            known.extend(FIRST_CHUNKS.map(|own| *own));
         }
         known.push(kind);
     }
@@ -436,6 +450,11 @@ fn of_segment(number: u8, content: &[u8]) -> Vec<String> {
         (14, b"Adobe"),
     ];
     let starts = |start: &[u8]| content.starts_with(start);
+    // What reads the file takes shorter ones for none.
+    const LEAST_EXIF_BYTES: usize = 7;
+    if number == 1 && starts(b"Exif") && content.len() < LEAST_EXIF_BYTES {
+        return vec!["Exif (damaged)".to_owned()];
+    }
     if KNOWN.iter().any(|(own, start)| *own == number && starts(start)) {
         return vec![];
     }

@@ -197,7 +197,8 @@ impl RawDepth {
             // The inverse of nothing is the sky; what is no number was not measured.
             DepthKind::Inverse | DepthKind::InverseBetween { .. } => self.values.mapv(|v| {
                 let inverse = f64::from(v) * factor;
-                if v.is_finite() { along(1.0 / inverse) } else { 0.0 }
+                // The sum has no 0 below 0.
+                if v.is_finite() { along(1.0 / (inverse + 0.0)) } else { 0.0 }
             }),
             DepthKind::Disparity { baseline_m, offset_px } => {
                 let view = view?;

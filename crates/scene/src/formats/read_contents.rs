@@ -15,7 +15,7 @@ use super::{
     depth::read_depth,
     envi::{contents_of_envi, header_of},
     light_unit::LightUnit,
-    mat::{MatScene, read_mat},
+    mat::{MatScene, UnitOf, read_mat},
     no_data::mend,
     npy::read_npy,
     npz::read_npz,
@@ -180,8 +180,18 @@ fn pages_of_tiff(path: &Path, options: &ReadOptions) -> Result<Contents, SceneEr
                 stack.page.count_from_black(plane, stack.top);
             }
             notes.extend(stack.page.notes_of_description(path));
-            let TiffStack { planes, wavelengths_nm, top, .. } = stack;
-            Cube { planes, top, wavelengths_nm, quantity: None, unit: None, notes }.into_contents(path, options)
+            let TiffStack { mut planes, wavelengths_nm, mut top, page } = stack;
+            let (mut quantity, mut unit) = (None, None);
+            match UnitOf::read(page.unit.as_deref()) {
+                UnitOf::Light(own, words) => unit = Some((own, words)),
+                UnitOf::Reflectance => quantity = Some(FileQuantity::Reflectance),
+                UnitOf::Percent => {
+                    planes.iter_mut().for_each(|plane| plane.mapv_inplace(|v| 0.01 * v));
+                    (quantity, top) = (Some(FileQuantity::Reflectance), None);
+                }
+                UnitOf::Unknown => notes.extend(page.note_of_unit(path)),
+            }
+            Cube { planes, top, wavelengths_nm, quantity, unit, notes }.into_contents(path, options)
         }
     }
 }

@@ -13,7 +13,7 @@ use super::{
     read_options::ReadOptions,
     reading::{DepthUnit, Frame},
     stated::{name_of, note_of},
-    unmeasured::{self, FillDepth},
+    unmeasured::{self, FillDepth, is_measured},
     unusable::unreadable,
 };
 use crate::{SceneError, View};
@@ -147,6 +147,7 @@ pub(super) fn depth_of(
         notes.push(format!("{}: its depth {} needs the field of view and is not used", name_of(file), raw.describe()));
         return Ok(None);
     };
+    check_sign(file, &values_m)?;
     let n_samples = values_m.len();
     let Some(fill) = fill.or(raw.is_picture.then_some(FillDepth::Beside)) else {
         check_measured(file, &values_m)?;
@@ -161,11 +162,26 @@ pub(super) fn depth_of(
     Ok(Some(DepthMap::new(z_m).map_err(values)?))
 }
 
-/// Checks that every depth was measured; what is negative is another matter.
+/// Checks that depths do not count along an axis that points to the camera: a few below 0 were not measured.
+fn check_sign(file: &Path, z_m: &Array2<f32>) -> Result<(), SceneError> {
+    // What programs put for none.
+    const LEAST_M: f32 = -1e9;
+    let n_below = z_m.iter().filter(|z| (LEAST_M..0.0).contains(*z)).count();
+    if n_below <= z_m.iter().filter(|z| is_measured(**z)).count() {
+        return Ok(());
+    }
+    let reason = format!(
+        "{n_below} of its {} depths are below 0, as along an axis that points to the camera (OpenGL, Houdini): expected them with the \
+         other sign",
+        z_m.len()
+    );
+    Err(unreadable(file, reason))
+}
+
+/// Checks that every depth was measured.
 fn check_measured(file: &Path, z_m: &Array2<f32>) -> Result<(), SceneError> {
-    let is_unmeasured = |z: f32| z == 0.0 || z.is_nan();
-    let Some(((row, column), _)) = z_m.indexed_iter().find(|(_, z)| is_unmeasured(**z)) else { return Ok(()) };
-    let n_unmeasured = z_m.iter().filter(|z| is_unmeasured(**z)).count();
+    let Some(((row, column), _)) = z_m.indexed_iter().find(|(_, z)| !is_measured(**z)) else { return Ok(()) };
+    let n_unmeasured = z_m.iter().filter(|z| !is_measured(**z)).count();
     Err(SceneError::Unmeasured { file: PathBuf::from(file), row, column, n_unmeasured, n_samples: z_m.len() })
 }
 
@@ -173,7 +189,7 @@ fn check_measured(file: &Path, z_m: &Array2<f32>) -> Result<(), SceneError> {
 pub(super) fn behind(file: &Path, mut z_m: Array2<f32>, first: Option<&DepthMap>) -> Result<DepthMap, SceneError> {
     if let Some(first) = first.filter(|first| first.z_m().dim() == z_m.dim()) {
         z_m.zip_mut_with(first.z_m(), |z, first| {
-            if *z == 0.0 || z.is_nan() {
+            if !is_measured(*z) {
                 *z = *first;
             }
         });

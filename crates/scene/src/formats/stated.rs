@@ -154,7 +154,7 @@ pub(super) fn short(text: &str) -> String {
 
 /// Whether a text says something of numbers or of a view, and not who made them when: a unit, or a quantity with a number.
 pub(super) fn tells(text: &str) -> bool {
-    const UNITS: [&str; 15] = [
+    const UNITS: [&str; 39] = [
         "mm",
         "cm",
         "km",
@@ -170,6 +170,30 @@ pub(super) fn tells(text: &str) -> bool {
         "disparities",
         "reciprocal",
         "wavenumber",
+        "thz",
+        "radiance",
+        "irradiance",
+        "reflectance",
+        "reflectances",
+        "luminance",
+        "absorbance",
+        "transmittance",
+        "photons",
+        "watt",
+        "watts",
+        "lux",
+        "nits",
+        "candela",
+        "radial",
+        "euclidean",
+        "axial",
+        "distance",
+        "distances",
+        "flipped",
+        "mirrored",
+        "rotated",
+        "upside",
+        "linear",
     ];
     const PARTS: [&str; 4] = ["metre", "meter", "micron", "angstrom"];
     const QUANTITIES: [&str; 11] =

@@ -72,9 +72,13 @@ fn numbers_that_stand_for_none_do_so_in_every_type() {
         assert_eq!(z_m("a.npy", &npy("<i4", false, "(2, 3)", &ints(codes))), expected, "{none}");
     }
     assert_eq!(z_m("a.txt", b"2000 nan 3000\n4000 5000 -1\n"), expected);
-    // Other numbers below 0 are no depths.
-    let turned = npy("<f4", false, "(2, 3)", &floats(&[-2.0, 3.0, 4.0, 5.0, 6.0, 7.0]));
-    check_refused(with_depth("a.npy", &turned, Some("m")), &["-2 m", "above 0"]);
+    for none in [f32::NEG_INFINITY, f32::MIN, -0.5] {
+        let codes = [2000.0, none, 3000.0, 4000.0, 5000.0, 0.0];
+        assert_eq!(z_m("a.npy", &npy("<f4", false, "(2, 3)", &floats(&codes))), expected, "{none}");
+    }
+    // An axis that points to the camera.
+    let turned = npy("<f4", false, "(2, 3)", &floats(&[-2.0, -3.0, -4.0, -5.0, 6.0, f32::NAN]));
+    check_refused(with_depth("a.npy", &turned, Some("m")), &["below 0", "other sign"]);
 }
 
 #[test]

@@ -13,10 +13,11 @@ use tiff::{
 
 use super::{
     contents::is_of,
-    picture_parts::comment,
+    picture_parts::{comment, notes_on_page},
     stated::{Noted, name_of, note_of},
     tiff_bands::{AsGray, planes_of},
     tiff_directory::{BELOW, Directory},
+    tiff_gdal::{GDAL, GdalWords},
     tiff_page::{Marked, Page, PageWords, SampleDepth, StatedBands},
     unusable::{check_memory, fault, unreadable},
 };
@@ -24,6 +25,10 @@ use crate::SceneError;
 
 /// The tag of a description.
 const DESCRIPTION: u16 = 270;
+/// The tags of the name of a document, of XMP data, and of Exif data.
+const DOCUMENT: u16 = 269;
+const XMP: u16 = 700;
+const EXIF: u16 = 34_665;
 /// The tag of what samples are marked as.
 const PHOTOMETRIC: u16 = 262;
 /// What of it is decoded, and a depth map.
@@ -151,7 +156,9 @@ pub(super) fn read_tiff(path: &Path, wanted: TiffAs) -> Result<Noted<TiffFile>, 
     let Some((first, _)) = pages.first() else { return Err(no_page(path)) };
     let words = first.words();
     // A picture of two gray samples may be told by its description to be one of two bands.
-    let is_listed = first.n_listed() == Some(pages.iter().map(|(page, _)| page.n_samples).sum());
+    let n_planes = pages.iter().map(|(page, _)| page.n_samples).sum();
+    let of_gdal = first.gdal.wavelengths_nm.as_ref().map(Vec::len);
+    let is_listed = [first.n_listed(), of_gdal].contains(&Some(n_planes));
     let as_planes = first.is_stack() || ((wanted != TiffAs::Marked || is_listed) && first.has_plain_samples());
     notes.extend(first.note_of_white(path).filter(|_| as_planes));
     // Gray pages are planes of a stack, colored ones a picture and others.
@@ -168,16 +175,26 @@ pub(super) fn read_tiff(path: &Path, wanted: TiffAs) -> Result<Noted<TiffFile>, 
     notes.extend(words.note_of_orientation(path));
     let mut planes = planes_of_pages(path, &pages)?;
     let first = &pages[0].0;
+    let words = unpacked(first, words, &mut planes);
     if is_picture {
         if first.unknown_sample().is_none() {
             notes.extend(without_opacity(path, first, &mut planes));
         }
         return Ok(Noted::new(TiffFile::Linear(colors_of(path, planes)?, words), notes));
     }
-    let top = first.top();
+    let top = first.top().filter(|_| !first.gdal.is_packed());
+    // That of a page is of its samples.
+    let gdal_nm = first.gdal.wavelengths_nm.clone().filter(|own| own.len() == planes.len());
     let own: Vec<Page> = pages.into_iter().map(|(page, _)| page).collect();
     // Where there are as many wavelengths as samples, what is marked as an opacity is a band.
-    let bands = StatedBands::of(&own).map_err(|reason| unreadable(path, reason))?;
+    let mut bands = StatedBands::of(&own).map_err(|reason| unreadable(path, reason))?;
+    if let (Some(own), Some(gdal)) = (&bands.wavelengths_nm, &gdal_nm)
+        && own != gdal
+    {
+        let reason = "its descriptions state other wavelengths than its metadata of GDAL: expected one of them";
+        return Err(unreadable(path, reason));
+    }
+    bands.wavelengths_nm = bands.wavelengths_nm.or(gdal_nm);
     let n_stated = bands.wavelengths_nm.as_ref().map(Vec::len);
     let is_whole = wanted == TiffAs::Planes(Some(planes.len())) || n_stated == Some(planes.len());
     if is_whole {
@@ -190,9 +207,21 @@ pub(super) fn read_tiff(path: &Path, wanted: TiffAs) -> Result<Noted<TiffFile>, 
     }
     notes.extend(note_of(path, "description key", &bands.keys));
     notes.extend(note_of(path, "page name", &bands.names));
+    let document: Vec<String> = own[0].document.iter().filter_map(|text| comment(text.as_bytes())).collect();
+    notes.extend(note_of(path, "document name", &document));
     let mut page = words;
     page.descriptions = described(&own, bands.are_described);
     Ok(Noted::new(TiffFile::Stack(TiffStack { planes, wavelengths_nm: bands.wavelengths_nm, top, page }), notes))
+}
+
+/// Makes the quantities of numbers that are packed, those that stand for none being none.
+fn unpacked(first: &Page, mut words: PageWords, planes: &mut [Array2<f32>]) -> PageWords {
+    if first.gdal.is_packed() {
+        planes.iter_mut().for_each(|plane| words.ignore(plane));
+        words.no_data = None;
+        first.gdal.unpack(planes);
+    }
+    words
 }
 
 /// Returns what the descriptions of all pages say, each once, where their wavelengths are not all that they say.
@@ -220,7 +249,7 @@ fn pages_of(path: &Path, wanted: TiffAs) -> Result<Pages, SceneError> {
     let length = fs::metadata(path).map_err(|error| unreadable(path, error))?.len();
     let mut decoder = Decoder::new(reader).map_err(broken)?.with_limits(Limits::default());
     let mut pages: Vec<(Page, u64)> = vec![];
-    let (mut bytes, mut unused, mut unknown) = (0, vec![], vec![]);
+    let (mut bytes, mut unused, mut unknown, mut notes) = (0, vec![], vec![], vec![]);
     for index in 1.. {
         if index > LIMIT_PAGES {
             return Err(unreadable(path, format!("it has more than {LIMIT_PAGES} pages")));
@@ -244,11 +273,20 @@ fn pages_of(path: &Path, wanted: TiffAs) -> Result<Pages, SceneError> {
             unused.extend((is_depth && wanted == TiffAs::Planes(None)).then(|| format!("{index} (a depth map)")));
             continue;
         }
-        if pages.is_empty() && !page.is_reduced && !page.descriptions.is_empty() {
-            // What decodes the file keeps the last of two.
+        if pages.is_empty() && !page.is_reduced {
             let mut file = File::open(path).map_err(|error| unreadable(path, error))?;
             let directory = Directory::read(&mut file, at).map_err(|error| unreadable(path, error))?;
-            page.descriptions = directory.texts(&mut file, DESCRIPTION).map_err(|error| unreadable(path, error))?;
+            let mut texts =
+                |tag| directory.texts(&mut file, tag).map_err(|error: std::io::Error| unreadable(path, error));
+            // What decodes the file keeps the last of two.
+            page.descriptions = texts(DESCRIPTION)?;
+            page.document = texts(DOCUMENT)?.into_iter().next();
+            let (xmp, gdal) = (texts(XMP)?, texts(GDAL)?.join(" "));
+            page.gdal = GdalWords::of(&gdal, page.n_samples);
+            let read = [(XMP, !xmp.is_empty()), (GDAL, !gdal.is_empty()), (EXIF, true)];
+            page.unknown.retain(|tag| !read.contains(&(*tag, true)));
+            notes.extend(notes_on_page(path, &xmp, matches!(wanted, TiffAs::Marked | TiffAs::Planes(Some(_)))));
+            notes.extend(note_of(path, "item of GDAL", &page.gdal.left));
         }
         bytes += page.bytes();
         // Its numbers as they stand, and as single floats.
@@ -280,7 +318,7 @@ fn pages_of(path: &Path, wanted: TiffAs) -> Result<Pages, SceneError> {
     }
     unknown.sort();
     unknown.dedup();
-    let notes = note_of(path, "tag", &unknown).into_iter().collect();
+    notes.extend(note_of(path, "tag", &unknown));
     Ok(Pages { pages, unused, notes })
 }
 
@@ -301,7 +339,7 @@ pub(super) fn float_planes(path: &Path) -> Result<Option<Noted<Vec<Array2<f32>>>
         }
     }
     let mut planes = planes_of_pages(path, &pages)?;
-    let words = first.words();
+    let words = unpacked(first, first.words(), &mut planes);
     planes.iter_mut().for_each(|plane| words.count_from_black(plane, None));
     let note = without_opacity(path, &pages[0].0, &mut planes);
     Ok(Some(Noted::new(planes, note)))
@@ -325,7 +363,12 @@ fn notes_on_others(path: &Path, pages: &[(Page, u64)], mut unused: Vec<String>) 
     if first.depth != SampleDepth::Float {
         let no_data = first.words().no_data.map(|none| none.to_string());
         notes.extend(note_of(path, "number for no data (GDAL)", no_data.as_slice()));
+        notes.extend(note_of(path, "word of GDAL", &first.gdal.of_numbers()));
+    } else {
+        notes.extend(first.words().note_of_unit(path));
     }
+    let named: Vec<String> = first.names().filter_map(|text| comment(text.as_bytes())).collect();
+    notes.extend(note_of(path, "name", &named));
     let told: Vec<String> = first.descriptions.iter().filter_map(|text| comment(text.as_bytes())).collect();
     notes.extend(note_of(path, "description", &told));
     notes

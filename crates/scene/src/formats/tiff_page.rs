@@ -16,14 +16,16 @@ use super::{
     picture_parts::differ,
     stated::{name_of, note_of},
     tiff_depth_map::{DEPTH_TAGS, DepthMapTags},
+    tiff_gdal::GdalWords,
 };
 
 /// The name of a page.
 const PAGE_NAME: Tag = Tag::Unknown(285);
 /// Tags that say how samples lie in the file, or what changes nothing: from sizes and strips to who made it when.
-const HARMLESS: [u16; 45] = [
+const HARMLESS: [u16; 46] = [
     254, 255, 256, 257, 258, 259, 262, 263, 266, 269, 270, 271, 272, 273, 274, 277, 278, 279, 282, 283, 284, 285, 288,
-    289, 292, 293, 296, 297, 305, 306, 315, 316, 317, 320, 322, 323, 324, 325, 338, 339, 347, 530, 531, 33432, 42113,
+    289, 292, 293, 296, 297, 305, 306, 315, 316, 317, 320, 322, 323, 324, 325, 338, 339, 347, 530, 531, 33432, 34853,
+    42113,
 ];
 
 /// The codes of black and of white of each sample.
@@ -92,6 +94,9 @@ pub(super) struct Page {
     /// Whether its samples are compressed as those of a JPEG picture.
     pub(super) is_jpeg: bool,
     name: Option<String>,
+    /// The name of the document that it is of.
+    pub(super) document: Option<String>,
+    pub(super) gdal: GdalWords,
     /// What its descriptions say, of which some writers have two.
     pub(super) descriptions: Vec<String>,
     no_data: Option<f64>,
@@ -174,6 +179,8 @@ impl Page {
             has_tiles_of_planes: is_planar && n_samples > 1 && has_tiles,
             is_jpeg: matches!(compression, 6 | 7),
             name,
+            document: None,
+            gdal: GdalWords::default(),
             descriptions,
             no_data,
             orientation,
@@ -187,9 +194,16 @@ impl Page {
             // Of several samples none is counted from white.
             is_white_zero: self.marked == Marked::Gray { is_white_zero: true } && self.n_samples == 1,
             descriptions: self.descriptions.clone(),
+            called: self.names().chain(self.descriptions.iter()).cloned().collect::<Vec<_>>().join("; "),
+            unit: self.gdal.unit.clone(),
             orientation: self.orientation,
             depth_map: self.depth_map,
         }
+    }
+
+    /// Returns what the page and its document are called.
+    pub(super) fn names(&self) -> impl Iterator<Item = &String> {
+        self.name.iter().chain(&self.document)
     }
 
     pub(super) fn bytes(&self) -> u64 {
@@ -277,6 +291,10 @@ pub(super) struct PageWords {
     /// Whether 0 is white.
     pub(super) is_white_zero: bool,
     pub(super) descriptions: Vec<String>,
+    /// What the file calls its numbers, in names and descriptions.
+    pub(super) called: String,
+    /// The unit of its numbers.
+    pub(super) unit: Option<String>,
     orientation: u16,
     pub(super) depth_map: Option<DepthMapTags>,
 }
@@ -295,6 +313,11 @@ impl PageWords {
             let top = top.unwrap_or(1.0) as f32;
             plane.mapv_inplace(|v| top - v);
         }
+    }
+
+    /// Returns what is said of a unit that nothing took.
+    pub(super) fn note_of_unit(&self, path: &Path) -> Option<String> {
+        note_of(path, "unit", self.unit.as_slice())
     }
 
     /// Returns what is said of numbers that lie as stored.
@@ -417,7 +440,7 @@ fn listed_in(page: &Page) -> Option<(Vec<f64>, Vec<String>)> {
 }
 
 /// Returns the wavelength of a text such as `450 nm` or `Band 450.5nm`.
-fn wavelength_in(text: &str) -> Option<f64> {
+pub(super) fn wavelength_in(text: &str) -> Option<f64> {
     let before = text.trim().strip_suffix("nm")?.trim_end();
     let number = before.rsplit(|c: char| !(c.is_ascii_digit() || c == '.')).next()?;
     number.parse().ok().filter(|nm: &f64| *nm > 0.0)

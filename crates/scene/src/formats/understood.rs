@@ -178,7 +178,9 @@ fn axis(view: View, rows: usize, columns: usize) -> String {
     if across.hypot(down) < 0.05 * columns as f64 {
         return String::new();
     }
-    format!(", its axis {across:.0} samples right of and {down:.0} below the middle")
+    // The sum has no 0 below 0.
+    let [across, down] = [across, down].map(|samples| (10.0 * samples).round() / 10.0 + 0.0);
+    format!(", its axis {across} samples right of and {down} below the middle")
 }
 
 /// Returns a number with three digits.

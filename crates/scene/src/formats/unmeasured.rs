@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::SceneError;
 
-/// The depth of places where nothing was measured: code 0 of a depth picture, 0 or NaN of a file of numbers.
+/// The depth of places where nothing was measured: code 0 of a depth picture, what is no number above 0 of a file of numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
@@ -57,10 +57,10 @@ impl FromStr for FillDepth {
     }
 }
 
-/// Returns a map of depths, with those that are 0 or NaN filled where that is asked for, and what was done in a sentence.
+/// Returns a map of depths, with those that are no number above 0 filled where that is asked for, and what was done in a sentence.
 ///
 /// # Errors
-/// When a depth is not above 0, or none was measured at all.
+/// When a depth is not above 0 and no filling is asked for, or none was measured at all.
 pub fn filled_depth(
     name: &str,
     z_m: Array2<f32>,
@@ -75,14 +75,14 @@ pub fn filled_depth(
     Ok((DepthMap::new(z_m)?, note))
 }
 
-/// Returns the depths with those that are 0 or NaN filled, and how many there were; `None` where no depth was measured at all.
+/// Returns the depths with those that are no number above 0 filled, and how many there were; `None` where no depth was measured at
+/// all. Below 0 are what programs put where they measured none, as −∞ of what was too near.
 pub(super) fn filled(mut z_m: Array2<f32>, fill: FillDepth) -> Option<(Array2<f32>, usize)> {
-    let is_measured = |z: f32| z > 0.0;
-    let n_unmeasured = z_m.iter().filter(|&&z| !(is_measured(z) || z < 0.0)).count();
+    let n_unmeasured = z_m.iter().filter(|&&z| !is_measured(z)).count();
     if n_unmeasured == 0 {
         return Some((z_m, 0));
     }
-    z_m.mapv_inplace(|z| if z.is_nan() { 0.0 } else { z });
+    z_m.mapv_inplace(|z| if is_measured(z) { z } else { 0.0 });
     let farthest = z_m.iter().copied().fold(0.0, f32::max);
     match fill {
         FillDepth::Metres(metres) => z_m.mapv_inplace(|z| if z == 0.0 { metres as f32 } else { z }),
@@ -91,6 +91,11 @@ pub(super) fn filled(mut z_m: Array2<f32>, fill: FillDepth) -> Option<(Array2<f3
         FillDepth::Beside => fill_from_beside(&mut z_m),
     }
     Some((z_m, n_unmeasured))
+}
+
+/// Whether a number is a depth, the sky's included.
+pub(super) fn is_measured(z_m: f32) -> bool {
+    z_m > 0.0
 }
 
 /// Returns in a sentence how many depths were filled, and with what.
@@ -153,9 +158,10 @@ mod tests {
     }
 
     #[test]
-    fn negative_depths_are_no_gaps() {
-        let (map, n) = filled(arr2(&[[-1.0, 0.0, 2.0]]), FillDepth::Far).unwrap();
-        assert_eq!((map, n), (arr2(&[[-1.0, 2.0, 2.0]]), 1));
+    fn what_is_below_0_was_not_measured() {
+        let (map, n) =
+            filled(arr2(&[[-0.5, f32::NEG_INFINITY, f32::MIN, 2.0, f32::INFINITY]]), FillDepth::Metres(3.0)).unwrap();
+        assert_eq!((map, n), (arr2(&[[3.0, 3.0, 3.0, 2.0, f32::INFINITY]]), 3));
     }
 
     #[test]

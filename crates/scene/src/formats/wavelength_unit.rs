@@ -27,7 +27,7 @@ pub(super) fn in_nm(unit: &str, numbers: &[f64]) -> Option<Vec<f64>> {
         }
         "mm" | "millimeters" | "millimeter" | "millimetres" | "millimetre" => times(1e6),
         "m" | "meters" | "meter" | "metres" | "metre" => times(1e9),
-        "angstroms" | "angstrom" | "ångström" | "å" | "a" | "aa" => times(0.1),
+        "angstroms" | "angstrom" | "ångström" | "å" | "aa" | "a" => times(0.1),
         "wavenumber" | "cm-1" | "cm^-1" | "cm⁻¹" | "1/cm" => over(1e7),
         "hz" => over(NM_PER_S),
         "ghz" => over(1e-9 * NM_PER_S),
@@ -60,7 +60,11 @@ pub(super) fn listed_nm(name: &str, unit: Option<&str>, numbers: &[f64]) -> Resu
 }
 
 fn list_of(name: &str, unit: Option<&str>, numbers: &[f64], or: &str) -> Result<Option<Vec<f64>>, String> {
-    let Some(unit) = unit else {
+    // A letter that may also tell one camera from another.
+    let last = name.trim_end_matches([']', ')']).rsplit(['_', '[', '(', ' ']).next();
+    let is_angstrom =
+        last == Some("A") && numbers.iter().all(|number| (1500.0..PLAUSIBLE_NM.end() * 10.0).contains(number));
+    let Some(unit) = unit.or(is_angstrom.then_some("A")) else {
         if are_counted(numbers) {
             return Ok(None);
         }
@@ -90,15 +94,19 @@ fn list_of(name: &str, unit: Option<&str>, numbers: &[f64], or: &str) -> Result<
 
 /// Returns the unit of wavelengths, wavenumbers, frequencies or energies that a name is or has among its words, as `wavelength_um`.
 pub(super) fn unit_in(name: &str) -> Option<&str> {
+    // Single letters are in too many names.
     let is_unit = |word: &&str| (word.chars().count() > 1 || *word == "Å") && in_nm(word, &[]).is_some();
-    let apart = |c: char| "/_ -,\t()[]".contains(c);
-    // A capital behind a small letter begins a word, as in wavelengthAngstrom.
-    let capital = name.char_indices().rev().find(|(i, c)| c.is_uppercase() && name[..*i].ends_with(char::is_lowercase));
-    // Single letters are in too many names, but for that at their end.
-    let last = name.split(apart).filter(|word| !word.is_empty()).skip(1).last().filter(|word| *word == "A");
-    let of_words = || name.rsplit(apart).find(is_unit);
-    let of_capital = || capital.map(|(i, _)| &name[i..]).filter(|word| is_unit(word) || *word == "A");
-    Some(name.trim()).filter(is_unit).or_else(of_words).or_else(of_capital).or(last)
+    const BETWEEN: [char; 11] = ['/', '_', ' ', '-', ',', '\t', '[', ']', '(', ')', '.'];
+    // A capital behind a small letter begins a word.
+    let behind = |word: &&str| {
+        let starts = word.char_indices().zip(word.chars().skip(1));
+        let starts = starts.filter(|((_, a), b)| a.is_lowercase() && b.is_uppercase());
+        starts.last().map(|((at, a), _)| at + a.len_utf8())
+    };
+    Some(name.trim())
+        .filter(is_unit)
+        .or_else(|| name.rsplit(BETWEEN).find(is_unit))
+        .or_else(|| name.rsplit(BETWEEN).find_map(|word| Some(&word[behind(&word)?..]).filter(is_unit)))
 }
 
 /// Returns the wavelengths, nm, of the column of a table, as the unit in its name says (`wavelength_nm`, `Wavelength (µm)`, `cm^-1`) or, where
@@ -192,6 +200,7 @@ mod tests {
             ("Wavelength angstrom", 5000.0),
             ("wavelengthAngstrom", 5000.0),
             ("wavelengths_A", 5000.0),
+            ("wavelengths_A", 500.0),
             ("wavelength_AA", 5000.0),
             ("wavelength[A]", 5000.0),
             ("wavelength", 0.5),

@@ -220,7 +220,8 @@ fn cube_of(path: &Path, file: &MatFile, name: &str, reading: &FileReading) -> Re
     let own = waves.as_ref().map(|waves| waves.nm.clone()).or(stated.clone()).or(known);
     let n_bands = reading.wavelengths_nm.as_ref().or(own.as_ref()).map(Vec::len);
     let unit = UnitOf::read(packing.unit.as_deref());
-    let percent = if matches!(unit, UnitOf::Percent) { 0.01 } else { 1.0 };
+    let packing = if matches!(unit, UnitOf::Light(..)) { packing } else { packing.of_reflectances() };
+    let percent = if matches!(unit, UnitOf::Percent) && packing.white.is_none() { 0.01 } else { 1.0 };
     let (order, named) = axes::order(file.words_of(name).1, reading.axes.as_deref());
     let planes = axes::planes(&array.sides, order.as_deref(), n_bands, file.is_row_major, |index| {
         (percent * packing.unpacked(numbers.at(index))) as f32
@@ -242,7 +243,8 @@ fn cube_of(path: &Path, file: &MatFile, name: &str, reading: &FileReading) -> Re
     let mut left = packing.left(!matches!(unit, UnitOf::Unknown), stated.is_some());
     left.extend(waves.iter().flat_map(|waves| waves.left.iter().map(|name| format!("{name} of {}", waves.name))));
     notes.extend(note_of(path, "attribute", &of_file.chain(left).collect::<Vec<_>>()));
-    let mut quantity = matches!(unit, UnitOf::Percent | UnitOf::Reflectance).then_some(FileQuantity::Reflectance);
+    let is_reflectance = matches!(unit, UnitOf::Percent | UnitOf::Reflectance) || packing.white.is_some();
+    let mut quantity = is_reflectance.then_some(FileQuantity::Reflectance);
     let is_integer = numbers.is_integer && !packing.is_packed();
     let told = reading.quantity.is_some() || reading.unit.is_some();
     if !told && !is_integer && quantity.is_none() && !matches!(unit, UnitOf::Light(..)) {
@@ -260,8 +262,8 @@ fn cube_of(path: &Path, file: &MatFile, name: &str, reading: &FileReading) -> Re
     Ok(NumberCube { planes, top, wavelengths_nm: own, quantity, unit, notes })
 }
 
-/// What the unit of an array says that its numbers are.
-enum UnitOf {
+/// What the unit of numbers says that they are.
+pub(in super::super) enum UnitOf {
     Light(LightUnit, String),
     Reflectance,
     Percent,
@@ -270,7 +272,7 @@ enum UnitOf {
 }
 
 impl UnitOf {
-    fn read(text: Option<&str>) -> Self {
+    pub(in super::super) fn read(text: Option<&str>) -> Self {
         let Some(text) = text else { return Self::Unknown };
         match text.to_lowercase().as_str() {
             "%" | "percent" => Self::Percent,
@@ -301,7 +303,10 @@ fn waves_of(file: &MatFile, cube: &str, sides: &[usize], is_told: bool) -> Resul
     let names = inner.iter().map(|(name, _)| name).chain(file.listed.iter().map(|own| &own.name));
     let rank = |own: &&String| rank_of_waves(last_part(own).rsplit('.').next().unwrap_or_default());
     let mut lists: Vec<&String> = names.filter(|own| *own != cube && rank(own).is_some()).collect();
-    lists.sort_by_key(rank);
+    // Those along a dimension of the cube before others.
+    let axes = file.words_of(cube).1;
+    let is_along = |own: &String| file.words_of(own).1.iter().any(|axis| axes.contains(axis));
+    lists.sort_by_key(|own| (!is_along(own), rank(own)));
     for own in lists {
         let numbers = file.array(own)?.and_then(|array| array.list());
         let Some(numbers) = numbers.filter(|list| sides.contains(&list.len())) else { continue };

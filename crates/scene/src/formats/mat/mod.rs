@@ -22,6 +22,6 @@ pub use iset_film::{IsetIrradiance, holds_iset_irradiance, read_iset_irradiance,
 pub use iset_write::write_iset_scene;
 #[cfg(test)]
 use isetcam::IsetScene;
-pub(super) use isetcam::{MatScene, read_mat};
+pub(super) use isetcam::{MatScene, UnitOf, read_mat};
 pub(super) use packing::rank_of_waves;
 pub(super) use plane::{DEPTHS, Plane, read_plane};

@@ -37,11 +37,17 @@ pub(super) struct Packing<'a> {
     scale: f64,
     offset: f64,
     missing: Vec<f64>,
+    /// The number of a perfect white (`Scale_Factor` of NEON, by which numbers are divided).
+    pub(super) white: Option<f64>,
     pub(super) unit: Option<String>,
 }
 
 /// Attributes that say which numbers stand for none.
-const MISSING: [&str; 2] = ["_FillValue", "missing_value"];
+const MISSING: [&str; 3] = ["_FillValue", "missing_value", "Data_Ignore_Value"];
+/// Names of a factor and of what is added then, those of netCDF and of HDF4.
+const SCALES: [&str; 2] = ["scale_factor", "slope"];
+const OFFSETS: [&str; 2] = ["add_offset", "intercept"];
+const WHITE: &str = "Scale_Factor";
 const UNITS: [&str; 2] = ["units", "unit"];
 
 /// Whether an attribute is called the unit of wavelengths.
@@ -66,11 +72,24 @@ impl<'a> Packing<'a> {
         };
         Self {
             attributes,
-            scale: number("scale_factor").unwrap_or(1.0),
-            offset: number("add_offset").unwrap_or(0.0),
+            scale: SCALES.into_iter().find_map(number).unwrap_or(1.0),
+            offset: OFFSETS.into_iter().find_map(number).unwrap_or(0.0),
+            white: None,
             missing: MISSING.iter().flat_map(|name| numbers(name)).collect(),
             unit: UNITS.iter().find_map(text).filter(|text| !text.is_empty()),
         }
+    }
+
+    /// Takes a number of a perfect white that is stated, where nothing else packs the numbers.
+    pub(super) fn of_reflectances(mut self) -> Self {
+        let stated = self.attributes.iter().find(|own| own.name == WHITE).map(|own| &own.value);
+        if let (Some(Value::Numbers(list)), false) = (stated, self.is_packed())
+            && let [white] = list[..]
+            && white > 1.0
+        {
+            (self.white, self.scale) = (Some(white), 1.0 / white);
+        }
+        self
     }
 
     /// Whether whole numbers are no codes, but packed.
@@ -111,10 +130,18 @@ impl<'a> Packing<'a> {
         })
     }
 
+    /// Whether an attribute is the first of these names that has a number.
+    fn is_taken(&self, names: &[&str], name: &str) -> bool {
+        let is_number = |own: &&Attribute| matches!(&own.value, Value::Numbers(list) if list.len() == 1);
+        let find = |wanted: &&str| self.attributes.iter().filter(is_number).find(|own| own.name == *wanted);
+        names.iter().find_map(find).is_some_and(|own| own.name == name)
+    }
+
     /// Returns the names of attributes that are not used, where the unit is, and the wavelengths with theirs are, or not.
     pub(super) fn left(&self, is_unit_used: bool, are_waves_used: bool) -> Vec<String> {
         let is_used = |own: &Attribute| match own.name.as_str() {
-            "scale_factor" | "add_offset" => matches!(&own.value, Value::Numbers(list) if list.len() == 1),
+            WHITE => self.white.is_some(),
+            name if self.is_taken(&SCALES, name) || self.is_taken(&OFFSETS, name) => true,
             name if MISSING.contains(&name) => matches!(own.value, Value::Numbers(_)),
             name if UNITS.iter().any(|unit| name.eq_ignore_ascii_case(unit)) => is_unit_used,
             name => are_waves_used && (is_wave_unit(name) || self.waves().is_some_and(|(waves, _)| waves == name)),
@@ -160,6 +187,11 @@ mod tests {
             (packing.left(true, true), packing.unit.as_deref()),
             (vec!["good_wavelengths".to_owned()], Some("1"))
         );
+        let attributes = ["Scale_Factor", "slope"].map(|name| [of(name, Value::Numbers(vec![10_000.0]))]);
+        let [white, slope] = attributes.each_ref().map(|own| Packing::of(own).of_reflectances());
+        assert_eq!((white.unpacked(5000.0), white.white, white.left(true, true).len()), (0.5, Some(10_000.0), 0));
+        assert_eq!((slope.unpacked(2.0), slope.white), (20_000.0, None));
+        assert_eq!(Packing::of(&attributes[0]).left(true, true), ["Scale_Factor"]);
         assert!(!Packing::of(&[]).is_packed() && Packing::of(&[]).unpacked(3.0) == 3.0);
     }
 }
