@@ -71,17 +71,10 @@ impl Surroundings<'_> {
         }
         for point in points {
             let [down_px, across_px] = point.place_px(1e-3 * self.film.pitch_um);
-            let (row, column) = (pixels.row_before(down_px), pixels.column_before(across_px));
-            let (below, beside) = (down_px - pixels.down_px(row), across_px - pixels.across_px(column));
-            // Among four pixels, so that the middle of its light is where it is.
-            for (row, of_rows) in [(row, 1.0 - below), (row + 1, below)] {
-                for (column, of_columns) in [(column, 1.0 - beside), (column + 1, beside)] {
-                    let (row, column) = (row - first_row, column - first_column);
-                    if (0..wide_rows as i64).contains(&row) && (0..wide_columns as i64).contains(&column) {
-                        let part = of_rows * of_columns * point.light();
-                        wide[row as usize * wide_columns + column as usize] += part as f32;
-                    }
-                }
+            let row = pixels.row_before(down_px + 0.5) - first_row;
+            let column = pixels.column_before(across_px + 0.5) - first_column;
+            if (0..wide_rows as i64).contains(&row) && (0..wide_columns as i64).contains(&column) {
+                wide[row as usize * wide_columns + column as usize] += point.light() as f32;
             }
         }
         for (row, line) in picture.rows().into_iter().enumerate() {

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use super::{
+    light_unit::LightUnit,
     stated::{self, name_of, note_of},
     wavelength_unit::{PLAUSIBLE_NM, UNITS, in_nm, without_unit},
 };
@@ -179,6 +180,13 @@ pub(crate) fn parse(path: &Path, text: &str) -> Result<EnviHeader, SceneError> {
         entries.list("bbl", bands)?.map_or_else(Vec::new, |list| list.iter().map(|good| *good <= 0.0).collect());
     let wavelengths_nm = entries.wavelengths_nm()?;
     let frame_offsets = entries.frame_offsets()?;
+    // The second title is that of the values, as in {Wavelength (nm), Radiance (uW/cm2/sr/nm)}.
+    let titles = entries.get("z plot titles").map(|entry| entry.value.trim_matches(['{', '}']).to_owned());
+    let title = titles.as_deref().and_then(|titles| titles.rsplit_once(',')).map(|(_, title)| title.trim());
+    let plotted = title.and_then(|title| title.split_once(['(', '['])).map(|(_, unit)| unit.trim_end());
+    let plotted =
+        plotted.and_then(|unit| unit.strip_suffix([')', ']'])).filter(|unit| LightUnit::parse(unit).is_some());
+    let plotted_unit = plotted.map(str::to_owned);
     let mut header = EnviHeader {
         columns: entries.required("samples")?,
         rows: entries.required("lines")?,
@@ -202,7 +210,10 @@ pub(crate) fn parse(path: &Path, text: &str) -> Result<EnviHeader, SceneError> {
         radiance_scale: entries.positive("radiance scale factor")?,
         exposures: entries.exposures(),
         settings: entries.settings(),
-        data_units: entries.get("data units").map(|entry| entry.value.trim_matches(['{', '}']).trim().to_owned()),
+        data_units: entries
+            .get("data units")
+            .map(|entry| entry.value.trim_matches(['{', '}']).trim().to_owned())
+            .or(plotted_unit),
         notes: vec![],
     };
     if header.columns == 0 || header.rows == 0 || header.bands == 0 {

@@ -85,7 +85,10 @@ pub(crate) fn fault(format: &str, error: impl ToString, expected_variant: Option
     if is_of(&OTHER) && !small.contains("corrupt") {
         return format!("it is no {format}, as its name says: it begins otherwise");
     }
-    match expected_variant {
+    // What is known by a name or number is whole.
+    const VARIANT: [&str; 4] = ["version", "unsupported", "not supported", "cannot be enumerated"];
+    let other = is_of(&VARIANT).then_some("it saved as an older version of the format, or another kind of it");
+    match expected_variant.or(other) {
         Some(expected) => format!("it is {format} of a kind that is not read ({said}): expected {expected}"),
         None => format!("its {format} is damaged ({said}): expected an undamaged copy, or the file saved anew"),
     }
@@ -159,6 +162,12 @@ mod tests {
             ("failed to fill whole buffer", Some("another"), TRUNCATED),
             ("invalid Zip archive: Could not find EOCD", None, TRUNCATED),
             ("invalid: file identifier missing", None, "it is no EXR, as its name says: it begins otherwise"),
+            (
+                "invalid data layout version: 5",
+                None,
+                "it is EXR of a kind that is not read (invalid data layout version: 5): expected it saved as an older version of the \
+                 format, or another kind of it",
+            ),
             (
                 "not supported: deep data",
                 Some("flat"),
