@@ -9,7 +9,8 @@ use super::{
     picture::{decode, has_holes, pnm_top},
     picture_parts::{note_of_orientation, notes_on_parts},
     stated::{Noted, name_of, note_of},
-    tiff_file::{TiffAs, TiffFile, TiffStack, is_tiff, read_tiff},
+    tiff_directory::is_tiff,
+    tiff_file::{TiffAs, TiffFile, TiffStack, read_tiff},
     tiff_page::PageWords,
     unusable::unreadable,
 };

@@ -14,7 +14,8 @@ use super::{
     primaries::into_srgb,
     spectral_exr::{NamedPlanes, notes_on_planes_exr, read_planes_and_primaries_exr},
     stated::{Noted, name_of, note_of},
-    tiff_file::{float_planes, is_tiff, notes_on_pages},
+    tiff_directory::is_tiff,
+    tiff_file::{float_planes, notes_on_pages},
     unusable::{check_made, fault, unreadable},
 };
 use crate::SceneError;

@@ -15,7 +15,7 @@ use image::{
 
 use super::{
     stated::{name_of, note_of, short, tells},
-    tiff_file::is_tiff,
+    tiff_directory::is_tiff,
     unusable::unreadable,
 };
 use crate::SceneError;

@@ -30,7 +30,8 @@ use super::{
     reduced::reduced_size,
     spectral_exr::{AskedChannels, RawFile, RawHidden, RawImage, read_raw_exr},
     stated::{name_of, note_of},
-    tiff_file::{RAW, TiffAs, TiffFile, TiffStack, has_depth_map, is_tiff, read_tiff},
+    tiff_directory::is_tiff,
+    tiff_file::{RAW, TiffAs, TiffFile, TiffStack, has_depth_map, read_tiff},
     unusable::{check_whole, starts_with, unreadable},
 };
 use crate::{SceneError, View};

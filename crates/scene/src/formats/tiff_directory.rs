@@ -3,12 +3,21 @@
 use std::{
     fs::File,
     io::{Read, Result, Seek, SeekFrom},
+    path::Path,
 };
 
 /// Bytes of a text that are read.
 const MOST_BYTES: u64 = 1 << 20;
 /// Directories below one that are looked at.
 const MOST_BELOW: u64 = 1000;
+
+/// Whether a file is a TIFF, by its first bytes, or by its name where they say nothing.
+pub(super) fn is_tiff(path: &Path) -> bool {
+    let is_named =
+        || path.extension().is_some_and(|own| own.eq_ignore_ascii_case("tif") || own.eq_ignore_ascii_case("tiff"));
+    let by_content = dioptric_pictures::format_of(path).ok().flatten();
+    by_content.map_or_else(is_named, |format| format == dioptric_pictures::ImageFormat::Tiff)
+}
 
 /// The entries of a directory.
 pub(super) struct Directory {

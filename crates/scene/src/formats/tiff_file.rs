@@ -12,7 +12,6 @@ use tiff::{
 };
 
 use super::{
-    contents::is_of,
     picture_parts::{comment, notes_on_page},
     stated::{Noted, name_of, note_of},
     tiff_bands::{AsGray, planes_of},
@@ -92,12 +91,6 @@ fn unknown_mark(path: &Path) -> Option<String> {
             "its samples are marked as {other} (tag 262), which is not read, expected gray (0 or 1) or red, green and blue (2)"
         ),
     })
-}
-
-/// Whether a file is a TIFF, by its first bytes, or by its name where they say nothing.
-pub(super) fn is_tiff(path: &Path) -> bool {
-    let by_content = dioptric_pictures::format_of(path).ok().flatten();
-    by_content.map_or_else(|| is_of(path, &["tif", "tiff"]), |format| format == dioptric_pictures::ImageFormat::Tiff)
 }
 
 /// Returns what is said where no page is a picture.

@@ -2,7 +2,10 @@
 
 use ndarray::Array2;
 
-use super::{picture_parts::comment, tiff_page::wavelength_in, wavelength_unit::in_nm};
+use super::{
+    picture_parts::comment,
+    wavelength_unit::{in_nm, wavelength_in},
+};
 
 /// The tag.
 pub(super) const GDAL: u16 = 42_112;

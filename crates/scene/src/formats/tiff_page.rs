@@ -17,6 +17,7 @@ use super::{
     stated::{name_of, note_of},
     tiff_depth_map::{DEPTH_TAGS, DepthMapTags},
     tiff_gdal::GdalWords,
+    wavelength_unit::wavelength_in,
 };
 
 /// The name of a page.
@@ -437,11 +438,4 @@ fn listed_in(page: &Page) -> Option<(Vec<f64>, Vec<String>)> {
     // The shape of the array is written by tifffile.
     let left = map.into_iter().filter(|(key, value)| !is_usual(key, &words(value))).map(|(key, _)| key).collect();
     Some((list, left))
-}
-
-/// Returns the wavelength of a text such as `450 nm` or `Band 450.5nm`.
-pub(super) fn wavelength_in(text: &str) -> Option<f64> {
-    let before = text.trim().strip_suffix("nm")?.trim_end();
-    let number = before.rsplit(|c: char| !(c.is_ascii_digit() || c == '.')).next()?;
-    number.parse().ok().filter(|nm: &f64| *nm > 0.0)
 }

@@ -122,6 +122,25 @@ pub fn wavelengths_of_column(name: &str, numbers: &[f64]) -> Result<Vec<f64>, St
     list_of(name, unit, numbers, "")?.ok_or_else(counted)
 }
 
+/// Returns the wavelength of a text such as `450 nm`, `Band 450.5nm, FWHM 10 nm` or, of a band, `445-455 nm`: the first that it names.
+pub(super) fn wavelength_in(text: &str) -> Option<f64> {
+    let number = |text: &str| -> Option<f64> {
+        let number = text.rsplit(|c: char| !(c.is_ascii_digit() || c == '.')).next()?;
+        number.parse().ok().filter(|nm| *nm > 0.0)
+    };
+    let named = |(at, _): (usize, &str)| {
+        let is_word = !text[at + 2..].starts_with(char::is_alphanumeric);
+        let before = text[..at].trim_end();
+        let last = number(before).filter(|_| is_word)?;
+        let start = before.trim_end_matches(|c: char| c.is_ascii_digit() || c == '.').trim_end();
+        let first = ["-", "–", "to"].iter().find_map(|sign| number(start.strip_suffix(sign)?.trim_end()));
+        // No wider than a filter's: `2 - 450 nm` counts the band.
+        let first = first.filter(|first| *first < last && last - first <= 100.0);
+        Some(first.map_or(last, |first| 0.5 * (first + last)))
+    };
+    text.match_indices("nm").find_map(named)
+}
+
 /// Returns these bands of a file, counted from 0, by ascending wavelength.
 ///
 /// # Errors
@@ -211,6 +230,23 @@ mod tests {
         }
         assert!(wavelengths_of_column("waves (zorp)", &[500.0]).unwrap_err().contains("'zorp'"));
         assert!(wavelengths_of_column("band", &[1.0, 2.0]).unwrap_err().contains("counts bands"));
+    }
+
+    #[test]
+    fn words_name_wavelengths() {
+        for text in [
+            "450 nm",
+            "Band 450nm",
+            "450 nm, FWHM 10 nm",
+            "445-455 nm",
+            "445 – 455nm",
+            "445 to 455 nm",
+            "B-450.0 nm",
+            "2 - 450 nm",
+        ] {
+            assert_eq!(wavelength_in(text), Some(450.0), "{text}");
+        }
+        assert_eq!(["450", "450 nmol", "nm", "0 nm"].map(wavelength_in), [None; 4]);
     }
 
     #[test]
