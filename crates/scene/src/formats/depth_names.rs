@@ -36,8 +36,8 @@ impl SaidOfDepth {
         let own = words_of(stem);
         let has = |known: &[&str]| own.iter().any(|word| known.contains(&word.as_str()));
         let is_last = |known: &[&str]| {
-            let words = own.iter().filter(|word| length_m(word).is_none() && !is_number(word));
-            words.last().is_some_and(|word| known.contains(&word.as_str()))
+            let mut words = own.iter().filter(|word| length_m(word).is_none() && !is_number(word));
+            words.next_back().is_some_and(|word| known.contains(&word.as_str()))
         };
         const LENGTHS: [&str; 7] = ["depth", "depths", "distance", "distances", "dist", "length", "lengths"];
         let is_axial = has(&["axial", "planar"]) || has_pair(&own, &["image"], &["plane"]);
