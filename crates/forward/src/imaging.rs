@@ -1,7 +1,7 @@
 //! The imaging of a scene's layers through one lens or one part of its pupil.
 
 use std::{
-    collections::{BTreeMap, BTreeSet},
+    collections::BTreeMap,
     sync::{Arc, Mutex, MutexGuard, PoisonError},
 };
 
@@ -58,7 +58,6 @@ pub(crate) struct Imaging {
     /// The points beside the scene; `None` where no film point looks.
     points: Vec<Option<Beside>>,
     kept: Mutex<Kept>,
-    halos: Halos,
     /// The largest that the kernels of a band have been, bytes.
     kernel_bytes: usize,
     pub(crate) stopwatch: Stopwatch,
@@ -107,11 +106,6 @@ impl Imaging {
         let kernels = BandKernels { by_layer: Arc::new(tiling.middle_kernels(&layered, middle_nm, &unobserved)?) };
         let through = |sight| Visible::through(sight, (&tiling.layers, &kernels.by_layer), film, work.cancel());
         let visible = sight.map(through).transpose()?;
-        let looked_up = few_of(&scene.kernel_bands).map(|band| (band, grid.centers_nm()[band]));
-        let of_points = points.iter().flatten().map(|point| point.seen_at().1);
-        let depths_dioptres: Vec<f64> = layers.dioptres().iter().copied().chain(of_points).collect();
-        let on_film = (film, settings.widest_blur_px);
-        let halos = Halos::of(lens, &depths_dioptres, on_film, &looked_up.collect::<Vec<_>>());
         let mut kept = Kept { budget_bytes: USUAL_BYTES, ..Kept::default() };
         kept.keep(middle, &kernels);
         Ok(Self {
@@ -125,7 +119,6 @@ impl Imaging {
             visible,
             points,
             kept: Mutex::new(kept),
-            halos,
             // Those of the middle band tell how much memory kernels take.
             kernel_bytes: kernels.size_bytes() + kernels.size_bytes() / 4,
             stopwatch,
@@ -139,7 +132,6 @@ impl Imaging {
         self.blocks.size_bytes()
             + self.visible.as_ref().map_or(0, Visible::size_bytes)
             + self.tiling.size_bytes()
-            + self.halos.size_bytes()
             + self.kept().size_bytes
     }
 
@@ -255,7 +247,7 @@ impl Imaging {
         const HALO_PLANES: usize = 4;
         let m = beside(&self.spec.film);
         let wide = (rows + 2 * m) * (columns + 2 * m);
-        let halos = if self.halos.are_any() { HALO_PLANES * wide + Halos::values(wide) } else { 0 };
+        let halos = if self.scene.halos.are_any() { HALO_PLANES * wide + Halos::values(wide) } else { 0 };
         let planes = PLANES * (rows * columns).max(scene_rows * scene_columns) + halos;
         size_of::<f32>() * planes + self.kernel_bytes
     }
@@ -346,9 +338,9 @@ impl Imaging {
             // What a pixel sees is spread before it is lit: an even scene stays even.
             let around = Surroundings { film: &self.spec.film, scene: &self.raster, map: &map };
             let front = front.as_slice().unwrap_or_default();
-            let picture = self.halos.applied(band, picture, (&around, front, &lamps));
+            let picture = self.scene.halos.applied(band, picture, (&around, front, &lamps));
             let beside = (!beside.is_empty()).then(|| Array2::from_shape_vec((rows, columns), beside).ok()).flatten();
-            let beside = beside.map(|beside| self.halos.applied(band, beside, (&around, &[], &points)));
+            let beside = beside.map(|beside| self.scene.halos.applied(band, beside, (&around, &[], &points)));
             self.lit(picture, beside, &map)
         }))
     }
@@ -452,9 +444,4 @@ fn about(bands: &[usize], band: usize) -> (usize, usize, f32) {
     let upper = bands[above];
     let lower = if upper == band { upper } else { bands[above - 1] };
     (lower, upper, (band - lower) as f32 / (upper - lower).max(1) as f32)
-}
-
-/// Returns the first, the middle and the last of some bands.
-fn few_of(bands: &[usize]) -> impl Iterator<Item = usize> {
-    BTreeSet::from([0, bands.len() / 2, bands.len() - 1].map(|number| bands[number])).into_iter()
 }

@@ -1,6 +1,6 @@
 //! The depths of a scene in layers, and what their edges hide: the same for all parts of a pupil.
 
-use std::sync::Arc;
+use std::{collections::BTreeSet, sync::Arc};
 
 use dioptric_psf::LensImage;
 use dioptric_spectrum::Cancel;
@@ -8,6 +8,7 @@ use glam::DVec2;
 
 use crate::{
     BlurMode, Film, ForwardError, ImagingSpec, SceneGeometry,
+    halo::Halos,
     layers::{Blurs, DEPTH_EDGE_PX, Layers},
     mixed::MixedSamples,
     narrow::NarrowRule,
@@ -35,6 +36,8 @@ pub(crate) struct SceneLayers {
     pub(crate) narrow_fraction: f64,
     /// Whether layers hide those behind them.
     pub(crate) hides: bool,
+    /// Edges of the whole pupil bend light, not those between its parts.
+    pub(crate) halos: Halos,
 }
 
 impl SceneLayers {
@@ -57,14 +60,20 @@ impl SceneLayers {
         let layers = Layers::over((1.0 / far_m, 1.0 / near_m), settings.layer_step_px, &blurs);
         let [kernel_bands, point_bands] =
             [1.0, OF_POINTS].map(|part| layers.chromatic_knots(part * settings.chromatic_step_px, &blurs));
+        let of_points = scene.points.iter().map(|point| 1.0 / point.depth_m);
+        let depths_dioptres: Vec<f64> = layers.dioptres().iter().copied().chain(of_points).collect();
+        let looked_up = few_of(&kernel_bands).map(|band| (band, grid.centers_nm()[band]));
+        let on_film = (film, settings.widest_blur_px);
+        let halos = Halos::of(lens, &depths_dioptres, on_film, &looked_up.collect::<Vec<_>>());
         let z_m = scene.depth.z_m();
         let coordinate = |row: usize, column: usize| layers.coordinate_of(z_m[(row, column)]);
         let coordinates = LayerCoordinates::new(plane_of(z_m.dim(), cancel, coordinate)?, cancel)?;
         let hides = settings.mode != BlurMode::Pointwise && layers.len() > 1;
         if !hides {
             let (occluded, mixed) = (OccludedSamples::Nothing, MixedSamples::default());
+            let narrow_fraction = 0.0;
             let this =
-                Self { layers, kernel_bands, point_bands, coordinates, occluded, mixed, narrow_fraction: 0.0, hides };
+                Self { layers, kernel_bands, point_bands, coordinates, occluded, mixed, narrow_fraction, hides, halos };
             return Ok(Arc::new(this));
         }
         // How fine the scene is in the film's middle.
@@ -75,7 +84,9 @@ impl SceneLayers {
         let occluded = OccludedSamples::find(&distances, &layers, samples_per_pixel, cancel)?;
         let mixed = MixedSamples::find(&distances, &layers, cancel)?;
         let narrow_fraction = narrow.fraction(&distances.front, cancel)?;
-        Ok(Arc::new(Self { layers, kernel_bands, point_bands, coordinates, occluded, mixed, narrow_fraction, hides }))
+        let this =
+            Self { layers, kernel_bands, point_bands, coordinates, occluded, mixed, narrow_fraction, hides, halos };
+        Ok(Arc::new(this))
     }
 
     /// Rows and columns of the scene.
@@ -88,7 +99,13 @@ impl SceneLayers {
             + self.occluded.layer_coordinates().map_or(0, LayerCoordinates::size_bytes)
             + self.occluded.size_bytes()
             + self.mixed.size_bytes()
+            + self.halos.size_bytes()
     }
+}
+
+/// Returns the first, the middle and the last of some bands.
+fn few_of(bands: &[usize]) -> impl Iterator<Item = usize> {
+    BTreeSet::from([0, bands.len() / 2, bands.len() - 1].map(|number| bands[number])).into_iter()
 }
 
 /// Returns a few points of the film, of which the blur tells that of all: from the axis outwards, or all over it.
