@@ -151,7 +151,8 @@ fn rows(info: &SceneInfo) -> Vec<(&'static str, String)> {
     let mut rows = vec![
         ("samples", format!("{} × {}", info.columns, info.rows)),
         ("bands, nm", info.wavelengths_nm.iter().map(|nm| format!("{nm}")).collect::<Vec<_>>().join(", ")),
-        ("mean luminance", format!("{:.4} cd/m²", info.mean_luminance_cd_m2)),
+        // Of infrared bands sums are 0 but for rounding, to either side.
+        ("mean luminance", format!("{:.4} cd/m²", (1e4 * info.mean_luminance_cd_m2).round() / 1e4 + 0.0)),
     ];
     let largest = info.largest_radiance.iter().copied().fold(0.0, f64::max);
     rows.push(("largest radiance", format!("{largest:.4e} W/m²/sr/nm")));

@@ -213,7 +213,6 @@ fn listing(folder: &Path) -> Result<Listing, SceneError> {
 
 /// Returns the middle of the range of wavelengths that a stem ends in, as `b_445-455`, `b_445nm_455` or `b_445to455`: none wider than a filter's.
 fn middle_of_range(stem: &str) -> Option<f64> {
-    const MOST_NM: f64 = 100.0;
     let range = |sign: &&str| {
         let (before, last) = stem.rsplit_once(*sign)?;
         let first = before.rsplit(|c: char| !c.is_ascii_digit() && c != '.').next()?;
@@ -222,6 +221,25 @@ fn middle_of_range(stem: &str) -> Option<f64> {
     };
     ["-", "to", "_to_", "nm_", "nm-", "nmto", "nm_to_"].iter().find_map(range)
 }
+
+/// Returns the middles of ranges that the names of all pictures end in, as `b_445_455`, where they are of one width: two numbers may also count a picture
+/// and be its wavelength.
+fn middles_of_ranges(pictures: &[(f64, PathBuf)]) -> Option<Vec<f64>> {
+    let range = |(last, path): &(f64, PathBuf)| {
+        let stem = path.file_stem()?.to_str()?;
+        let (before, _) = stem.strip_suffix("nm").unwrap_or(stem).rsplit_once('_')?;
+        let first: f64 = before.rsplit('_').next()?.parse().ok()?;
+        (are_wavelengths(&[first, *last]) && *last > first).then_some([first, *last])
+    };
+    let ranges: Vec<[f64; 2]> = pictures.iter().map(range).collect::<Option<_>>()?;
+    let width = ranges.first().map(|[first, last]| last - first)?;
+    let are_alike = ranges.iter().all(|[first, last]| (last - first - width).abs() <= 1.0);
+    (ranges.len() > 1 && are_alike && width <= MOST_NM)
+        .then(|| ranges.iter().map(|[first, last]| 0.5 * (first + last)).collect())
+}
+
+/// The widest range of a filter.
+const MOST_NM: f64 = 100.0;
 
 /// Returns the number that a stem ends in, before an optional `nm`.
 fn number_at_end(stem: &str) -> Option<f64> {
@@ -251,6 +269,9 @@ fn wavelengths_of(folder: &Path, pictures: &[(f64, PathBuf)]) -> Result<Vec<f64>
         let unit = unit.or(are_angstroms.then_some("A"));
         let own = listed_nm("wavelengths", unit, &numbers).map_err(|reason| unreadable(&list, reason))?;
         return own.ok_or_else(|| unreadable(&list, "its numbers count bands: expected wavelengths in nm"));
+    }
+    if let Some(middles) = middles_of_ranges(pictures) {
+        return Ok(middles);
     }
     let numbers: Vec<f64> = pictures.iter().map(|(number, _)| *number).collect();
     if are_wavelengths(&numbers) {
@@ -302,6 +323,20 @@ mod tests {
         assert_eq!(image.quantity(), Quantity::Reflectance);
         let expected = [200.0, 300.0, 100.0].map(|code: f32| f64::from(code / 65535.0));
         assert_eq!(image.spectrum_at(1, 2), expected);
+    }
+
+    #[test]
+    fn names_of_ranges_are_those_of_their_middles() {
+        for (names, expected) in [
+            (["b_445_455.png", "b_495_505.png"], [450.0, 500.0]),
+            (["b_445_455nm.png", "b_495_505nm.png"], [450.0, 500.0]),
+            // Photographs 450 and 451, and a scene called 400.
+            (["p_450_500.png", "p_451_510.png"], [500.0, 510.0]),
+            (["a_400_450.png", "a_400_500.png"], [450.0, 500.0]),
+        ] {
+            let image = read_band_folder(folder_of(&names).path(), None).unwrap();
+            assert_eq!(image.grid().centers_nm(), expected, "{names:?}");
+        }
     }
 
     #[test]

@@ -178,6 +178,17 @@ impl<'a> MatArray<'a> {
         }
     }
 
+    /// Returns the names of what it holds, that of an array itself, and of what is in structures as `outer.inner`.
+    pub(super) fn leaves(&self, name: &str) -> Vec<String> {
+        match &self.content {
+            Content::Fields(fields) => {
+                fields.iter().flat_map(|(own, array)| array.leaves(&format!("{name}.{own}"))).collect()
+            }
+            _ if self.len() > 0 => vec![name.to_owned()],
+            _ => vec![],
+        }
+    }
+
     /// Returns a field of a structure that is there and not empty.
     pub(super) fn field(&self, name: &str) -> Option<&Self> {
         match &self.content {

@@ -15,7 +15,7 @@ use super::{
         light_unit::LightUnit,
         photons::joules_per_photon,
         reading::{FileQuantity, FileReading},
-        stated::{name_of, note_of},
+        stated::{name_of, note_of, shown},
         unusable::unreadable,
         wavelength_unit::{self, listed_nm, unit_in},
     },
@@ -232,8 +232,8 @@ fn cube_of(path: &Path, file: &MatFile, name: &str, reading: &FileReading) -> Re
         |own: &str| own == name || holds(own) || is_depth(own) || waves.as_ref().is_some_and(|waves| waves.name == own);
     let mut unused: Vec<String> = file.listed.iter().map(|own| own.name.clone()).filter(|own| !used(own)).collect();
     for outer in file.listed.iter().filter(|own| holds(&own.name)) {
-        let fields = file.array(&outer.name)?.map(|array| array.numeric_fields(&outer.name)).unwrap_or_default();
-        unused.extend(fields.into_iter().map(|(own, _)| own).filter(|own| own != name && !used(own)));
+        let fields = file.array(&outer.name)?.map(|array| array.leaves(&outer.name)).unwrap_or_default();
+        unused.extend(fields.into_iter().filter(|own| !used(own)));
     }
     let mut notes: Vec<String> = note_of(path, "variable", &unused).into_iter().collect();
     let file_name = name_of(path);
@@ -338,7 +338,19 @@ fn of_iset(path: &Path, file: &MatFile) -> Result<IsetScene, SceneError> {
     let planes = order.iter().filter_map(|&band| planes[band].take()).collect();
     let image = SpectralImage::new(Quantity::Radiance, grid, planes).map_err(values)?;
     let light = light.map(|spectrum| light_of(&spectrum)).transpose().map_err(wrong)?;
-    let notes = unused_of(path, file).map_err(wrong)?;
+    let mut notes = unused_of(path, file).map_err(wrong)?;
+    if let (Some(map), Some(distance_m)) = (&depth_m, distance_m) {
+        let measured = map.iter().map(|z| f64::from(*z)).filter(|z| z.is_finite() && *z > 0.0);
+        let [near_m, far_m] = measured.fold([f64::INFINITY, 0.0], |[near, far], z| [near.min(z), far.max(z)]);
+        if near_m <= far_m && !(0.99 * near_m..=1.01 * far_m).contains(&distance_m) {
+            let of_map = if near_m == far_m { shown(near_m) } else { format!("{} to {}", shown(near_m), shown(far_m)) };
+            notes.push(format!(
+                "{}: its distance, {} m, is not in its depth map, {of_map} m, which counts",
+                name_of(path),
+                shown(distance_m)
+            ));
+        }
+    }
     Ok(IsetScene { image, depth_m, distance_m, horizontal_fov_deg, light, notes })
 }
 

@@ -212,6 +212,7 @@ fn fields_of_structures_are_taken_by_their_names() {
         field("cube", &[2, 3, 2], &numbers),
         field("wavelengths", &[2, 1], &[450.0, 550.0]),
         field("gain", &[1, 1], &[2.0]),
+        ("unit".to_owned(), elements::text("", "W/m2/sr/um").unwrap()),
     ];
     let data = elements::variable(&elements::structure("data", &fields).unwrap()).unwrap();
     let folder = tempfile::tempdir().unwrap();
@@ -224,7 +225,9 @@ fn fields_of_structures_are_taken_by_their_names() {
     };
     let scene = read(Some("data.cube")).unwrap();
     assert_eq!(scene.radiance.grid().centers_nm(), [450.0, 550.0]);
-    assert!(scene.notes.join(" ").contains("'data.gain'"), "{:?}", scene.notes);
+    for left in ["'data.gain'", "'data.unit'"] {
+        assert!(scene.notes.join(" ").contains(left), "{:?}", scene.notes);
+    }
     for (variable, words) in [
         (None, "or --variable data.cube"),
         (Some("data"), "is a structure, expected numbers: --variable data.cube"),
