@@ -5,8 +5,8 @@ use std::f64::consts::PI;
 use dioptric_psf::{FilmQuery, LensImage};
 use glam::DVec2;
 
-use crate::points::LEAST_CELL_PX;
-
+/// The least width of the cells of the kernel of a point, pixels.
+pub(crate) const LEAST_CELL_PX: f64 = 0.125;
 /// Points along each side of a pixel at which the halo is looked up.
 pub(crate) const POINTS: usize = 8;
 

@@ -13,14 +13,25 @@ use crate::{
     Film,
     beyond::Beyond,
     convolve::{fast_size, with_fft},
-    points::Point,
     splines::{doubled, halved},
-    surroundings::{Surroundings, beside},
     wing::{Directions, Wing},
 };
 
 /// Pixels of a film with what lies around it beyond which wings are drawn on pixels twice as wide, or four times, …
 const MOST_PIXELS: usize = 1 << 21;
+/// The most pixels beside a film that are looked at, and the pixels in all up to which there are as many; of larger films, as many pixels around as within.
+const MOST_BESIDE: f64 = 256.0;
+const AMPLE_PIXELS: f64 = 100_000.0;
+
+/// Returns how far beside a film is looked, pixels.
+pub(crate) fn beside(film: &Film) -> usize {
+    let (rows, columns) = (film.rows as f64, film.columns as f64);
+    let most = (2.0 * rows * columns).max(AMPLE_PIXELS);
+    // Of (rows + 2 m)(columns + 2 m) = most.
+    let sides = rows + columns;
+    let beside = 0.25 * ((sides * sides + 4.0 * (most - rows * columns)).sqrt() - sides);
+    beside.clamp(0.0, MOST_BESIDE) as usize
+}
 
 /// The halos of the bands of a plan.
 #[derive(Debug)]
@@ -67,20 +78,15 @@ impl Halos {
         (4 + 1) * n_pixels.min(MOST_PIXELS)
     }
 
-    /// Returns the picture of a band with the halos of its points and of what lies around it, if any light lies beyond its windows.
-    pub(crate) fn applied(
-        &self,
-        band: usize,
-        picture: Array2<f32>,
-        (surroundings, radiance, points): (&Surroundings<'_>, &[f32], &[Point]),
-    ) -> Array2<f32> {
+    /// Returns the picture of a band and of so many pixels beside its film with the halos of what it holds, if any light lies beyond its windows.
+    pub(crate) fn applied(&self, band: usize, picture: Array2<f32>, beside: usize) -> Array2<f32> {
         let (Some((lower, below)), Some((upper, above))) =
             (self.known.range(..=band).next_back(), self.known.range(band..).next())
         else {
             return picture;
         };
         let fraction = (band - lower) as f32 / (upper - lower).max(1) as f32;
-        surroundings.with(&picture, (radiance, points), |wide, beside| below.applied(wide, beside, (above, fraction)))
+        below.applied(picture, beside, (above, fraction))
     }
 }
 

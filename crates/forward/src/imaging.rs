@@ -16,7 +16,7 @@ use crate::{
     blocks::Blocks,
     coverage::Composite,
     gather::{GatherTask, Past, gather, out_samples},
-    halo::Halos,
+    halo::{Halos, beside},
     kept::Kept,
     lamps::{Lamp, without_lamps},
     node_kernels::NodeKernel,
@@ -29,7 +29,7 @@ use crate::{
     sight::{Before, Sight},
     stopwatch::{Part, Stopwatch},
     surface::{LayerCoordinates, Surface},
-    surroundings::{Surroundings, beside},
+    surroundings::Surroundings,
     tile::{TileGroup, film_pixels},
     tiling::{LayeredLens, Rule, Tiling, reach_px},
     visible::Visible,
@@ -338,9 +338,14 @@ impl Imaging {
             // What a pixel sees is spread before it is lit: an even scene stays even.
             let around = Surroundings { film: &self.spec.film, scene: &self.raster, map: &map };
             let front = front.as_slice().unwrap_or_default();
-            let picture = self.scene.halos.applied(band, picture, (&around, front, &lamps));
+            let halos = &self.scene.halos;
+            let haloed = |picture: Array2<f32>, sources: (&[f32], &[Point])| {
+                let halo = |wide, beside| halos.applied(band, wide, beside);
+                if halos.are_any() { around.with(&picture, sources, halo) } else { picture }
+            };
+            let picture = haloed(picture, (front, &lamps));
             let beside = (!beside.is_empty()).then(|| Array2::from_shape_vec((rows, columns), beside).ok()).flatten();
-            let beside = beside.map(|beside| self.scene.halos.applied(band, beside, (&around, &[], &points)));
+            let beside = beside.map(|beside| haloed(beside, (&[], &points)));
             self.lit(picture, beside, &map)
         }))
     }

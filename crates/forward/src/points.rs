@@ -10,6 +10,7 @@ use rayon::prelude::*;
 
 use crate::{
     Film, SceneGeometry,
+    beyond::LEAST_CELL_PX,
     lamps::Lamp,
     node_kernels::NodeKernel,
     past_surfaces::{HiddenPoint, OpenPupil},
@@ -171,8 +172,7 @@ const APART_PX: f64 = 16.0;
 const MOST_KERNELS: usize = 256;
 /// Change of blur radius between points that share a kernel, pixels.
 const BLUR_STEP_PX: f64 = 0.5;
-/// Cells of a kernel: an eighth of a pixel, or more where there would be more of them along its spread.
-pub(crate) const LEAST_CELL_PX: f64 = 0.125;
+/// Cells of a kernel: the least, or wider ones where there would be more of them along its spread.
 const CELLS: f64 = 32.0;
 
 impl Drawing<'_> {

@@ -5,25 +5,12 @@ use ndarray::{Array2, s};
 
 use crate::{
     Film,
+    halo::beside,
     places::{Places, SceneRaster, UNSEEN},
     points::Point,
     raster::{BLOCK, Level, Raster},
     tile::film_pixels,
 };
-
-/// The most pixels beside a film that are looked at, and the pixels in all up to which there are as many; of larger films, as many pixels around as within.
-const MOST_BESIDE: f64 = 256.0;
-const AMPLE_PIXELS: f64 = 100_000.0;
-
-/// Returns how far beside a film is looked, pixels.
-pub(crate) fn beside(film: &Film) -> usize {
-    let (rows, columns) = (film.rows as f64, film.columns as f64);
-    let most = (2.0 * rows * columns).max(AMPLE_PIXELS);
-    // Of (rows + 2 m)(columns + 2 m) = most.
-    let sides = rows + columns;
-    let beside = 0.25 * ((sides * sides + 4.0 * (most - rows * columns)).sqrt() - sides);
-    beside.clamp(0.0, MOST_BESIDE) as usize
-}
 
 /// A film, and where in the scene what lies around it is seen.
 pub(crate) struct Surroundings<'a> {
