@@ -15,7 +15,7 @@ pub(crate) use self::edge::EdgeSearch;
 use self::front::Front;
 pub use self::{plane::PupilPlane, region::PupilRegion};
 use crate::{
-    MonoLens, ObjectPoint, RayBatch, Vignetting,
+    MonoLens, ObjectPoint, Placement, RayBatch, Vignetting,
     trace::{self, Plan},
 };
 
@@ -241,11 +241,15 @@ const HIDDEN_PLACES: usize = 12;
 pub(crate) const EDGE_MM: f64 = 1e-11;
 
 impl MonoLens {
-    /// How far inside the rim and the openings of a surface a point of it lies, mm; the point is of the lens frame.
-    fn clearance_on_mm(&self, surface: usize, point_mm: DVec3) -> f64 {
+    /// Returns a point and a direction of the lens frame in that of a surface.
+    fn in_frame_of(&self, surface: usize, point_mm: DVec3, direction: DVec3) -> [DVec3; 2] {
+        let placement = self.placements().map_or(Placement::centered(self.vertex_z_mm(surface)), |all| all[surface]);
+        [placement.surface_from_lens(point_mm), placement.direction_to_own(direction)]
+    }
+
+    /// How far inside the rim and the openings of a surface a place of it lies, mm from its vertex.
+    fn clearance_on_mm(&self, surface: usize, at: DVec2) -> f64 {
         let step = &self.steps()[surface];
-        let at =
-            self.placements().map_or(point_mm, |placements| placements[surface].surface_from_lens(point_mm)).truncate();
         let openings = step.apertures.iter().map(|aperture| aperture.clearance_mm(at.x, at.y));
         openings.fold(step.semi_aperture - at.length(), f64::min)
     }

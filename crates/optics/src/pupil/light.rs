@@ -17,7 +17,8 @@ const FINER_ROUNDS: usize = 28;
 const AROUND: usize = 25;
 const SURROUNDINGS: f64 = 1.6;
 
-/// How far a ray gets: the surfaces that it passes, then how far outside the rim it meets the next, mm, as a negative number.
+/// How far a ray gets: how many surfaces it meets, is within the rims of and is bent by, three for each that it passes, and how much it is
+/// short of the next of these, as a negative number.
 #[derive(Clone, Copy, PartialEq, PartialOrd)]
 struct Progress(usize, f64);
 
@@ -100,13 +101,21 @@ impl Search<'_> {
         let targets: Vec<DVec2> = on_front.iter().map(|place| self.target_through_front(*place)).collect();
         let mut rays = self.plane.rays(self.lens, self.point, &targets);
         self.lens.trace(&mut rays, Vignetting::On);
-        let progress = |i: usize| match rays.fate[i] {
-            RayFate::Vignetted { surface } => {
-                let surface = usize::from(surface);
-                Progress(surface, self.lens.clearance_on_mm(surface, rays.point_mm(i)))
+        let progress = |i: usize| {
+            let Some(surface) = rays.fate[i].surface() else { return Progress(3 * self.lens.n_surfaces(), 0.0) };
+            let [point_mm, direction] = self.lens.in_frame_of(surface, rays.point_mm(i), rays.direction(i));
+            let place_mm = point_mm.truncate();
+            match rays.fate[i] {
+                // A ray through the vertex meets the surface.
+                RayFate::Missed { .. } => Progress(3 * surface, -point_mm.cross(direction).length()),
+                RayFate::Vignetted { .. } => Progress(3 * surface + 1, self.lens.clearance_on_mm(surface, place_mm)),
+                _ => {
+                    let step = &self.lens.steps()[surface];
+                    let cosine = step.normal_at(place_mm).normalize().dot(direction);
+                    let sine = step.index_before / step.index_after * (1.0 - cosine * cosine).max(0.0).sqrt();
+                    Progress(3 * surface + 2, -sine)
+                }
             }
-            RayFate::InFlight => Progress(self.lens.n_surfaces(), 0.0),
-            fate => Progress(fate.surface().unwrap_or(0), f64::NEG_INFINITY),
         };
         on_front.iter().enumerate().map(|(i, &on_front)| Trial { on_front, progress: progress(i) }).collect()
     }

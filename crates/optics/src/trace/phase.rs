@@ -91,7 +91,7 @@ impl Step {
     }
 
     /// Returns the normal of the surface over a place of its vertex plane, of any length, pointing downstream.
-    fn normal_at(&self, place_mm: DVec2) -> DVec3 {
+    pub(crate) fn normal_at(&self, place_mm: DVec2) -> DVec3 {
         let c = self.curvature;
         let square = place_mm.length_squared();
         let conic_slope = |conic: f64| c / (1.0 - (1.0 + conic) * c * c * square).sqrt();
