@@ -9,10 +9,9 @@ use crate::{MonoLens, ObjectPoint, quadrature::gauss_legendre_on};
 
 /// The share of an outline's area that may be wrong at jumps of its edge.
 const UNCERTAIN: f64 = 5e-4;
-/// By how much of an outline's area half of its azimuths may differ from all of them, which are good to a third or less of that.
-const AREA_CHANGE: f64 = 2e-3;
-/// The same where light grazes a surface at the edge, which bends sharply at the ends of that part.
-const GRAZING_AREA_CHANGE: f64 = 5e-4;
+/// By how much of an outline's area half of its azimuths may differ from all of them, which are good to a third of that, and to as much
+/// where the edge is hardly seen, as along a crescent and at its ends.
+const AREA_CHANGE: f64 = 5e-4;
 /// The share of that area from which on a jump of an outline that grazes is looked behind.
 const HIDING: f64 = 0.1;
 /// How often the number of azimuths is doubled for that.
@@ -55,9 +54,8 @@ impl PupilRegion {
         let in_middle = search.lit_middle().and_then(|seed| search.part_about(seed, n_azimuths));
         let part = in_middle.or_else(|| search.part_of(&lit, n_azimuths))?;
         let does_graze = search.grazes(&part);
-        let most_change = if does_graze { GRAZING_AREA_CHANGE } else { AREA_CHANGE };
-        let part = search.refined(part, most_change);
-        let is_smooth = part.area_change() <= most_change;
+        let part = search.refined(part);
+        let is_smooth = part.area_change() <= AREA_CHANGE;
         let most_mm2 = UNCERTAIN * part.area_mm2();
         let hidden_mm2 = || if does_graze { search.hidden_mm2(&part, HIDING * most_mm2) } else { 0.0 };
         if is_smooth && search.uncertain_mm2(&part) + hidden_mm2() <= most_mm2 {
@@ -128,22 +126,27 @@ impl PupilBoundary {
         nodes
     }
 
-    /// By what share the area of every other azimuth differs from that of all, or a quarter of what that of every fourth does: of an edge
-    /// with corners one of them alone may by chance be small.
+    /// By what share the area of every other azimuth differs from that of all, or a quarter of the most that those of every fourth do: of an
+    /// edge with corners one of them alone may by chance be small.
     fn area_change(&self) -> f64 {
         let n = self.rho_mm.len();
-        let squares = |every: usize| self.rho_mm.iter().step_by(every).map(|rho| rho * rho).sum::<f64>() * every as f64;
-        let change =
-            |every: usize| if n.is_multiple_of(every) { (squares(every) / squares(1) - 1.0).abs() } else { 0.0 };
+        let squares = |first: usize, every: usize| {
+            self.rho_mm.iter().skip(first).step_by(every).map(|rho| rho * rho).sum::<f64>() * every as f64
+        };
+        let all = squares(0, 1);
+        let change = |every: usize| {
+            let of_first = |first: usize| (squares(first, every) / all - 1.0).abs();
+            if n.is_multiple_of(every) { (0..every).map(of_first).fold(0.0, f64::max) } else { 0.0 }
+        };
         change(2).max(0.25 * change(4))
     }
 }
 
 impl Search<'_> {
-    /// Returns a part with as many azimuths as its area needs to change by no more than this from half of them.
-    fn refined(&self, mut part: PupilBoundary, most_change: f64) -> PupilBoundary {
+    /// Returns a part with as many azimuths as its area needs to change little from half of them.
+    fn refined(&self, mut part: PupilBoundary) -> PupilBoundary {
         for _ in 0..MOST_DOUBLINGS {
-            if part.area_change() <= most_change {
+            if part.area_change() <= AREA_CHANGE {
                 break;
             }
             let between: Vec<DVec2> = PupilBoundary::azimuths(2 * part.rho_mm.len()).skip(1).step_by(2).collect();

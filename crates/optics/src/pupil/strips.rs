@@ -18,7 +18,7 @@ const N_AT_ENDS: usize = 64;
 const FINER_ROUNDS: usize = 4;
 const N_FINER: usize = 7;
 /// Rounds in which the rectangle that lines are laid over is fitted to the light, and the room that is left about it.
-const FIT_ROUNDS: usize = 6;
+const FIT_ROUNDS: usize = 16;
 const ROOM: f64 = 0.3;
 /// Light that fills less than this share of the rectangle is looked at more closely.
 const SMALL: f64 = 0.4;
