@@ -300,7 +300,7 @@ impl Lens {
     /// Returns notes on the lens at these wavelengths, a list of sentences: `notes`, and which glasses are
     /// continued beyond the range in which they are known.
     fn notes_at(&self, wavelengths_nm: Vec<f64>) -> Vec<String> {
-        let of_glasses = self.file.lens.notes_on_glass_range(&wavelengths_nm);
+        let of_glasses = self.file.lens.notes_on_ranges(&wavelengths_nm);
         self.file.notes.iter().cloned().chain(of_glasses).collect()
     }
 

@@ -57,7 +57,9 @@ fn phase_summary(lens: &Lens, surface: usize) -> Option<String> {
             format!("phase of {sum} rad with ρ = r/{} mm in the order {order}", short(*radius_mm))
         }
         PhaseProfile::Wavefront(error) => {
-            let nm: Vec<String> = error.bands.iter().map(|band| short(band.wavelength_nm).to_string()).collect();
+            let mut nm: Vec<String> = error.bands.iter().map(|band| short(band.wavelength_nm).to_string()).collect();
+            nm.sort();
+            nm.dedup();
             let eye =
                 error.chromatic_eye_nm.map_or(String::new(), |nm| format!(", chromatic as the eye about {nm} nm"));
             let (terms, radius_mm) = (error.terms, short(error.radius_mm));
