@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use dioptric_optics::{PhaseProfile, WavefrontError};
-use dioptric_pipeline::{LensReadOptions, LensSpec};
+use dioptric_pipeline::{Camera, LensReadOptions, LensSpec};
 
 /// A variable of a MATLAB file of version 5: a matrix of doubles, the first index fastest.
 fn variable(name: &str, rows: usize, columns: usize, values: &[f64]) -> Vec<u8> {
@@ -122,4 +122,15 @@ fn tables_have_wavelengths_and_fields() {
     }
     assert!(refusal(&format!("{eye}:1")).contains("one eye"));
     assert!(refusal(&format!("eye:{}:0mm", json.display())).contains("semi_aperture_mm"));
+}
+
+#[test]
+fn a_camera_may_have_a_measured_eye() {
+    let mut camera = Camera::demo().unwrap();
+    camera.lens = LensSpec::named("eye:none.mat:3mm:7");
+    camera.validate().unwrap();
+    let again = Camera::parse(&camera.to_ron(), Path::new("camera.ron")).unwrap();
+    assert_eq!(again.lens, camera.lens);
+    camera.lens = LensSpec::named("eye:none.mat:-3mm");
+    assert!(camera.validate().unwrap_err().to_string().contains("pupil_mm"));
 }
