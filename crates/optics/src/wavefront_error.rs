@@ -17,7 +17,6 @@ use crate::{OpticsError, zernike};
 /// The field of light is where the line lies from the middle of the surface to the point that the light comes from. Where a trace does
 /// not say how far that is (from the film into a scene), each ray comes from far away.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct WavefrontError {
     /// Radius of the disc, mm; the polynomials go on beyond it.
@@ -41,7 +40,6 @@ pub struct WavefrontError {
 
 /// The coefficients at a wavelength and a field.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct WavefrontBand {
     /// Vacuum wavelength, nm.
@@ -59,7 +57,6 @@ fn is_on_axis(field_deg: &[f64; 2]) -> bool {
 
 /// An order and a norm of Zernike's polynomials.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub enum ZernikeTerms {
     /// Those of OSA and ANSI Z80.28, from number 0, each of mean square 1.
     Osa,
@@ -150,7 +147,7 @@ impl WavefrontError {
     }
 
     /// The angles along x and along y of the fields, ascending.
-    pub(crate) fn axes_deg(&self) -> [Vec<f64>; 2] {
+    fn axes_deg(&self) -> [Vec<f64>; 2] {
         [0, 1].map(|axis| {
             let mut axis_deg: Vec<f64> = self.bands.iter().map(|band| band.field_deg[axis]).collect();
             axis_deg.sort_by(f64::total_cmp);
@@ -306,7 +303,7 @@ pub(crate) struct WavefrontMaps {
     /// Where the object plane appears to the surface, from it; −∞ of a far one.
     object_z_mm: f64,
     /// Whether light is met that goes back towards the object, its z mirrored.
-    pub(crate) is_met_from_behind: bool,
+    is_met_from_behind: bool,
 }
 
 /// Where a ray meets a surface and which way it goes, its z above 0.
