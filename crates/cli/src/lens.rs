@@ -150,7 +150,7 @@ fn info(arguments: &LensInfoArgs, common: &Common) -> anyhow::Result<()> {
     };
     let wavelength_nm = nearest_to_reference_nm(&wavelengths_nm);
     let used = arguments.lens.state.apply(used, wavelength_nm, common)?;
-    tell(&used.lens.notes_on_glass_range(&wavelengths_nm), common);
+    tell(&used.lens.notes_on_ranges(&wavelengths_nm), common);
     let lens = &used.lens;
     tell(&Vec::from_iter(LensData::note_on_third_order(lens)), common);
     // Color counts between the wavelengths that were asked for, or those of the file.
@@ -312,7 +312,7 @@ fn draw(arguments: &LensDrawArgs, common: &Common) -> anyhow::Result<()> {
     tell_taken(&taken, common);
     let wavelength_nm = wavelengths_nm.first().copied().unwrap_or(REFERENCE_WAVELENGTH_NM);
     let used = arguments.lens.state.apply(used, wavelength_nm, common)?;
-    tell(&used.lens.notes_on_glass_range(&wavelengths_nm), common);
+    tell(&used.lens.notes_on_ranges(&wavelengths_nm), common);
     let focus_nm = if asked_nm.is_none() { used.wavelengths_or(&USUAL_NM) } else { wavelengths_nm.clone() };
     let of = FilmUse { wavelengths_nm: &focus_nm, reference_nm: wavelength_nm, distance_mm };
     let film = arguments.film.of(&used);

@@ -27,7 +27,7 @@ pub(crate) enum LensCommand {
     Ghosts(LensGhostsArgs),
     /// Writes a lens in another format, chosen by the extension
     Convert {
-        /// Lens to read: a file, the name of a built-in one, thin:50mm:f2, pinhole:0.1mm or eye:navarro:4D
+        /// Lens to read: a file, the name of a built-in one, thin:50mm:f2, pinhole:0.1mm, eye:navarro:4D or eye:FILE:3mm
         input: String,
         /// File to write; a .zmx file of a lens with glasses of its own gets a catalogue (.agf) beside it
         output: PathBuf,
@@ -42,7 +42,7 @@ pub(crate) enum LensCommand {
 /// A lens, how far it is open and how it stands: what every command about one lens takes.
 #[derive(Debug, Args)]
 pub(crate) struct LensArgs {
-    /// Lens: a file, the name of a built-in one, thin:50mm:f2, pinhole:0.1mm or eye:navarro:4D
+    /// Lens: a file, the name of a built-in one, thin:50mm:f2, pinhole:0.1mm, eye:navarro:4D or eye:FILE:3mm
     pub(crate) lens: String,
     #[command(flatten)]
     pub(crate) state: LensStateArgs,
@@ -312,7 +312,7 @@ pub(crate) struct LensAnalyzeArgs {
 /// Which two lenses to compare, and how they are looked at.
 #[derive(Debug, Args)]
 pub(crate) struct LensCompareArgs {
-    /// Lens: a file, the name of a built-in one, thin:50mm:f2, pinhole:0.1mm or eye:navarro:4D
+    /// Lens: a file, the name of a built-in one, thin:50mm:f2, pinhole:0.1mm, eye:navarro:4D or eye:FILE:3mm
     pub(crate) lens: String,
     /// The lens to compare it with, in the fields, wavelengths and at the object of the first
     pub(crate) other: String,

@@ -43,7 +43,7 @@ pub(crate) fn run(arguments: &LensGhostsArgs, common: &Common) -> anyhow::Result
     };
     tell_taken(&taken, common);
     let used = arguments.lens.state.apply(used, reference_nm, common)?;
-    tell(&used.lens.notes_on_glass_range(&wavelengths_nm), common);
+    tell(&used.lens.notes_on_ranges(&wavelengths_nm), common);
     let focus_nm = used.wavelengths_or(&USUAL_NM);
     let of = FilmUse { wavelengths_nm: &focus_nm, reference_nm, distance_mm };
     let FilmPlace { distance_mm: film_distance_mm, origin } = arguments.film.of(&used).place(&used.lens, of)?;

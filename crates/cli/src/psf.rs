@@ -47,7 +47,7 @@ pub(crate) fn run(arguments: &PsfArgs, common: &Common) -> anyhow::Result<()> {
     };
     let reference_nm = request.reference_nm(&used.lens)?;
     let lens = arguments.lens.state.apply(used, reference_nm, common)?.lens;
-    let mut notes = lens.notes_on_glass_range(&request.wavelengths_nm);
+    let mut notes = lens.notes_on_ranges(&request.wavelengths_nm);
     notes.extend(stored.iter().filter_map(|file| file.note_on_ends(&request.fields_deg, &request.distances_mm)));
     notes.extend(stored.into_iter().flat_map(|file| file.notes));
     let is_old = arguments.bank.is_some() || arguments.bank_error.is_some();

@@ -17,7 +17,7 @@ pub(crate) fn run(arguments: &TraceArgs, common: &Common) -> anyhow::Result<()> 
     let wavelength_nm = used.wavelength_or_usual();
     let lens = arguments.lens.state.apply(used, wavelength_nm, common)?.lens;
     let rays = RayTable::open(&arguments.rays)?;
-    tell(&lens.notes_on_glass_range(&rays.wavelengths_nm()), common);
+    tell(&lens.notes_on_ranges(&rays.wavelengths_nm()), common);
     let settings = TraceSettings { rims_clip: !arguments.no_clip, film_distance_mm: arguments.film_mm };
     let Some(path) = &arguments.output else {
         let out = io::BufWriter::new(io::stdout().lock());

@@ -7,8 +7,8 @@ use dioptric_diffraction::{
     PupilGrid, WaveQuality, WaveWindow, Wavefront, WavefrontReference, WindowCenter, wave_psf, zernike::noll,
 };
 use dioptric_optics::{
-    DiffractiveSurface, Glass, Interface, Lens, ObjectPoint, PhaseProfile, Shape, Surface, WavefrontBand,
-    WavefrontError, ZernikeTerms,
+    DiffractiveSurface, Glass, Interface, Lens, ObjectPoint, PhaseProfile, RayBatch, Shape, Surface, Vignetting,
+    WavefrontBand, WavefrontError, ZernikeTerms,
     glam::{DVec2, DVec3},
     quadrature::gauss_legendre_on,
 };
@@ -28,7 +28,8 @@ fn lens(focal_mm: f64, coefficients_um: Vec<f64>) -> Lens {
     let error = WavefrontError {
         radius_mm: RADIUS_MM,
         terms: ZernikeTerms::Noll,
-        bands: vec![WavefrontBand { wavelength_nm: NM, coefficients_um }],
+        bands: vec![WavefrontBand { wavelength_nm: NM, coefficients_um, ..WavefrontBand::default() }],
+        turned_about_axis: false,
         chromatic_eye_nm: None,
     };
     let profile = PhaseProfile::Wavefront(error);
@@ -86,7 +87,8 @@ fn point_spreads_are_those_of_a_direct_sum() {
         wave_psf(&mono, &FAR, focal_mm, &window, quality).unwrap()
     };
     let unaberrated = peak_of(vec![]).samples[(n / 2, n / 2)];
-    let cases = (2..=11).map(|j| one_term(j, 0.15)).chain([vec![0.0, 0.0, 0.0, 0.2, -0.1, 0.05, 0.1, 0.0, 0.08]]);
+    let cases =
+        (2..=11).map(|j| one_term(j, 0.15)).chain([vec![], vec![0.0, 0.0, 0.0, 0.2, -0.1, 0.05, 0.1, 0.0, 0.08]]);
     for coefficients_um in cases {
         let psf = peak_of(coefficients_um.clone());
         let film = psf.in_film_frame();
@@ -97,5 +99,104 @@ fn point_spreads_are_those_of_a_direct_sum() {
             worst = worst.max((energy / unaberrated - direct(focal_mm, &coefficients_um, at_mm)).abs());
         }
         assert!(worst < 1e-3, "{coefficients_um:?}: {worst:e}");
+    }
+}
+
+/// The lens with coma along y that grows in step with the field, to 0.1 µm at 10° upwards.
+fn with_coma_by_field(turned_about_axis: bool) -> Lens {
+    let lens = lens(240.0, vec![]);
+    let band = |y_deg: f64, um: f64| WavefrontBand {
+        wavelength_nm: NM,
+        field_deg: [0.0, y_deg],
+        coefficients_um: one_term(7, um),
+    };
+    let error = WavefrontError {
+        radius_mm: RADIUS_MM,
+        terms: ZernikeTerms::Noll,
+        bands: vec![band(0.0, 0.0), band(10.0, 0.1)],
+        turned_about_axis,
+        chromatic_eye_nm: None,
+    };
+    let profile = PhaseProfile::Wavefront(error);
+    lens.with_diffractive(vec![DiffractiveSurface { surface: 0, order: 1, profile, blaze: None }]).unwrap()
+}
+
+/// A point at a field, to the right and upwards, far away or so far before the lens.
+fn point(x_deg: f64, y_deg: f64, distance_mm: f64) -> ObjectPoint {
+    let toward = DVec3::new(x_deg.to_radians().tan(), y_deg.to_radians().tan(), -1.0);
+    match distance_mm.is_finite() {
+        true => ObjectPoint::Finite(distance_mm * toward),
+        false => ObjectPoint::Infinite(-toward.normalize()),
+    }
+}
+
+#[test]
+fn a_term_that_grows_with_the_field_is_that_share_of_itself() {
+    for (distance_mm, film_mm) in [(f64::INFINITY, 240.0), (600.0, 400.0)] {
+        let coma_waves = |lens: &Lens, x_deg: f64, y_deg: f64| {
+            let (mono, point) = (lens.at(NM).unwrap(), point(x_deg, y_deg, distance_mm));
+            let traced = Wavefront::trace(&mono, &point, film_mm, PupilGrid::STANDARD, WavefrontReference::Chief);
+            let terms = traced.unwrap().zernike_waves(8);
+            [terms[6], terms[7]]
+        };
+        // Along y and along x, of 0.1 µm.
+        let most = 0.1 / (1e-3 * NM);
+        let (fixed, turned) = (with_coma_by_field(false), with_coma_by_field(true));
+        let diagonal_deg = (2_f64.sqrt() * 5_f64.to_radians().tan()).atan().to_degrees();
+        for (lens, x_deg, y_deg, expected) in [
+            (&fixed, 0.0, 0.0, [0.0, 0.0]),
+            (&fixed, 0.0, 2.5, [0.25, 0.0]),
+            (&fixed, 3.0, 7.5, [0.75, 0.0]),
+            (&fixed, 0.0, -5.0, [0.0, 0.0]),
+            (&fixed, 0.0, 14.0, [1.0, 0.0]),
+            (&turned, 0.0, 5.0, [0.5, 0.0]),
+            (&turned, 0.0, -5.0, [-0.5, 0.0]),
+            (&turned, 5.0, 0.0, [0.0, 0.5]),
+            (&turned, 5.0, 5.0, [0.1 * diagonal_deg * 0.5_f64.sqrt(), 0.1 * diagonal_deg * 0.5_f64.sqrt()]),
+        ] {
+            let found = coma_waves(lens, x_deg, y_deg);
+            // The pupil is foreshortened by the cosine of the field, which is 3 % at 14°.
+            let off = [0, 1].map(|i| (found[i] / most - expected[i]).abs());
+            assert!(
+                off.iter().all(|off| *off < 0.04),
+                "{x_deg} {y_deg} {distance_mm}: {found:?} of {most}: {expected:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn halfway_the_point_spread_is_that_of_the_mean_coefficients() {
+    let window = WaveWindow { pitch_um: 8.0, rows: 21, columns: 21, center: WindowCenter::Centroid };
+    let quality = WaveQuality { nodes: None, points_per_pixel: Some(1) };
+    for (distance_mm, film_mm) in [(f64::INFINITY, 240.0), (600.0, 400.0)] {
+        let psf = |lens: &Lens| {
+            wave_psf(&lens.at(NM).unwrap(), &point(0.0, 5.0, distance_mm), film_mm, &window, quality).unwrap()
+        };
+        for turned in [false, true] {
+            let (found, expected) =
+                (psf(&with_coma_by_field(turned)).samples, psf(&lens(240.0, one_term(7, 0.05))).samples);
+            let peak = expected.iter().copied().fold(0.0, f64::max);
+            let worst = found.iter().zip(&expected).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            assert!(worst < 1e-9 * peak, "{distance_mm} {turned}: {:e}", worst / peak);
+        }
+    }
+}
+
+/// Back along the way that it came, light is turned as it was: the field is that of the side of the object.
+#[test]
+fn rays_from_the_film_go_back_to_the_scene() {
+    for turned in [false, true] {
+        let mono = with_coma_by_field(turned).at(NM).unwrap();
+        let reversed = mono.reversed();
+        for (x_deg, y_deg) in [(0.0, 5.0), (4.0, 2.0), (-3.0, 8.0)] {
+            let ObjectPoint::Infinite(direction) = point(x_deg, y_deg, f64::INFINITY) else { unreachable!() };
+            let place = DVec3::new(0.7, -0.9, 0.0);
+            let mut rays = RayBatch::from_points(&[place], &[direction]);
+            mono.trace(&mut rays, Vignetting::On);
+            let mut back = RayBatch::from_points(&[rays.point_mm(0)], &[-rays.direction(0)]);
+            reversed.trace(&mut back, Vignetting::On);
+            assert!((back.direction(0) + direction).length() < 1e-12, "{turned} {x_deg} {y_deg}");
+        }
     }
 }

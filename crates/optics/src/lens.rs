@@ -10,7 +10,7 @@ use glam::DVec2;
 
 use crate::{
     Aperture, Coating, CoordinateBreak, DiffractiveSurface, Glass, GlassRange, Interface, Iris, OpticsError,
-    PhaseProfile, Placement, Shape, Surface, placement,
+    PhaseProfile, Placement, Shape, Surface, WavefrontError, placement,
 };
 
 pub use self::changes::SurfaceChange;
@@ -219,11 +219,15 @@ impl Lens {
 
     /// Checks that the wavefront errors of all surfaces are known at a wavelength.
     pub(crate) fn check_wavefronts_at(&self, wavelength_nm: f64) -> Result<(), OpticsError> {
-        let mut errors = self.diffractive.iter().filter_map(|phase| match &phase.profile {
+        self.wavefront_errors().try_for_each(|error| error.check_at(wavelength_nm))
+    }
+
+    /// The wavefront errors of its surfaces.
+    fn wavefront_errors(&self) -> impl Iterator<Item = &WavefrontError> {
+        self.diffractive.iter().filter_map(|phase| match &phase.profile {
             PhaseProfile::Wavefront(error) => Some(error),
             PhaseProfile::Grating { .. } | PhaseProfile::Rings { .. } => None,
-        });
-        errors.try_for_each(|error| error.check_at(wavelength_nm))
+        })
     }
 
     /// Returns the lens with a film of this shape.
@@ -394,8 +398,13 @@ impl Lens {
             && self.is_centered_and_rotational()
     }
 
-    /// Whether every surface is one of revolution about the lens's axis, whatever apertures bound the light: what first- and
-    /// third-order theory ask for.
+    /// Whether the lens has aberrations of third order: whether it is [centered and
+    /// rotational](Self::is_centered_and_rotational) and has no wavefront errors by field.
+    pub fn has_third_order(&self) -> bool {
+        self.is_centered_and_rotational() && !self.wavefront_errors().any(WavefrontError::varies)
+    }
+
+    /// Whether every surface is one of revolution about the lens's axis, whatever apertures bound the light.
     pub fn is_centered_and_rotational(&self) -> bool {
         let is_round = |interface: &Interface| interface.surface.is_rotational();
         self.interfaces.iter().all(is_round)

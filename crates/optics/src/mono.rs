@@ -409,9 +409,11 @@ impl MonoLens {
         rays.par_slices(CHUNK).with_max_len(1).for_each(|chunk| trace::trace_batch(&plan, Goal::LastSurface, chunk));
     }
 
-    /// Returns the steps, in which ideal lenses know where the object plane appears to them.
+    /// Returns the steps, in which ideal lenses and wavefront errors by field know where the object plane appears to them.
     pub(crate) fn steps_for(&self, object_z_mm: f64) -> Cow<'_, [Step]> {
-        if !self.steps.iter().any(|step| matches!(step.kind, Kind::ThinLens { .. })) {
+        let asks =
+            |step: &Step| matches!(step.kind, Kind::ThinLens { .. }) || step.phase.as_ref().is_some_and(Phase::varies);
+        if !self.steps.iter().any(asks) {
             return Cow::Borrowed(&self.steps);
         }
         let mut steps = self.steps.clone();
@@ -428,6 +430,7 @@ impl MonoLens {
             if let Kind::ThinLens { object_z, .. } = &mut step.kind {
                 *object_z = seen_z;
             }
+            step.phase = step.phase.take().map(|phase| phase.of_object_at(seen_z));
         }
         Cow::Owned(steps)
     }

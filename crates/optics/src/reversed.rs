@@ -10,7 +10,7 @@ use crate::{
     mono::trace_light_by_surfaces,
     rays::RaySlices,
     toric::Toric,
-    trace::{self, Goal, Kind, LightPass, Lights, Plan, Real, Step},
+    trace::{self, Goal, Kind, LightPass, Lights, Phase, Plan, Real, Step},
     transmission::Transmission,
 };
 
@@ -281,7 +281,6 @@ pub(crate) fn mirrored(step: &Step) -> Step {
     if step.is_mirror {
         return step.clone();
     }
-    // The phase of a place adds to light of either direction.
     let negated = |list: &[f64]| list.iter().map(|a| -a).collect();
     let kind = match &step.kind {
         Kind::Window => Kind::Window,
@@ -310,6 +309,7 @@ pub(crate) fn mirrored(step: &Step) -> Step {
         index_before: step.index_after,
         index_after: step.index_before,
         vertex_z: -step.vertex_z,
+        phase: step.phase.clone().map(Phase::turned_round),
         ..step.clone()
     }
 }

@@ -117,10 +117,10 @@ impl Lens {
     /// does to the path (docs/mirrors.md), with the color of their power.
     ///
     /// # Errors
-    /// When a glass is not known at one of the wavelengths, or a surface is not one of revolution about the
-    /// lens's axis; apertures may have any shape.
+    /// When a glass is not known at one of the wavelengths, a surface is not one of revolution about the
+    /// lens's axis, or it has a wavefront error by field; apertures may have any shape.
     pub fn seidel(&self, settings: &SeidelSettings) -> Result<Seidel, OpticsError> {
-        if !self.is_centered_and_rotational() {
+        if !self.has_third_order() {
             return Err(OpticsError::NotRotational {
                 lens: self.name().to_owned(),
                 task: "a sum of Seidel aberrations",

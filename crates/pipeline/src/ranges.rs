@@ -79,7 +79,7 @@ const RANGES: &[(Range, &[&str])] = &[
     (of(1e-3, 1e6, "nm"), &["step_nm"]),
     // The lens.
     (of(0.05, 1e5, ""), &["f_number", "FNumber"]),
-    (of(1e-6, 1e6, "mm"), &["stop_mm", "DiameterMm", "diameter_mm", "focal_length_mm"]),
+    (of(1e-6, 1e6, "mm"), &["stop_mm", "DiameterMm", "diameter_mm", "focal_length_mm", "pupil_mm"]),
     (of(-1e6, 1e6, "mm"), &["film_mm", "FilmMm", "advance_mm", "aside_mm"]),
     (of(3.0, 64.0, "blades"), &["blades"]),
     (of(-360.0, 360.0, "degrees"), &["blade_rotation_deg", "rotation_deg"]),

@@ -8,7 +8,7 @@ use std::{
 use dioptric_analysis::{LensData, LensDefaults, LensInfoRequest, built_in_lenses};
 use dioptric_optics::{Layout, LensFile, MonoLens, ReadOptions, Vignetting};
 use dioptric_pipeline::{
-    Camera, CoatingSpec, Given, GlassRange, Iris, KeptCamera, LensReadOptions, LensSpec, MissingGlass,
+    Camera, CoatingSpec, DrawnEye, Given, GlassRange, Iris, KeptCamera, LensReadOptions, LensSpec, MissingGlass,
     REFERENCE_WAVELENGTH_NM, StopSpec,
 };
 use pyo3::{
@@ -263,6 +263,24 @@ impl Lens {
         guarded(|| Self::of_choice(LensSpec::Pinhole { diameter_mm }, LensReadOptions::default()))
     }
 
+    /// Returns an eye that is known by the coefficients of its wavefront: an ideal lens right behind its pupil, and the retina.
+    ///
+    /// Parameters
+    /// ----------
+    /// path : str or os.PathLike
+    ///     Coefficients of the terms of OSA, µm: ``.csv``; with their statistics ``.json``, or ``.mat`` as of ISETCam.
+    /// pupil_mm : float
+    ///     Diameter of the pupil that they are of.
+    /// number, seed : int
+    ///     Which eye is drawn from the statistics; without a number it is the mean.
+    #[staticmethod]
+    #[pyo3(signature = (path, pupil_mm, *, number=None, seed=0))]
+    fn measured_eye(path: PathBuf, pupil_mm: f64, number: Option<u64>, seed: u64) -> PyResult<Self> {
+        let drawn = number.map(|number| DrawnEye { number, seed });
+        let eye = LensSpec::MeasuredEye { file: path, pupil_mm, drawn };
+        guarded(|| Self::of_choice(eye, LensReadOptions::default()))
+    }
+
     /// Returns the lens with wavelengths outside the range in which a glass is known refused ("refuse") or its glasses
     /// continued ("extend"); `notes_at` states how far an index may be off.
     fn with_glass_range(&self, glass_range: &str) -> PyResult<Self> {
@@ -300,7 +318,7 @@ impl Lens {
     /// Returns notes on the lens at these wavelengths, a list of sentences: `notes`, and which glasses are
     /// continued beyond the range in which they are known.
     fn notes_at(&self, wavelengths_nm: Vec<f64>) -> Vec<String> {
-        let of_glasses = self.file.lens.notes_on_glass_range(&wavelengths_nm);
+        let of_glasses = self.file.lens.notes_on_ranges(&wavelengths_nm);
         self.file.notes.iter().cloned().chain(of_glasses).collect()
     }
 

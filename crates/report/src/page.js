@@ -52,7 +52,7 @@ const show = event => {
 };
 for (const kind of ['pointermove', 'pointerdown']) document.addEventListener(kind, show);
 
-// An enlarged view: the wheel zooms, dragging moves, a double click shows all again. A narrow window begins with the left part, unshrunk.
+// An enlarged view: the wheel and two fingers zoom, dragging moves, a double click shows all again. A narrow window begins with the left part, unshrunk.
 const enlarge = drawn => {
   const dialog = make(document.body, 'dialog');
   const svg = drawn.cloneNode(true);
@@ -64,16 +64,32 @@ const enlarge = drawn => {
   dialog.append(svg);
   make(dialog, 'button', 'Close', { onclick: () => dialog.close() });
   dialog.onclose = () => { document.body.append(tip); dialog.remove(); };
-  svg.onwheel = event => {
-    event.preventDefault();
-    const factor = Math.min(1.2 ** (event.deltaY / 100), whole[2] / view[2]);
-    const at = new DOMPoint(event.clientX, event.clientY).matrixTransform(svg.getScreenCTM().inverse());
+  // Shows so many times as much, about a place that stays.
+  const zoom = ({ clientX, clientY }, wanted) => {
+    const factor = Math.min(wanted, whole[2] / view[2]);
+    const at = new DOMPoint(clientX, clientY).matrixTransform(svg.getScreenCTM().inverse());
     set([at.x - factor * (at.x - view[0]), at.y - factor * (at.y - view[1]), factor * view[2], factor * view[3]]);
   };
+  svg.onwheel = event => {
+    event.preventDefault();
+    zoom(event, 1.2 ** (event.deltaY / 100));
+  };
+  // The pointers that are down, where they were last.
+  const down = new Map();
+  const away = (one, other) => Math.hypot(one.clientX - other.clientX, one.clientY - other.clientY);
+  svg.onpointerdown = event => {
+    svg.setPointerCapture(event.pointerId);
+    down.set(event.pointerId, event);
+  };
+  svg.onpointerup = svg.onpointercancel = event => down.delete(event.pointerId);
   svg.onpointermove = event => {
-    if (!event.buttons) return;
+    const before = down.get(event.pointerId);
+    if (!before) return;
+    down.set(event.pointerId, event);
+    const other = [...down.values()].find(one => one.pointerId !== event.pointerId);
+    if (other) return zoom(other, away(before, other) / Math.max(away(event, other), 1));
     const { a } = svg.getScreenCTM();
-    set([view[0] - event.movementX / a, view[1] - event.movementY / a, view[2], view[3]]);
+    set([view[0] - (event.clientX - before.clientX) / a, view[1] - (event.clientY - before.clientY) / a, view[2], view[3]]);
   };
   svg.ondblclick = () => set([...whole]);
   dialog.showModal();

@@ -10,6 +10,8 @@ const STYLE: &str = include_str!("page.css");
 const SCRIPT: &str = include_str!("page.js");
 /// Size of a chart, px: two stand side by side in a window of 1280.
 const CHART_PX: (f64, f64) = (560.0, 360.0);
+/// The largest drawing that a printed page of A4 holds beside its title, px.
+const PRINTED_PX: [f64; 2] = [710.0, 850.0];
 
 /// Returns a self-contained page; `body` is HTML, name and source are text.
 pub(crate) fn page(name: &str, source: &str, body: &str) -> String {
@@ -23,7 +25,18 @@ pub(crate) fn page(name: &str, source: &str, body: &str) -> String {
 }
 
 pub(crate) fn section(title: &str, inside: &str) -> String {
-    format!("<section>\n<h2>{title}</h2>\n{inside}</section>\n")
+    let class = if holds_large_drawing(inside) { " class=\"large\"" } else { "" };
+    format!("<section{class}>\n<h2>{title}</h2>\n{inside}</section>\n")
+}
+
+/// Whether a drawing is there that would be shrunk on a printed page.
+fn holds_large_drawing(inside: &str) -> bool {
+    let px = |head: &str, key: &str| -> Option<f64> { head.split_once(key)?.1.split_once('"')?.0.parse().ok() };
+    inside.split("<svg xmlns=").skip(1).any(|drawing| {
+        let head = drawing.split('>').next().unwrap_or_default();
+        let sides = [" width=\"", " height=\""].map(|key| px(head, key).unwrap_or(0.0));
+        sides.iter().zip(PRINTED_PX).any(|(side, most)| *side > most)
+    })
 }
 
 pub(crate) fn note(words: &str) -> String {

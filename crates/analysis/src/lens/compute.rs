@@ -100,7 +100,7 @@ impl AnalysisRequest {
         }
         let (fields, mut notes) = self.fields_of(&lenses[reference], way_mm);
         notes.extend(lenses[reference].note_on_limit(self.distance_mm));
-        notes.extend(lens.notes_on_glass_range(&self.wavelengths_nm));
+        notes.extend(lens.notes_on_ranges(&self.wavelengths_nm));
         // A stop that is wider than the light is no measure of where rays pass the pupil.
         let beam = lenses[reference].axial_beam(self.distance_mm);
         let coordinates = match beam.is_some_and(|beam| !beam.is_limited_by_stop) {

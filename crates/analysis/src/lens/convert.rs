@@ -48,7 +48,7 @@ pub fn convert_lens(input: &str, target: &Path, reading: &LensReadOptions) -> Re
         "json" => (0..=30).map(|step| 400.0 + 10.0 * f64::from(step)).collect(),
         _ => Vec::new(),
     };
-    notes.extend(file.lens.notes_on_glass_range(&written_nm));
+    notes.extend(file.lens.notes_on_ranges(&written_nm));
     let (text, glasses) = match extension.as_str() {
         "ron" => (file.to_ron(), None),
         "dat" => (file.to_dat()?, None),

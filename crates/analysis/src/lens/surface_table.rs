@@ -1,5 +1,7 @@
 //! The surfaces of a lens in words and numbers.
 
+use std::collections::BTreeSet;
+
 use dioptric_optics::{Blaze, DiffractiveSurface, Glass, Lens, Outline, PhaseProfile, Shape, Surface};
 use serde::Serialize;
 
@@ -57,11 +59,16 @@ fn phase_summary(lens: &Lens, surface: usize) -> Option<String> {
             format!("phase of {sum} rad with ρ = r/{} mm in the order {order}", short(*radius_mm))
         }
         PhaseProfile::Wavefront(error) => {
-            let nm: Vec<String> = error.bands.iter().map(|band| short(band.wavelength_nm).to_string()).collect();
+            let mut stated_nm: Vec<f64> = error.bands.iter().map(|band| band.wavelength_nm).collect();
+            stated_nm.sort_by(f64::total_cmp);
+            stated_nm.dedup();
+            let nm: Vec<String> = stated_nm.iter().map(|nm| short(*nm).to_string()).collect();
             let eye =
                 error.chromatic_eye_nm.map_or(String::new(), |nm| format!(", chromatic as the eye about {nm} nm"));
-            let (terms, radius_mm) = (error.terms, short(error.radius_mm));
-            format!("wavefront error of {terms:?} terms over {radius_mm} mm, stated at {} nm{eye}", nm.join(", "))
+            let fields: BTreeSet<[u64; 2]> = error.bands.iter().map(|band| band.field_deg.map(f64::to_bits)).collect();
+            let of_fields = if fields.len() > 1 { format!(" and {} fields", fields.len()) } else { String::new() };
+            let (terms, radius_mm, nm) = (error.terms, short(error.radius_mm), nm.join(", "));
+            format!("wavefront error of {terms:?} terms over {radius_mm} mm, stated at {nm} nm{of_fields}{eye}")
         }
     };
     Some(match blaze {

@@ -188,9 +188,9 @@ impl PlaneData {
 impl LensData {
     /// Returns what of the data of a lens is left out and why, in one sentence; nothing where it has all.
     pub fn note_on_third_order(lens: &Lens) -> Option<String> {
-        (!lens.is_centered_and_rotational()).then(|| {
+        (!lens.has_third_order()).then(|| {
             format!(
-                "{}: third-order sums and Petzval's radius are left out: only a centered lens of revolution has them",
+                "{}: third-order sums and Petzval's radius are left out: only a centered lens of revolution without wavefront errors by field has them",
                 lens.name()
             )
         })
@@ -236,7 +236,7 @@ impl LensData {
             object_distance_mm: distance_mm.unwrap_or(f64::INFINITY),
             chief_slope: field_deg.to_radians().tan(),
         };
-        let has_sums = lens.is_centered_and_rotational();
+        let has_sums = lens.has_third_order();
         let mut seidel = has_sums.then(|| lens.seidel(&settings)).transpose()?;
         if let (Some(seidel), None) = (&mut seidel, colors_nm) {
             for sums in seidel.per_surface.iter_mut().chain([&mut seidel.total]) {

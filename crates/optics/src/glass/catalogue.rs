@@ -36,6 +36,7 @@ pub struct GlassCatalogue {
 
 const BUILT_IN: &str = include_str!("../../data/glass/catalogue.csv");
 const CRYSTALS: &str = include_str!("../../data/glass/crystals.csv");
+const MAKERS: &str = include_str!("../../data/glass/makers.csv");
 
 /// Plastics of phone lenses by the index at the d line and the Abbe number: OKP4 and OKP4HT of the maker's table of their
 /// properties (Osaka Gas Chemicals), and a cyclo-olefin copolymer, whose maker's Zemax catalogue states 1.5332 and 56.15
@@ -76,12 +77,13 @@ impl GlassCatalogue {
     /// The built-in glasses: those of six makers and LZOS, B270, a few plastics, crystals and fluids, infrared glasses, and the
     /// media of the eye (`EYE:CORNEA`, `EYE:AQUEOUS`, `EYE:LENS`, `EYE:VITREOUS`).
     ///
-    /// The numbers are the refractiveindex.info database's (public domain, CC0 1.0), but for three plastics and
-    /// for the eye, whose tables are iset3d's (MIT licence). Indices are relative to air, but
+    /// The numbers are the refractiveindex.info database's (public domain, CC0 1.0), but for glasses that only the catalogues of four
+    /// makers have, three plastics, and the eye, whose tables are iset3d's (MIT licence). Indices are relative to air, but
     /// for the fluids, whose source gives them relative to vacuum.
     pub fn built_in() -> &'static Self {
         static CATALOGUE: LazyLock<GlassCatalogue> = LazyLock::new(|| {
-            let rows = BUILT_IN.lines().chain(CRYSTALS.lines()).filter(|line| !line.starts_with('#'));
+            let lists = [BUILT_IN, MAKERS, CRYSTALS];
+            let rows = lists.iter().flat_map(|list| list.lines()).filter(|line| !line.starts_with('#'));
             let of_database = rows.map(|row| glass_of_row(row).expect("a test reads every row"));
             let plastics = PLASTICS.map(|(name, nd, vd)| CatalogueGlass {
                 maker: "MISC".to_owned(),
@@ -252,9 +254,25 @@ mod tests {
     use super::*;
 
     #[test]
+    fn glasses_of_makers_have_the_indices_of_their_lists() {
+        // At the lines h, g, F, d, C: Hikari's catalogue of 2020 and Ohara's.
+        let nm = [404.656, 435.835, 486.133, 587.562, 656.273];
+        for (name, listed) in [
+            ("J-KZFH9", [1.77949, 1.767673, 1.754185, 1.738, 1.731309]),
+            ("J-SFH4", [1.710834, 1.696531, 1.681192, 1.66382, 1.656918]),
+            ("S-LAH99", [2.06424, 2.046, 2.0254, 2.001, 1.99105]),
+        ] {
+            let found = &GlassCatalogue::built_in().find(name).unwrap().glass;
+            for (nm, listed) in nm.into_iter().zip(listed) {
+                assert!((found.index_at(nm).unwrap() - listed).abs() < 6e-6, "{name} {nm}");
+            }
+        }
+    }
+
+    #[test]
     fn every_row_is_read_and_makes_sense() {
         let catalogue = GlassCatalogue::built_in();
-        assert_eq!(catalogue.glasses().len(), 1694 + 31 + PLASTICS.len() + 1 + 4);
+        assert_eq!(catalogue.glasses().len(), 1694 + 43 + 31 + PLASTICS.len() + 1 + 4);
         let mut n_infrared = 0;
         for glass in catalogue.glasses() {
             glass.glass.check().unwrap();

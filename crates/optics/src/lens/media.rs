@@ -25,9 +25,10 @@ impl Lens {
     }
 
     /// Returns a sentence for each medium that is continued beyond the range in which it is known, with the greatest possible error of
-    /// its index at these wavelengths; none where nothing is.
-    pub fn notes_on_glass_range(&self, wavelengths_nm: &[f64]) -> Vec<String> {
-        let mut notes: Vec<String> = Vec::new();
+    /// its index at these wavelengths, and for wavefront errors that are held beyond theirs; none where nothing is.
+    pub fn notes_on_ranges(&self, wavelengths_nm: &[f64]) -> Vec<String> {
+        let mut notes: Vec<String> =
+            self.wavefront_errors().flat_map(|error| error.notes_on_ranges(wavelengths_nm)).collect();
         if self.glass_range == GlassRange::Refuse {
             return notes;
         }
@@ -64,12 +65,12 @@ mod tests {
         let mut interfaces = lens.interfaces().to_vec();
         interfaces.iter_mut().take(1).for_each(|interface| interface.medium_after = bk7.clone());
         let lens = Lens::new("mixed", "made up", interfaces, lens.stop()).unwrap();
-        assert!(lens.at(290.0).is_err() && lens.notes_on_glass_range(&[290.0]).is_empty());
+        assert!(lens.at(290.0).is_err() && lens.notes_on_ranges(&[290.0]).is_empty());
         let lens = lens.with_glass_range(GlassRange::Extend);
-        let notes = lens.notes_on_glass_range(&[280.0, 290.0, 550.0]);
+        let notes = lens.notes_on_ranges(&[280.0, 290.0, 550.0]);
         assert_eq!(notes.len(), 1, "{notes:?}");
         assert!(notes[0].starts_with("the glass SCHOTT:N-BK7 is known from 300 to 2500 nm and continued: at 280 nm"));
-        assert!(lens.notes_on_glass_range(&[550.0]).is_empty());
+        assert!(lens.notes_on_ranges(&[550.0]).is_empty());
         // The others are laws through an index and an Abbe number.
         assert!(lens.at(290.0).unwrap_err().to_string().contains("cannot be continued to 290 nm"));
     }

@@ -3,7 +3,15 @@
 use glam::{DVec2, DVec3};
 
 use super::{Kind, Step};
-use crate::{RayFate, rays::RaySlices, wavefront_error::WavefrontMap};
+use crate::{
+    RayFate,
+    rays::RaySlices,
+    wavefront_error::{Meeting, WavefrontMaps},
+};
+
+/// How often a direction is found again that the phase depends on: each time it is nearer by the share of the field that the phase turns
+/// light by where the field differs by one, below a hundredth.
+const TURNS: usize = 8;
 
 /// What a surface adds to the paths of light of one wavelength in one order.
 #[derive(Clone, Debug)]
@@ -21,12 +29,13 @@ pub(crate) enum Phase {
         coefficients_mm: Vec<f64>,
     },
     /// A wavefront error, which is ahead where paths are shorter.
-    Wavefront(WavefrontMap),
+    Wavefront(WavefrontMaps),
 }
 
 impl Phase {
-    /// Returns the path that is added at a place, mm, and its slopes there.
-    fn at(&self, place_mm: DVec2) -> (f64, DVec2) {
+    /// Returns the path that is added where a ray meets the surface, mm, and its slopes there.
+    fn at(&self, meeting: Meeting) -> (f64, DVec2) {
+        let place_mm = meeting.place_mm;
         match self {
             Self::Grating { slope } => (slope.dot(place_mm), *slope),
             Self::Rings { per_mm2, coefficients_mm } => {
@@ -40,8 +49,8 @@ impl Phase {
                 }
                 (sum, place_mm * (2.0 * derivative * per_mm2))
             }
-            Self::Wavefront(map) => {
-                let (ahead_mm, slope) = map.at(place_mm);
+            Self::Wavefront(maps) => {
+                let (ahead_mm, slope) = maps.at(meeting);
                 (-ahead_mm, -slope)
             }
         }
@@ -54,7 +63,7 @@ impl Phase {
             Self::Rings { per_mm2, coefficients_mm } => {
                 coefficients_mm.get(i - 1).copied().unwrap_or(0.0) * per_mm2.powi(i as i32)
             }
-            Self::Wavefront(map) => -map.of_power(i),
+            Self::Wavefront(maps) => -maps.of_power(i),
         }
     }
 
@@ -68,12 +77,38 @@ impl Phase {
         self.of_power(2)
     }
 
-    /// Whether the path depends on the distance from the axis alone.
+    /// Returns it for an object plane that appears there to the surface, from it, mm.
+    pub(crate) fn of_object_at(self, z_mm: f64) -> Self {
+        match self {
+            Self::Wavefront(maps) => Self::Wavefront(maps.of_object_at(z_mm)),
+            other => other,
+        }
+    }
+
+    /// Returns it for light that meets it from the other side.
+    pub(crate) fn turned_round(self) -> Self {
+        match self {
+            Self::Wavefront(maps) => Self::Wavefront(maps.turned_round()),
+            other => other,
+        }
+    }
+
+    /// Whether it differs between fields.
+    pub(crate) fn varies(&self) -> bool {
+        matches!(self, Self::Wavefront(maps) if maps.varies())
+    }
+
+    /// Whether the path depends on the direction in which light goes on, which it turns itself.
+    fn depends_on_way_on(&self) -> bool {
+        matches!(self, Self::Wavefront(maps) if maps.varies() && maps.is_met_from_behind)
+    }
+
+    /// Whether the path is the same all around the axis.
     fn is_rotational(&self) -> bool {
         match self {
             Self::Grating { slope } => *slope == DVec2::ZERO,
             Self::Rings { .. } => true,
-            Self::Wavefront(map) => map.is_rotational(),
+            Self::Wavefront(maps) => maps.is_rotational(),
         }
     }
 }
@@ -123,13 +158,23 @@ impl Step {
     /// new direction, or `None` where the order does not propagate, and how much longer the path becomes.
     fn diffract(&self, phase: &Phase, place_mm: DVec2, direction: DVec3) -> (Option<DVec3>, f64) {
         let normal = self.normal_at(place_mm).normalize();
-        let (longer_mm, slope) = phase.at(place_mm);
-        let optical = direction * self.index_before + slope.extend(0.0);
-        // What is along the surface stays, what is across it makes the length that of the index behind.
-        let along = optical - normal * optical.dot(normal);
-        let across2 = self.index_after * self.index_after - along.length_squared();
-        let across = if self.is_mirror { -across2.sqrt() } else { across2.sqrt() };
-        let after = (across2 >= 0.0).then(|| (along + normal * across) / self.index_after);
+        let optical = direction * self.index_before;
+        let turned = |slope: DVec2| {
+            // What is along the surface stays, what is across it makes the length that of the index behind.
+            let optical = optical + slope.extend(0.0);
+            let along = optical - normal * optical.dot(normal);
+            let across2 = self.index_after * self.index_after - along.length_squared();
+            let across = if self.is_mirror { -across2.sqrt() } else { across2.sqrt() };
+            (across2 >= 0.0).then(|| (along + normal * across) / self.index_after)
+        };
+        let (mut longer_mm, slope) = phase.at(Meeting { place_mm, direction });
+        let mut after = turned(slope);
+        let n_more = if phase.depends_on_way_on() { TURNS } else { 0 };
+        for _ in 0..n_more {
+            let Some(direction) = after else { break };
+            let (now_mm, slope) = phase.at(Meeting { place_mm, direction });
+            (longer_mm, after) = (now_mm, turned(slope));
+        }
         (after, longer_mm)
     }
 

@@ -9,6 +9,7 @@ use dioptric_optics::{
 use dioptric_sensor::Sensor;
 use serde::{Deserialize, Serialize};
 
+use super::measured_eye;
 use crate::{Camera, LensSpec, PipelineError, SensorSpec, StopSpec};
 
 /// The wavelength of f-numbers, fields and focus where nothing else is said, nm.
@@ -34,10 +35,26 @@ impl LensSpec {
             Some(Err(_)) if !Path::new(text).exists() => return Self::BuiltIn(text.to_owned()),
             _ => {}
         }
+        if let Some(eye) = measured_eye::named(text) {
+            return eye;
+        }
         // Names such as fisheye-12.5mm and eye:arizona:2.5D look as though they had an extension.
         let is_eye = SchematicEye::named(text).is_some() && !Path::new(text).exists();
         let is_built_in = is_eye || Lens::built_in_names().any(|name| name == text);
         if !is_built_in && is_path(text) { Self::File(PathBuf::from(text)) } else { Self::BuiltIn(text.to_owned()) }
+    }
+
+    /// What `LENS` on the command line is for it: the name of a built-in lens, the path of a file, an eye of a file; `None` of others.
+    pub fn text(&self) -> Option<String> {
+        match self {
+            Self::BuiltIn(name) => Some(name.clone()),
+            Self::File(path) => Some(path.display().to_string()),
+            Self::MeasuredEye { file, pupil_mm, drawn } => {
+                let which = drawn.map_or(String::new(), |drawn| format!(":{}@{}", drawn.number, drawn.seed));
+                Some(format!("eye:{}:{pupil_mm}mm{which}", file.display()))
+            }
+            Self::Thin { .. } | Self::Pinhole { .. } | Self::Changed { .. } => None,
+        }
     }
 
     /// The lens that this is, or is a changed form of.
@@ -64,13 +81,16 @@ impl LensSpec {
 
     /// The file that it is read from.
     pub fn file(&self) -> Option<&Path> {
-        if let Self::File(path) = self.base() { Some(path) } else { None }
+        match self.base() {
+            Self::File(path) | Self::MeasuredEye { file: path, .. } => Some(path),
+            _ => None,
+        }
     }
 
     /// The file that it is read from, to be named otherwise.
     pub fn file_mut(&mut self) -> Option<&mut PathBuf> {
         match self {
-            Self::File(path) => Some(path),
+            Self::File(path) | Self::MeasuredEye { file: path, .. } => Some(path),
             Self::Changed { lens, .. } => lens.file_mut(),
             _ => None,
         }
@@ -85,7 +105,12 @@ impl LensSpec {
         let options = reading.options()?;
         let mut file = match self {
             Self::File(path) => LensFile::read(path, &options)?,
+            Self::BuiltIn(name) if measured_eye::is_meant(name) => {
+                let (found, expected) = (name.clone(), measured_eye::PATTERNS.to_owned());
+                return Err(PipelineError::Value { origin: "the lens".to_owned(), key: "lens", found, expected });
+            }
             Self::BuiltIn(name) => LensFile::built_in(name)?,
+            Self::MeasuredEye { file, pupil_mm, drawn } => measured_eye::open(file, *pupil_mm, *drawn)?,
             Self::Thin { focal_length_mm, diameter_mm } => LensFile::from(Lens::thin(*focal_length_mm, *diameter_mm)?),
             Self::Pinhole { diameter_mm } => LensFile::from(Lens::pinhole(*diameter_mm)?),
             Self::Changed { lens, surfaces } => {
@@ -314,6 +339,7 @@ impl LensReadOptions {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::DrawnEye;
 
     #[test]
     fn names_and_paths_are_told_apart() {
@@ -322,6 +348,13 @@ mod tests {
         assert_eq!(LensSpec::named("thin:50mm:f2"), LensSpec::Thin { focal_length_mm: 50.0, diameter_mm: 25.0 });
         assert_eq!(LensSpec::named("pinhole:0.1mm"), LensSpec::Pinhole { diameter_mm: 0.1 });
         assert_eq!(LensSpec::named("pinhole:0.1"), LensSpec::BuiltIn("pinhole:0.1".to_owned()));
+        let eye = |drawn: Option<DrawnEye>| LensSpec::MeasuredEye { file: "a:b.mat".into(), pupil_mm: 4.5, drawn };
+        assert_eq!(LensSpec::named("eye:a:b.mat:4.5mm"), eye(None));
+        assert_eq!(LensSpec::named("eye:a:b.mat:4.5mm:7"), eye(Some(DrawnEye { number: 7, seed: 0 })));
+        let drawn = eye(Some(DrawnEye { number: 7, seed: 2 }));
+        assert_eq!(LensSpec::named(&drawn.text().unwrap()), drawn);
+        let message = LensSpec::named("eye:b.mat:4.5").open(&LensReadOptions::default()).unwrap_err().to_string();
+        assert!(message.contains("eye:FILE:PUPILmm"), "{message}");
         for path in ["lens.dat", "./lens", "folder/lens"] {
             assert_eq!(LensSpec::named(path), LensSpec::File(PathBuf::from(path)));
         }

@@ -10,6 +10,7 @@ mod filters;
 mod frames;
 mod lens;
 mod light_field;
+mod measured_eye;
 mod movements;
 mod photodiodes;
 mod reflections;
@@ -38,6 +39,7 @@ pub(crate) use frames::at_rest;
 pub use frames::{Exposed, FramesSpec, PhotodiodeReads};
 pub use lens::{CoatingSpec, LensReadOptions, REFERENCE_WAVELENGTH_NM, nearest_to_reference_nm, with_blades};
 pub use light_field::LightFieldSpec;
+pub use measured_eye::DrawnEye;
 pub use movements::Movements;
 pub use photodiodes::Photodiodes;
 pub use reflections::LensReflections;
@@ -168,6 +170,16 @@ pub enum LensSpec {
     Pinhole {
         /// Diameter, mm.
         diameter_mm: f64,
+    },
+    /// An eye that is known by the coefficients of its wavefront; also "eye:IASstats30.mat:3mm".
+    MeasuredEye {
+        /// Coefficients of the terms of OSA, µm: `.csv`; with their statistics `.json`, or `.mat` as of ISETCam.
+        file: PathBuf,
+        /// Diameter of the pupil that they are of, mm.
+        pupil_mm: f64,
+        /// An eye drawn from the statistics; left out, the mean.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        drawn: Option<DrawnEye>,
     },
     /// Another lens with some of its curvatures and distances changed.
     Changed {
@@ -400,6 +412,7 @@ impl Camera {
                 checker.number("diameter_mm", *diameter_mm)?;
             }
             LensSpec::Pinhole { diameter_mm } => checker.number("diameter_mm", *diameter_mm)?,
+            LensSpec::MeasuredEye { pupil_mm, .. } => checker.number("pupil_mm", *pupil_mm)?,
             LensSpec::BuiltIn(_) | LensSpec::File(_) | LensSpec::Changed { .. } => {}
         }
         if let Some(slope_per_nm) = self.lens_reading.slope_per_nm {

@@ -67,7 +67,7 @@ impl ResolvedLens {
     /// What is to be known of it at these wavelengths, a sentence each: its [`notes`](Self::notes), and which glasses are continued beyond
     /// the range in which they are known.
     pub fn notes_at(&self, wavelengths_nm: &[f64]) -> Vec<String> {
-        self.notes.iter().cloned().chain(self.lens.notes_on_glass_range(wavelengths_nm)).collect()
+        self.notes.iter().cloned().chain(self.lens.notes_on_ranges(wavelengths_nm)).collect()
     }
 }
 

@@ -96,8 +96,8 @@ pub use exr_stream::{SpectralHead, is_irradiance_exr, read_exr_text};
 pub use exr_write::{ExrParts, write_planes_exr, write_scene_exr, write_spectral_exr};
 pub use flat_size::flat_size_of;
 pub use mat::{
-    IsetIrradiance, holds_iset_irradiance, read_iset_display, read_iset_irradiance, write_iset_irradiance,
-    write_iset_scene,
+    IsetIrradiance, holds_iset_irradiance, read_iset_display, read_iset_irradiance, read_mat_matrices,
+    write_iset_irradiance, write_iset_scene,
 };
 pub use npz::{NamedArray, read_npz_arrays, write_npz_arrays};
 pub use photons::joules_per_photon;

@@ -121,11 +121,7 @@ impl Telling {
     }
 
     fn lens(&mut self, camera: &Camera) {
-        let named = match &camera.lens {
-            LensSpec::BuiltIn(name) => name.clone(),
-            LensSpec::File(path) => path.display().to_string(),
-            LensSpec::Thin { .. } | LensSpec::Pinhole { .. } | LensSpec::Changed { .. } => return,
-        };
+        let Some(named) = camera.lens.text() else { return };
         if LensSpec::named(&named) == camera.lens {
             self.text("lens", &named);
             self.made.lens = camera.lens.clone();

@@ -26,7 +26,18 @@ use super::desk::{draw, small, studio, type_into, window, window_of};
 const PANELS: &[(&str, &[&str])] = &[
     ("name", &["Camera.name"]),
     ("lens", &["Camera.lens", "LensSpec.BuiltIn", "LensSpec.Changed.lens"]),
-    ("lens file", &["LensSpec.File"]),
+    (
+        "lens file",
+        &[
+            "LensSpec.File",
+            "LensSpec.MeasuredEye",
+            "LensSpec.MeasuredEye.file",
+            "LensSpec.MeasuredEye.drawn",
+            "DrawnEye.number",
+            "DrawnEye.seed",
+        ],
+    ),
+    ("pupil", &["LensSpec.MeasuredEye.pupil_mm"]),
     ("focal length", &["LensSpec.Thin", "LensSpec.Thin.focal_length_mm"]),
     ("diameter", &["LensSpec.Thin.diameter_mm", "LensSpec.Pinhole", "LensSpec.Pinhole.diameter_mm"]),
     ("surface", &["LensSpec.Changed", "LensSpec.Changed.surfaces", "SurfaceChange.surface"]),
@@ -278,6 +289,7 @@ fn cameras() -> Vec<Camera> {
         world(RenderEffort::Samples(8)),
         world(RenderEffort::Noise(0.1)),
         with(&|camera| camera.lens = LensSpec::Thin { focal_length_mm: 50.0, diameter_mm: 10.0 }),
+        with(&|camera| camera.lens = LensSpec::named("eye:none.mat:3mm:7")),
         target(Pattern::Checkerboard { check_px: 5 }),
         target(Pattern::SlantedBar { slope: 0.1 }),
         target(Pattern::RadialLines { n_lines: 5 }),

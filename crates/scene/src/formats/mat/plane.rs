@@ -36,6 +36,32 @@ pub(in super::super) struct Plane {
     pub(in super::super) words: String,
 }
 
+/// Returns the real matrices of these names that a MATLAB or HDF5 file has, with their names.
+///
+/// # Errors
+/// When the file cannot be read, or one of them has more than two axes.
+pub fn read_mat_matrices(path: &Path, wanted: &[&str]) -> Result<Vec<(String, Array2<f64>)>, SceneError> {
+    let is_wanted = |own: &Listed| own.is_numeric && wanted.contains(&own.name.as_str());
+    let file = MatFile::read(path, &is_wanted)?;
+    let wrong = |reason: String| unreadable(path, reason);
+    let matrix = |own: &Listed| {
+        let array =
+            file.array(&own.name).map_err(wrong)?.ok_or_else(|| wrong(format!("its '{}' is not there", own.name)))?;
+        let numbers =
+            array.numbers().map_err(|what| wrong(format!("its '{}' is {what}, expected numbers", own.name)))?;
+        let (rows, columns) = match own.sides[..] {
+            [] => (1, 1),
+            [n] => (n, 1),
+            [rows, columns] => (rows, columns),
+            _ => return Err(wrong(format!("its '{}' has {} axes, expected a matrix", own.name, own.sides.len()))),
+        };
+        let at =
+            |(row, column)| numbers.at(if file.is_row_major { column + columns * row } else { row + rows * column });
+        Ok((own.name.clone(), Array2::from_shape_fn((rows, columns), at)))
+    };
+    file.listed.iter().filter(|own| is_wanted(own)).map(matrix).collect()
+}
+
 /// Reads the one plane of a file, that whose name says that it is a depth, or that of the name told.
 ///
 /// # Errors

@@ -31,18 +31,18 @@ pub(super) fn show(ui: &mut Ui, camera: &mut Camera, desk: &Desk<'_>) {
 
 fn which(ui: &mut Ui, camera: &mut Camera, desk: &Desk<'_>) {
     let mut named = match camera.lens.base() {
-        LensSpec::BuiltIn(name) => name.clone(),
-        LensSpec::File(path) => path.display().to_string(),
         LensSpec::Thin { .. } => "thin".to_owned(),
         LensSpec::Pinhole { .. } => "pinhole".to_owned(),
-        LensSpec::Changed { .. } => "changed".to_owned(),
+        other => other.text().unwrap_or_else(|| "changed".to_owned()),
     };
+    let is_text = camera.lens.base().text().is_some();
     let before = named.clone();
     let mut names: Vec<(String, &str)> = Lens::built_in_names().map(|name| (name.to_owned(), name)).collect();
     names.extend([("thin".to_owned(), "ideal thin lens"), ("pinhole".to_owned(), "pinhole")]);
     choice(ui, "lens", "A built-in lens, an ideal one, or a pinhole", &mut named, &names);
-    if matches!(camera.lens.base(), LensSpec::BuiltIn(_) | LensSpec::File(_)) {
-        let words = "A lens file, or the name of a built-in lens; files can be dropped on the window";
+    if is_text {
+        let words =
+            "A lens file, the name of a built-in lens, or an eye as eye:FILE:3mm; files can be dropped on the window";
         let (typed, is_asked) =
             with_choice_of_file(ui, "Choose a lens file", |ui| text(ui, "lens file", words, &before));
         if is_asked {
@@ -63,6 +63,9 @@ fn which(ui: &mut Ui, camera: &mut Camera, desk: &Desk<'_>) {
         }
         LensSpec::Pinhole { diameter_mm } => {
             millimetres("diameter", "Diameter of the hole", 0.01..=5.0).show(ui, diameter_mm);
+        }
+        LensSpec::MeasuredEye { pupil_mm, .. } => {
+            millimetres("pupil", "Diameter of the pupil that the coefficients are of", 1.0..=8.0).show(ui, pupil_mm);
         }
         LensSpec::BuiltIn(_) | LensSpec::File(_) | LensSpec::Changed { .. } => {}
     }

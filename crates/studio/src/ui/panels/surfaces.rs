@@ -68,13 +68,7 @@ pub(super) fn show(ui: &mut Ui, camera: &mut Camera, desk: &Desk<'_>) {
 }
 
 fn name(lens: &LensSpec) -> String {
-    match lens {
-        LensSpec::BuiltIn(name) => name.clone(),
-        LensSpec::File(path) => path.display().to_string(),
-        LensSpec::Thin { .. } | LensSpec::Pinhole { .. } | LensSpec::Changed { .. } => {
-            "the lens that it was".to_owned()
-        }
-    }
+    lens.text().unwrap_or_else(|| "the lens that it was".to_owned())
 }
 
 fn numbers(ui: &mut Ui, camera: &mut Camera, prescription: &Prescription, surface: usize) {
