@@ -38,10 +38,13 @@ impl Packets {
             BandSampling::Mean => (i as f64 + 0.5) / PACKET as f64 - 0.5,
             BandSampling::Center => 0.0,
         };
-        let of_band = |(&center, &width): (&f64, &f64)| {
-            (0..PACKET).map(move |i| center + width * eighth(i)).collect::<Vec<f64>>()
+        let of_band =
+            |(place, &width): (f64, &f64)| (0..PACKET).map(move |i| place + width * eighth(i)).collect::<Vec<f64>>();
+        let places = match sampling {
+            BandSampling::Mean => grid.middles_nm(),
+            BandSampling::Center => grid.centers_nm().to_vec(),
         };
-        let nodes_nm = grid.centers_nm().iter().zip(grid.widths_nm()).flat_map(of_band).collect();
+        let nodes_nm = places.into_iter().zip(grid.widths_nm()).flat_map(of_band).collect();
         // Steps of eight nodes reach every band soonest; they must not close before all have been taken.
         let from = if n_bands > PACKET { PACKET } else { (5 * n_bands).div_ceil(8) };
         let stride = (from.max(1)..).find(|&stride| greatest_common_divisor(stride, n_bands) == 1).unwrap_or(1);

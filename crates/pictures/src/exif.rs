@@ -114,6 +114,8 @@ const SUBJECT_DISTANCE: u16 = 0x9206;
 const GAMMA: u16 = 0xA500;
 const COLOR_SPACE: u16 = 0xA001;
 const EXIF_DIRECTORY: u16 = 0x8769;
+/// The tag of XMP data in TIFF files.
+const XMP: u16 = 700;
 
 /// The diagonal of a frame of 36 mm × 24 mm, mm.
 const FILM_DIAGONAL_MM: f64 = 43.266_615;
@@ -164,6 +166,8 @@ impl Exif {
         let wanted = [FOCAL, FOCAL_ON_FILM, SUBJECT_DISTANCE, GAMMA, COLOR_SPACE];
         let mut found = wanted.map(|tag| number(decoder.find_tag(Tag::Unknown(tag)).ok().flatten()));
         let mut is_damaged = false;
+        let xmp =
+            decoder.get_tag_u8_vec(Tag::Unknown(XMP)).map_or_else(|_| Self::default(), |bytes| Self::of_xmp(&bytes));
         if let Ok(Some(place)) = decoder.find_tag_unsigned::<u64>(Tag::Unknown(EXIF_DIRECTORY)) {
             match decoder.read_directory(IfdPointer(place)) {
                 Ok(directory) => {
@@ -178,7 +182,8 @@ impl Exif {
             }
         }
         let of = |tag: u16| wanted.into_iter().zip(found).find(|(own, _)| *own == tag).and_then(|(_, own)| own);
-        (is_damaged || found.iter().any(Option::is_some)).then(|| Self { is_damaged, ..Self::of_numbers(of, false) })
+        let own = Self { is_damaged, ..Self::of_numbers(of, false) }.or(&xmp);
+        (own != Self::default()).then_some(own)
     }
 
     fn of_numbers(number: impl Fn(u16) -> Option<f64>, is_r03: bool) -> Self {

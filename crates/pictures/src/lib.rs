@@ -21,7 +21,7 @@ use image::{ExtendedColorType, ImageDecoder, ImageReader};
 pub use colors::StatedColors;
 pub use exif::Exif;
 pub use image::{DynamicImage, ImageError, ImageFormat, Limits};
-pub use open::{PictureFile, open, orientation_of};
+pub use open::{PictureFile, is_xyze, open, orientation_of};
 pub use reduced::{Curve, read_reduced};
 pub use tagged::{CodeSpace, encode_in};
 pub use xmp::xmp_properties;
@@ -47,14 +47,30 @@ pub fn size_of(path: &Path) -> Result<(usize, usize), ImageError> {
 }
 
 /// Reads a picture of any format that is compiled in, after its header was found to fit the memory that a file may take: its samples, and
-/// `beside_bytes` for each pixel that its reader makes of them.
+/// `beside_bytes` for each pixel that its reader makes of them. X, Y and Z of a Radiance picture become linear red, green and blue of sRGB.
 ///
 /// # Errors
 /// When the file cannot be read, is no such picture, or takes more memory than it may.
 pub fn read_within(path: &Path, beside_bytes: u64) -> Result<DynamicImage, ImageError> {
     let n_bytes = fs::metadata(path)?.len();
     check_numbers(path)?;
-    decoded(open(path)?, n_bytes, beside_bytes)
+    let picture = decoded(open(path)?, n_bytes, beside_bytes)?;
+    Ok(if is_xyze(path) { of_xyz(picture) } else { picture })
+}
+
+/// Makes linear sRGB of X, Y and Z, of which the white of D65 has a Y of 1 (IEC 61966-2-1).
+fn of_xyz(picture: DynamicImage) -> DynamicImage {
+    const SRGB_FROM_XYZ: [[f64; 3]; 3] = [
+        [3.240_454_162_114_103, -1.537_138_512_797_716, -0.498_531_409_556_016],
+        [-0.969_266_030_505_187, 1.876_010_845_446_694, 0.041_556_017_530_350],
+        [0.055_643_430_959_115, -0.204_025_913_516_754, 1.057_225_188_223_179],
+    ];
+    let mut picture = picture.into_rgb32f();
+    for pixel in picture.pixels_mut() {
+        let xyz = pixel.0.map(f64::from);
+        pixel.0 = SRGB_FROM_XYZ.map(|row| row.iter().zip(xyz).map(|(m, v)| m * v).sum::<f64>() as f32);
+    }
+    picture.into()
 }
 
 /// Refuses a TIFF file of colors of whole numbers of 32 bits, which what decodes it takes for floats.

@@ -1,5 +1,5 @@
 //! Files of pictures as decoders see them: a TIFF file that begins with a thumbnail begins with its first page of full size, a Radiance
-//! picture whose rows do not run from the top, each from the left, does.
+//! picture lies upright, and has red, green and blue where it has X, Y and Z.
 
 use std::{
     fs::File,
@@ -16,8 +16,8 @@ const MOST_PAGES: usize = 10_000;
 pub struct PictureFile {
     file: File,
     at: u64,
-    /// Where the place of the first page stands, and that of the first of full size; or the signs of sides that are others.
-    start: Option<(u64, Vec<u8>)>,
+    /// What stands elsewhere than in the file, each with its place: the place of the first page, signs of sides, the name of the colors.
+    others: Vec<(u64, Vec<u8>)>,
 }
 
 impl PictureFile {
@@ -28,9 +28,9 @@ impl PictureFile {
     pub fn open(path: &Path) -> Result<Self> {
         let mut file = File::open(path)?;
         // Whoever decodes a broken file says what is wrong with it.
-        let start = start_of(&mut file).ok().flatten();
+        let others = others_of(&mut file).unwrap_or_default();
         file.rewind()?;
-        Ok(Self { file, at: 0, start })
+        Ok(Self { file, at: 0, others })
     }
 }
 
@@ -46,27 +46,37 @@ pub fn open(path: &Path) -> Result<ImageReader<BufReader<PictureFile>>> {
     reader.with_guessed_format()
 }
 
-/// The line of a Radiance picture that has its sides, as `-Y 2 +X 3`: that which its scan lines are counted by first ("Radiance file
-/// formats", Ward 2004).
-struct Sides {
-    /// Where it stands.
+/// The lines of a Radiance picture that say how it lies and what its colors are ("Radiance file formats", Ward 2004).
+#[derive(Default)]
+struct RadianceLines {
+    /// Where `-Y 2 +X 3` stands: that which its scan lines are counted by first.
     at: u64,
     line: String,
+    /// Where its colors are called X, Y and Z.
+    xyze_at: Option<u64>,
 }
 
-impl Sides {
-    fn of(file: &mut File) -> Result<Option<Self>> {
+impl RadianceLines {
+    fn of(file: &mut File) -> Result<Self> {
         const LIMIT_BYTES: u64 = 1 << 20;
         let (mut bytes, mut at) = (vec![], 0);
         file.rewind()?;
         file.take(LIMIT_BYTES).read_to_end(&mut bytes)?;
-        let mut lines = bytes.split(|byte| *byte == b'\n').map(|line| {
+        let mut this = Self::default();
+        let mut is_head = true;
+        for line in bytes.split(|byte| *byte == b'\n') {
+            if !is_head {
+                (this.at, this.line) = (at, String::from_utf8_lossy(line).into_owned());
+                break;
+            }
+            // An empty line ends the head.
+            is_head = !line.trim_ascii().is_empty();
+            let place = line.windows(XYZE.len()).position(|word| word == XYZE);
+            let place = place.filter(|_| line.starts_with(b"FORMAT"));
+            this.xyze_at = this.xyze_at.or(place.map(|place| at + place as u64));
             at += line.len() as u64 + 1;
-            (at - line.len() as u64 - 1, line)
-        });
-        // An empty line ends what stands before.
-        let line = lines.find(|(_, line)| line.trim_ascii().is_empty()).and_then(|_| lines.next());
-        Ok(line.and_then(|(at, line)| Some(Self { at, line: str::from_utf8(line).ok()?.to_owned() })))
+        }
+        Ok(this)
     }
 
     /// Returns the line with the signs and letters of a picture that lies upright.
@@ -94,18 +104,34 @@ impl Sides {
     }
 }
 
+/// What a Radiance picture of X, Y and Z calls its colors, and what one of red, green and blue does.
+const XYZE: &[u8] = b"xyze";
+const RGBE: &[u8] = b"rgbe";
+
+/// Whether a file is a Radiance picture whose colors are X, Y and Z (CIE 1931).
+pub fn is_xyze(path: &Path) -> bool {
+    let lines = || {
+        let mut file = File::open(path)?;
+        let mut start = [0; 2];
+        file.read_exact(&mut start)?;
+        if start == *b"#?" { RadianceLines::of(&mut file) } else { Ok(RadianceLines::default()) }
+    };
+    lines().is_ok_and(|lines| lines.xyze_at.is_some())
+}
+
 /// Returns how a picture lies in its file, as that states it; upright where it states nothing.
 pub fn orientation_of(path: &Path) -> Orientation {
     let reader = open(path).ok();
     let stated = reader.and_then(|reader| match reader.format()? {
-        ImageFormat::Hdr => Sides::of(&mut File::open(path).ok()?).ok()??.orientation(),
+        ImageFormat::Hdr => RadianceLines::of(&mut File::open(path).ok()?).ok()?.orientation(),
         _ => reader.into_decoder().ok()?.orientation().ok(),
     });
     stated.unwrap_or(Orientation::NoTransforms)
 }
 
-/// Returns what the header of a TIFF file says in place of its first page, where that is a reduced one and another is not.
-fn start_of(file: &mut File) -> Result<Option<(u64, Vec<u8>)>> {
+/// Returns what decoders see in place of what stands in a file: that the first page of a TIFF file is the first of full size, how a Radiance picture lies
+/// and what its colors are.
+fn others_of(file: &mut File) -> Result<Vec<(u64, Vec<u8>)>> {
     let mut head = [0; 4];
     file.read_exact(&mut head)?;
     let (is_big_endian, is_big_file) = match &head {
@@ -114,10 +140,11 @@ fn start_of(file: &mut File) -> Result<Option<(u64, Vec<u8>)>> {
         b"II+\0" => (false, true),
         b"MM\0+" => (true, true),
         b"#?RA" => {
-            let turned = Sides::of(file)?.filter(|sides| sides.orientation().is_some());
-            return Ok(turned.map(|sides| (sides.at, sides.upright())));
+            let lines = RadianceLines::of(file)?;
+            let turned = lines.orientation().map(|_| (lines.at, lines.upright()));
+            return Ok(turned.into_iter().chain(lines.xyze_at.map(|at| (at, RGBE.to_vec()))).collect());
         }
-        _ => return Ok(None),
+        _ => return Ok(vec![]),
     };
     let mut number = |at: u64, n_bytes: usize| -> Result<u64> {
         let mut bytes = [0; 8];
@@ -152,18 +179,18 @@ fn start_of(file: &mut File) -> Result<Option<(u64, Vec<u8>)>> {
         if !is_reduced {
             let place = at.to_be_bytes()[8 - n_place..].to_vec();
             let place = if is_big_endian { place } else { place.into_iter().rev().collect() };
-            return Ok((index > 0).then_some((header, place)));
+            return Ok(if index > 0 { vec![(header, place)] } else { vec![] });
         }
         at = number(entries.saturating_add(n_entry * n_entries), n_place)?;
     }
-    Ok(None)
+    Ok(vec![])
 }
 
 impl Read for PictureFile {
     fn read(&mut self, buffer: &mut [u8]) -> Result<usize> {
         let n = self.file.read(buffer)?;
         let (from, end) = (self.at, self.at + n as u64);
-        if let Some((start, bytes)) = &self.start {
+        for (start, bytes) in &self.others {
             for (place, byte) in (*start..).zip(bytes) {
                 if (from..end).contains(&place) {
                     buffer[(place - from) as usize] = *byte;

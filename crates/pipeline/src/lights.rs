@@ -9,17 +9,22 @@ use dioptric_spectrum::{Illuminant, Spectrum};
 
 use crate::PipelineError;
 
-/// Returns the light of a name (in any case), a temperature (`3200K`), a chromaticity (`0.46,0.414`) or a CSV file whose two
+/// Returns the light of a name (in any case), a temperature (`3200K`), a chromaticity (`0.46,0.414`) or a table, whatever its file ends in, whose two
 /// columns are wavelengths in nm and spectral power.
 ///
 /// # Errors
 /// When the text is none of these, or there can be no such light.
 pub fn parse_illuminant(text: &str) -> Result<Illuminant, PipelineError> {
     let path = Path::new(text);
-    if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("csv")) {
+    if is_table(path) {
         return read_light(path);
     }
     Ok(Illuminant::parse(text)?)
+}
+
+/// Whether a text is the name of a table, by its ending or because it is there.
+fn is_table(path: &Path) -> bool {
+    path.extension().is_some_and(|own| own.eq_ignore_ascii_case("csv") || path.is_file())
 }
 
 /// Returns the white of a command line: a word of [`WhiteBalance::parse`], or the CSV file of a light's spectrum.
@@ -28,7 +33,7 @@ pub fn parse_illuminant(text: &str) -> Result<Illuminant, PipelineError> {
 /// As [`WhiteBalance::parse`] and [`parse_illuminant`].
 pub fn parse_white(text: &str) -> Result<WhiteBalance, PipelineError> {
     let path = Path::new(text);
-    if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("csv")) {
+    if is_table(path) {
         return Ok(WhiteBalance::Light(read_light(path)?));
     }
     Ok(WhiteBalance::parse(text)?)
@@ -38,6 +43,12 @@ fn read_light(path: &Path) -> Result<Illuminant, PipelineError> {
     let unreadable = |reason: String| PipelineError::Read { path: path.to_owned(), reason };
     let text = text::read(path).map_err(|e| unreadable(e.to_string()))?;
     let text = text::with_commas(&text);
+    // Two numbers with a gap between.
+    let with_comma = |line: &str| match line.split_whitespace().collect::<Vec<_>>()[..] {
+        [nm, power] if !line.contains([',', '#']) && nm.parse::<f64>().is_ok() => format!("{nm},{power}"),
+        _ => line.to_owned(),
+    };
+    let text = text.lines().map(with_comma).collect::<Vec<_>>().join("\n");
     let mut reader = csv::ReaderBuilder::new()
         .has_headers(false)
         .flexible(true)
@@ -67,7 +78,7 @@ fn read_light(path: &Path) -> Result<Illuminant, PipelineError> {
     }
     let wavelengths_nm =
         wavelengths_of_column(names.first().map_or("", String::as_str), &wavelengths_nm).map_err(unreadable)?;
-    let counts_photons = names.get(1).is_some_and(|name| has(name, &["photon", "quanta", "mol"]));
+    let counts_photons = names.get(1).is_some_and(|name| has(name, &["photon", "quanta", "mol", "ppfd"]));
     let is_comment = |line: &&str| line.starts_with('#') && has(line, &["photon", "quanta"]);
     if let Some(comment) = text.lines().find(is_comment).filter(|_| !counts_photons) {
         return Err(unreadable(format!(
@@ -75,10 +86,14 @@ fn read_light(path: &Path) -> Result<Illuminant, PipelineError> {
             comment.trim_start_matches('#').trim()
         )));
     }
+    if values.is_empty() {
+        return Err(unreadable("it has no line of a wavelength in nm and a power".to_owned()));
+    }
     // A power a frequency, or in decibels, is none a nanometre.
     let is_other = |name: &String| {
         let lower = name.to_lowercase();
-        ["dbm", "decibel", "log("].iter().any(|of| lower.contains(of))
+        let has_word = |of: &str| lower.split(|c: char| !c.is_alphabetic()).any(|word| word == of);
+        ["db", "dbm", "decibel", "decibels", "log", "logarithm"].into_iter().any(has_word)
             || lower.ends_with("hz")
             || lower.contains("hz-1")
             || lower.contains("hz^-1")
@@ -116,6 +131,8 @@ mod tests {
             "µm;W/nm\n0,4;1\n0,5;2\n0,8;1\n",
             "cm^-1\tpower\n12500\t1\n20000\t2\n25000\t1\n",
             "nm, photons/s\n400, 400\n500, 1000\n800, 800\n",
+            "400 1\n500   2\n800 1\n",
+            "nm, PPFD\n400, 400\n500, 1000\n800, 800\n",
             "\u{feff}Å, W\n4000, 1\n5000, 2\n8000, 1\n",
         ] {
             assert_eq!(read(text).unwrap(), light, "{text}");
@@ -125,6 +142,8 @@ mod tests {
             ("waves (zorp), a\n400, 1\n700, 1\n", "'zorp'"),
             ("400, 1\n500; 2\n", "line 2"),
             ("nm,dBm\n400, -1\n500, -2\n", "'dBm' is no power"),
+            ("nm,dB\n400, -1\n500, -2\n", "'dB' is no power"),
+            ("nm,absolute log irradiance\n400, -1\n500, -2\n", "irradiance' is no power"),
             ("nm,W m-2 Hz-1\n400, 1\n500, 2\n", "Hz-1' is no power"),
             ("Light in photons\nnm, a\n400, 1\n500, 2\n", "photons"),
             ("400, 1\n400, 2\n", "400"),

@@ -50,17 +50,16 @@ pub(crate) fn resampling_weights(
             ),
         });
     }
-    Ok(to
-        .centers_nm()
-        .iter()
-        .zip(to.widths_nm())
-        .map(|(&center, &width)| {
+    let bands = to.centers_nm().iter().zip(to.middles_nm()).zip(to.widths_nm());
+    Ok(bands
+        .map(|((&center, middle), &width)| {
             let old_width = from.widths_nm()[from.nearest(center)];
             // A new band of about the old width takes the line's value; a wider one its mean over the width.
             let n_points = if width <= 1.5 * old_width { 1 } else { (8.0 * width / old_width).ceil() as usize };
+            let place = if n_points == 1 { center } else { middle };
             let mut weights = vec![0.0; n];
             for i in 0..n_points {
-                let at = center + width * ((i as f64 + 0.5) / n_points as f64 - 0.5);
+                let at = place + width * ((i as f64 + 0.5) / n_points as f64 - 0.5);
                 let (band, fraction) = bracket(from, at);
                 weights[band] += (1.0 - fraction) / n_points as f64;
                 if fraction > 0.0 {

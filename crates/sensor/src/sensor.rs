@@ -332,7 +332,7 @@ impl Sensor {
             .map(|filter| {
                 let table = &self.filters[filter].quantum_efficiency;
                 let collected_m2 = area_m2 * self.filters[filter].exposure_fraction;
-                let weight = |(&center_nm, &width_nm): (&f64, &f64)| {
+                let weight = |(center_nm, &width_nm): (f64, &f64)| {
                     let (first_nm, last_nm) = table.range_nm();
                     let is_within = (first_nm..=last_nm).contains(&center_nm);
                     let in_table = |nm: f64| if is_within { nm.clamp(first_nm, last_nm) } else { nm };
@@ -344,7 +344,7 @@ impl Sensor {
                         / n as f64;
                     collected_m2 * width_nm * mean / HC_J_M
                 };
-                grid.centers_nm().iter().zip(grid.widths_nm()).map(weight).collect()
+                grid.middles_nm().into_iter().zip(grid.widths_nm()).map(weight).collect()
             })
             .collect()
     }

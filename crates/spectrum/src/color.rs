@@ -43,10 +43,10 @@ impl Observer {
     /// 10 and 20 nm grids keep the area under the curves.
     pub fn weights(self, grid: &WavelengthGrid) -> [Vec<f64>; 3] {
         self.matching_functions().each_ref().map(|bar| {
-            grid.centers_nm()
-                .iter()
+            grid.middles_nm()
+                .into_iter()
                 .zip(grid.widths_nm())
-                .map(|(&center, &width)| {
+                .map(|(center, &width)| {
                     // The table is given every nanometer: a mean of points half a nanometer apart is exact to 1e-4.
                     let n = (2.0 * width).ceil().max(1.0) as usize;
                     let (first, last) = bar.range_nm();

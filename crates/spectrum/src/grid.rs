@@ -62,6 +62,16 @@ impl WavelengthGrid {
         &self.widths_nm
     }
 
+    /// The middles of the bands, nm: their centers where neighbors are as far on both sides.
+    ///
+    /// What a band stands for lies half its width on both sides of its middle, so that bands neither overlap nor leave gaps.
+    pub fn middles_nm(&self) -> Vec<f64> {
+        let c = &self.centers_nm;
+        let step = |i: usize| c[i + 1] - c[i];
+        let shift = |i: usize| if i == 0 || i + 1 == c.len() { 0.0 } else { 0.25 * (step(i) - step(i - 1)) };
+        c.iter().enumerate().map(|(i, center)| center + shift(i)).collect()
+    }
+
     /// The number of bands, at least 1.
     #[expect(clippy::len_without_is_empty, reason = "a grid is never empty")]
     pub fn len(&self) -> usize {
@@ -135,6 +145,10 @@ mod tests {
     fn widths_reach_half_way_to_the_neighbors() {
         let grid = WavelengthGrid::new(vec![400.0, 410.0, 440.0]).unwrap();
         assert_eq!(grid.widths_nm(), [10.0, 20.0, 30.0]);
+        // From 405 nm to 425 nm.
+        assert_eq!(grid.middles_nm(), [400.0, 415.0, 440.0]);
+        let even = WavelengthGrid::uniform(400.0, 700.0, 10.0).unwrap();
+        assert_eq!(even.middles_nm(), even.centers_nm());
     }
 
     #[test]

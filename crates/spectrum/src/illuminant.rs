@@ -212,12 +212,15 @@ impl Illuminant {
         self.on_bands(grid).iter().map(|v| v * scale).collect()
     }
 
-    /// Returns its relative power, in each band: means where it has lines, or may have, that fall between the centers of bands.
+    /// Returns its relative power, in each band: means where it has lines, or may have, that fall between the centers of bands, and of bands
+    /// that are wider than the 10 nm by which daylight is known (CIE 015:2018, 4.1.2).
     pub fn on_bands(&self, grid: &WavelengthGrid) -> Vec<f64> {
-        match self {
-            Self::Fl2 | Self::Fl11 | Self::LedB3 | Self::Spectrum(_) => self.spectrum().band_means_held(grid),
-            _ => self.spectrum().sample_held(grid),
+        const DAYLIGHT_STEP_NM: f64 = 10.0;
+        let has_lines = matches!(self, Self::Fl2 | Self::Fl11 | Self::LedB3 | Self::Spectrum(_));
+        if has_lines || grid.widths_nm().iter().any(|width| *width > DAYLIGHT_STEP_NM + 1e-9) {
+            return self.spectrum().band_means_held(grid);
         }
+        self.spectrum().sample_held(grid)
     }
 
     /// Returns what is said of bands beyond a light's table, where there are any.

@@ -94,13 +94,13 @@ impl Spectrum {
     }
 
     fn means(&self, grid: &WavelengthGrid) -> impl Iterator<Item = (f64, Option<f64>)> {
-        let bands = grid.centers_nm().iter().zip(grid.widths_nm());
-        bands.map(|(&center_nm, &width_nm)| (center_nm, self.mean_over(center_nm, width_nm)))
+        let bands = grid.centers_nm().iter().zip(grid.middles_nm()).zip(grid.widths_nm());
+        bands.map(|((&center_nm, middle_nm), &width_nm)| (center_nm, self.mean_over(center_nm, middle_nm, width_nm)))
     }
 
     /// Returns the mean over a band, of the lines between the values of the table; `None` beyond it.
-    fn mean_over(&self, center_nm: f64, width_nm: f64) -> Option<f64> {
-        let (start, end) = (center_nm - 0.5 * width_nm, center_nm + 0.5 * width_nm);
+    fn mean_over(&self, center_nm: f64, middle_nm: f64, width_nm: f64) -> Option<f64> {
+        let (start, end) = (middle_nm - 0.5 * width_nm, middle_nm + 0.5 * width_nm);
         let (first, last) = self.range_nm();
         let (from, to) = (start.max(first), end.min(last));
         if from > to {

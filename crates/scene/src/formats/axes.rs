@@ -165,14 +165,19 @@ pub(super) fn are_turned(names: &[String]) -> bool {
     matches!(names, [first, second] if kind_of(first) == Some('x') && kind_of(second) == Some('y'))
 }
 
-/// Returns in a sentence which axis is taken for bands, where others are as long as there are bands and nothing is told.
-pub(super) fn note(sides: &[usize], told: Option<&str>, n_bands: Option<usize>) -> Option<String> {
+/// Returns in a sentence which axes are taken for what, where nothing is told and others are as long as there are bands; or where bands come first and
+/// the last axis is the fastest, since MATLAB's `h5write` leaves columns before rows then.
+pub(super) fn note(sides: &[usize], told: Option<&str>, n_bands: Option<usize>, is_row_major: bool) -> Option<String> {
     let &[a, b, c] = sides else { return None };
-    let n = n_bands?;
-    let is_open = told.is_none() && n > 1 && sides.iter().filter(|side| **side == n).count() > 1;
+    let n = n_bands.filter(|n| told.is_none() && *n > 1)?;
     let taken = if c == n { "last" } else { "first" };
-    is_open.then(|| {
-        format!("its sides are {a} × {b} × {c}, of which the {taken} is taken for bands: --axes says otherwise")
+    if sides.iter().filter(|side| **side == n).count() > 1 {
+        return Some(format!(
+            "its sides are {a} × {b} × {c}, of which the {taken} is taken for bands: --axes says otherwise"
+        ));
+    }
+    (is_row_major && a == n).then(|| {
+        format!("its axes, {a} × {b} × {c}, are taken for bands, rows and columns: --axes bxy where columns come before rows, as MATLAB leaves them")
     })
 }
 
@@ -229,9 +234,12 @@ mod tests {
         assert!(planes(&[2, 3, 4], None, Some(7), true, |_| 0.0).unwrap_err().contains("--axes"));
         assert!(planes(&[2, 0, 4], None, None, true, |_| 0.0).is_err());
         for (sides, taken) in [([7, 7, 9], "first"), ([9, 7, 7], "last"), ([7, 9, 7], "last")] {
-            assert!(note(&sides, None, Some(7)).is_some_and(|note| note.contains(taken)), "{sides:?}");
+            assert!(note(&sides, None, Some(7), true).is_some_and(|note| note.contains(taken)), "{sides:?}");
         }
-        assert!(note(&[7, 7, 9], None, Some(9)).is_none() && note(&[7, 7, 9], Some("ybx"), Some(7)).is_none());
+        assert!(
+            note(&[7, 8, 9], None, Some(9), true).is_none() && note(&[7, 7, 9], Some("ybx"), Some(7), true).is_none()
+        );
+        assert!(note(&[7, 8, 9], None, Some(7), true).is_some() && note(&[7, 8, 9], None, Some(7), false).is_none());
         assert_eq!(planes(&[2, 3], None, Some(1), true, |i| i as f32).unwrap()[0][(1, 2)], 5.0);
     }
 }

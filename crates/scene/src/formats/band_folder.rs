@@ -26,8 +26,8 @@ const LISTS: [&str; 2] = ["wavelengths.txt", "wavelengths.csv"];
 /// Endings of pictures that are no bands.
 const OTHERS: [&str; 10] = ["bmp", "jpg", "jpeg", "webp", "ppm", "pgm", "pnm", "exr", "hdr", "pfm"];
 
-/// Endings of files that may say something of the numbers.
-const TELLING: [&str; 11] = ["json", "txt", "csv", "xml", "yaml", "yml", "ini", "toml", "mat", "npy", "h5"];
+/// Files that systems leave in folders.
+const OF_SYSTEMS: [&str; 2] = ["thumbs.db", "desktop.ini"];
 
 /// Reads a folder of gray PNG or TIFF pictures, one a band, whose codes are linear, or floats.
 ///
@@ -96,7 +96,7 @@ pub(super) fn band_folder(folder: &Path, options: &ReadOptions) -> Result<Cube, 
         grays.iter_mut().for_each(|gray| gray.stretch(top));
     }
     let planes = grays.into_iter().map(|gray| gray.values).collect();
-    Ok(Cube { planes, top, wavelengths_nm: Some(wavelengths_nm), quantity: None, unit: None, notes })
+    Ok(Cube { planes, top, wavelengths_nm: Some(wavelengths_nm), quantity: None, unit: None, called: None, notes })
 }
 
 /// Refuses two pictures of one wavelength, and one of none.
@@ -130,6 +130,10 @@ fn grays_of(pictures: &[Numbered], notes: &mut Vec<String>) -> Result<(Vec<GrayP
         grays.push(gray);
     }
     notes.extend(merged(told.into_iter()));
+    // Where some are packed all are quantities, be their factor 1.
+    if grays.iter().any(|gray| gray.page.is_packed) {
+        grays.iter_mut().for_each(|gray| gray.top = None);
+    }
     let (rows, columns) = grays[0].values.dim();
     let other = grays.iter().zip(pictures).find(|(gray, _)| gray.values.dim() != (rows, columns));
     if let Some((gray, (_, path))) = other {
@@ -173,7 +177,7 @@ struct Listing {
     pictures: Vec<Numbered>,
     /// The names of other pictures.
     unused: Vec<String>,
-    /// The names of files that may say something of the numbers.
+    /// The names of what else there is.
     files: Vec<String>,
 }
 
@@ -183,20 +187,15 @@ fn listing(folder: &Path) -> Result<Listing, SceneError> {
     for entry in entries {
         let path = entry.map_err(|error| unreadable(folder, error))?.path();
         let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
-        // What macOS leaves beside files.
-        if name_of(&path).starts_with("._") {
+        let name = name_of(&path).to_lowercase();
+        let is_known = [&LISTS[..], &OF_SYSTEMS].iter().any(|known| known.contains(&name.as_str()))
+            || ["readme", "license"].iter().any(|start| name.starts_with(start));
+        if name.starts_with('.') || is_known {
             continue;
         }
-        if OTHERS.contains(&extension.as_str()) {
-            unused.push(name_of(&path));
-        }
-        let name = name_of(&path).to_lowercase();
-        let is_known =
-            LISTS.contains(&name.as_str()) || ["readme", "license"].iter().any(|start| name.starts_with(start));
-        if TELLING.contains(&extension.as_str()) && !is_known {
-            files.push(name_of(&path));
-        }
-        if !matches!(extension.as_str(), "png" | "tif" | "tiff") {
+        if path.is_dir() || !matches!(extension.as_str(), "png" | "tif" | "tiff") {
+            let is_picture = OTHERS.contains(&extension.as_str());
+            (if is_picture { &mut unused } else { &mut files }).push(name_of(&path));
             continue;
         }
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
@@ -204,6 +203,16 @@ fn listing(folder: &Path) -> Result<Listing, SceneError> {
             Some(number) => pictures.push((number, path)),
             None => unused.push(name_of(&path)),
         }
+    }
+    // Bands are called alike before their numbers.
+    let start = |path: &Path| {
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        stem.trim_end_matches(|c: char| c.is_ascii_digit() || ".nmto_- ".contains(c)).to_owned()
+    };
+    let n_called = |own: &str| pictures.iter().filter(|(_, path)| start(path) == own).count();
+    let usual = pictures.iter().map(|(_, path)| start(path)).max_by_key(|own| n_called(own)).unwrap_or_default();
+    if 2 * n_called(&usual) > pictures.len() {
+        unused.extend(pictures.extract_if(.., |(_, path)| start(path) != usual).map(|(_, path)| name_of(&path)));
     }
     pictures.sort_by(|a, b| a.0.total_cmp(&b.0).then_with(|| a.1.cmp(&b.1)));
     unused.sort();

@@ -89,6 +89,15 @@ impl CameraFile {
             );
             return Err(unreadable(&self.file, reason));
         }
+        // Shares of the picture's sides, as photogrammetry has them.
+        let are_shares = self.center_px.iter().all(|own| own.is_some_and(|c| (0.0..1.0).contains(&c))) && fx_px < 10.0;
+        if width.min(height) > 4 && are_shares {
+            let reason = format!(
+                "its focal length of {} px and its center within the first sample look like shares of the picture: expected them in samples",
+                shown(fx_px)
+            );
+            return Err(unreadable(&self.file, reason));
+        }
         if fx_px < LEAST_FOCAL_WIDTHS * width as f64 {
             let reason = format!(
                 "its focal length of {} px would make a picture of {width} samples wider than 178°: expected it in samples",

@@ -9,12 +9,12 @@ use serde::{
     Deserialize, Deserializer,
     de::{MapAccess, SeqAccess, Visitor},
 };
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use super::{
     camera::CameraFile,
     camera_models::{HARMLESS, check_matrix, is_fisheye, unknown_model},
-    camera_yaml::of_yaml,
+    camera_yaml::{of_xml, of_yaml},
     distortion::Distortion,
     npy::parse as parse_npy,
     stated::{Stated, name_of, short},
@@ -25,8 +25,6 @@ use crate::SceneError;
 /// What camera data are read as.
 const EXPECTED: &str = "expected JSON, YAML or XML of OpenCV, a matrix of 3 × 3 numbers, or a line of COLMAP's cameras.txt (colmap model_converter --output_type \
                         TXT): number, model, width, height, parameters";
-/// Lines of YAML of ROS, the matrix of its messages.
-const YAML: [&str; 2] = ["k:", "K:"];
 /// Endings of a picture's stem that its camera file does not repeat.
 const PARTS: [&str; 4] = [".radiance_depth", ".radiance", ".reflectance", ".depth"];
 impl CameraFile {
@@ -39,8 +37,8 @@ impl CameraFile {
         Self::read(&path, picture).map(Some)
     }
 
-    /// Reads the camera data of a picture: JSON of ours (`width`, `height`, `fx_px`, `fy_px`, `cx_px`, `cy_px`), of `Open3D` (`intrinsic_matrix`) or of
-    /// nerfstudio (`fl_x`, …), COLMAP's `cameras.txt`, or YAML of `OpenCV` and ROS (`camera_matrix`) or of Kalibr (`intrinsics`).
+    /// Reads the camera data of a picture: JSON, YAML or `OpenCV`'s XML of ours (`width`, `height`, `fx_px`, `fy_px`, `cx_px`, `cy_px`), of `Open3D`
+    /// (`intrinsic_matrix`), nerfstudio (`fl_x`, …), `OpenCV` and ROS (`camera_matrix`) or Kalibr (`intrinsics`), or COLMAP's `cameras.txt`.
     ///
     /// # Errors
     /// When it is none of these, lacks what is needed, says a thing twice, or has a model of a lens that is not known.
@@ -49,29 +47,47 @@ impl CameraFile {
         check_memory(path, length.saturating_mul(4), length)?;
         check_whole(path)?;
         if starts_with(path, NUMPY)? {
-            return of_npy(path, picture).and_then(Self::checked).map_err(|reason| unreadable(path, reason));
+            let data = of_npy(path).and_then(|object| of_object(path, object, picture));
+            return data.and_then(Self::checked).map_err(|reason| unreadable(path, reason));
         }
         let text = dioptric_files::text::read(path).map_err(|error| match error.kind() {
             std::io::ErrorKind::InvalidData => unreadable(path, format!("it is no text, {EXPECTED}")),
             _ => unreadable(path, error),
         })?;
-        let data = match text.trim_start() {
-            text if text.starts_with('{') => of_json(path, text, picture),
+        // JSON has its keys in quotes.
+        let is_flow =
+            |text: &str| text.strip_prefix('{').is_some_and(|rest| rest.trim_start().starts_with(char::is_alphabetic));
+        let is_yaml =
+            || path.extension().is_some_and(|own| ["yaml", "yml"].iter().any(|yaml| own.eq_ignore_ascii_case(yaml)));
+        // Of a key in front of its value.
+        let has_key = |line: &str| !line.starts_with('#') && (line.contains(": ") || line.ends_with(':'));
+        let is_section = |line: &str| {
+            let name = line.strip_prefix('[').and_then(|line| line.trim_end().strip_suffix(']'));
+            name.is_some_and(|name| name.starts_with(char::is_alphabetic))
+        };
+        let object = match text.trim_start() {
+            text if is_yaml() || is_flow(text) => of_yaml(text),
+            text if text.starts_with('{') => of_json(text),
+            text if is_section(text.lines().next().unwrap_or_default()) => Err(
+                "it is an INI file, as ZED has it: expected fx, fy, cx and cy of one of its cameras as JSON or YAML"
+                    .to_owned(),
+            ),
             text if text.starts_with('[') => Err(
                 "it is a list of JSON, expected the object of one camera (with fx, fy, cx and cy, or intrinsic_matrix)"
                     .to_owned(),
             ),
-            text if text.starts_with(['%', '<']) || text.lines().any(|line| YAML.contains(&line.trim())) || {
-                text.contains("camera_matrix") || text.contains("intrinsics:")
-            } =>
-            {
-                of_yaml(path, text)
-            }
+            text if text.starts_with('<') => of_xml(text),
             text => match matrix_of(text) {
-                Some(numbers) => of_matrix(path, &numbers, picture),
-                None => of_colmap(path, text),
+                Some(numbers) => Ok(of_matrix(&numbers)),
+                None if text.starts_with('%') || text.lines().any(|line| has_key(line.trim_end())) => of_yaml(text),
+                None => {
+                    return of_colmap(path, text, picture)
+                        .and_then(Self::checked)
+                        .map_err(|reason| unreadable(path, reason));
+                }
             },
         };
+        let data = object.and_then(|object| of_object(path, object, picture));
         data.and_then(Self::checked).map_err(|reason| unreadable(path, reason))
     }
 }
@@ -151,26 +167,25 @@ impl<'de> Deserialize<'de> for Once {
 const NUMPY: &[u8] = b"\x93NUMPY";
 
 /// Reads the matrix of a camera: 3 rows of 3 numbers of `NumPy`.
-fn of_npy(path: &Path, picture: &Path) -> Result<CameraFile, String> {
+fn of_npy(path: &Path) -> Result<Value, String> {
     let array = parse_npy(&fs::read(path).map_err(|error| error.to_string())?)?;
     if array.sides != [3, 3] {
         return Err(format!("its array has sides of {:?}, expected the 3 × 3 matrix of a camera", array.sides));
     }
-    of_matrix(path, &array.values.iter().map(f32::to_string).collect::<Vec<_>>(), picture)
+    Ok(of_matrix(&array.values.iter().map(|v| f64::from(*v)).collect::<Vec<_>>()))
 }
 
-/// Reads the matrix of a camera, row by row.
-fn of_matrix(path: &Path, numbers: &[String], picture: &Path) -> Result<CameraFile, String> {
-    let rows: Vec<_> = numbers.chunks(3).map(|row| format!("[{}]", row.join(","))).collect();
-    of_json(path, &format!("{{\"intrinsic_matrix\": [{}]}}", rows.join(",")), picture)
+/// Returns the object of the matrix of a camera, row by row.
+fn of_matrix(numbers: &[f64]) -> Value {
+    json!({ "intrinsic_matrix": numbers.chunks(3).collect::<Vec<_>>() })
 }
 
 /// Returns the numbers of a text that is a matrix of 3 rows of 3 numbers, as `savetxt` of `NumPy` writes it.
-fn matrix_of(text: &str) -> Option<Vec<String>> {
+fn matrix_of(text: &str) -> Option<Vec<f64>> {
     let is_comment = |line: &&str| line.trim().is_empty() || line.starts_with('#');
-    let number = |word: &str| Some(word.parse::<f64>().ok()?.to_string());
+    let number = |word: &str| word.parse().ok();
     let row = |line: &str| line.split([' ', '\t', ',', ';']).filter(|word| !word.is_empty()).map(number).collect();
-    let rows: Option<Vec<Vec<String>>> = text.lines().filter(|line| !is_comment(line)).map(row).collect();
+    let rows: Option<Vec<Vec<f64>>> = text.lines().filter(|line| !is_comment(line)).map(row).collect();
     rows.filter(|rows| rows.len() == 3 && rows.iter().all(|row| row.len() == 3)).map(|rows| rows.concat())
 }
 
@@ -197,11 +212,15 @@ fn no_json(text: &str, error: &serde_json::Error) -> String {
     format!("line {line}, column {column}: found '{}', expected {expected}", short(found))
 }
 
-/// Reads JSON of ours, `Open3D`, nerfstudio or ROS.
-fn of_json(path: &Path, text: &str, picture: &Path) -> Result<CameraFile, String> {
+fn of_json(text: &str) -> Result<Value, String> {
     let Once(all) = serde_json::from_str(text).map_err(|error| no_json(text, &error))?;
-    let Value::Object(entries) = all else { return Err("it is no object of JSON".to_owned()) };
-    let (mut keys, frames_note) = with_frame(path, picture, Stated::new("key", entries.into_iter().collect()))?;
+    Ok(all)
+}
+
+/// Reads an object of ours, `Open3D`, nerfstudio, `OpenCV`, ROS or Kalibr.
+fn of_object(path: &Path, object: Value, picture: &Path) -> Result<CameraFile, String> {
+    let Value::Object(entries) = object else { return Err("it is no object of a camera (key: value)".to_owned()) };
+    let (mut keys, frames_note) = with_frame(path, picture, of_one_camera(entries.into_iter().collect())?)?;
     let depth_file = match keys.take("depth_file_path") {
         None | Some(Value::Null) => None,
         Some(Value::String(own)) => Some(path.with_file_name(own.replace('\\', "/"))),
@@ -214,11 +233,28 @@ fn of_json(path: &Path, text: &str, picture: &Path) -> Result<CameraFile, String
     if keys.get("units").and_then(Value::as_str).is_some_and(|unit| ["px", "pixel", "pixels"].contains(&unit)) {
         keys.take("units");
     }
-    let size = (side(&mut keys, &["width", "w"])?, side(&mut keys, &["height", "h"])?);
+    let size = match keys.take("resolution") {
+        None => (
+            side(&mut keys, &["width", "w", "image_width", "image_Width"])?,
+            side(&mut keys, &["height", "h", "image_height", "image_Height"])?,
+        ),
+        Some(own) => match numbers_of(&own, "resolution")?[..] {
+            [width, height] => (Some(n_samples(width, "resolution")?), Some(n_samples(height, "resolution")?)),
+            _ => return Err("its resolution is no width and height".to_owned()),
+        },
+    };
     let angles_rad = [number(&mut keys, &["camera_angle_x"])?, number(&mut keys, &["camera_angle_y"])?];
     let [fx, fy, cx, cy] = pinhole_of(&mut keys)?;
     let depth_unit_m = depth_unit_of(&mut keys)?;
     let distortion = distortion_of(&mut keys, is_fisheye, is_nerf)?;
+    // A rectification that turns nothing is none.
+    const NO_TURN: [f64; 9] = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
+    for name in ["rectification_matrix", "R", "r"] {
+        let turn = keys.get(name).and_then(|own| numbers_of(own, name).ok());
+        if turn.is_some_and(|own| own == NO_TURN) {
+            keys.take(name);
+        }
+    }
     let half = if is_nerf { 0.5 } else { 0.0 };
     let missing = |name: &str| format!("missing {name}: expected width, height, fx_px, fy_px, cx_px and cy_px");
     Ok(CameraFile {
@@ -235,12 +271,41 @@ fn of_json(path: &Path, text: &str, picture: &Path) -> Result<CameraFile, String
         distortion,
         depth_unit_m,
         depth_file,
-        notes: keys.note(path, |name| HARMLESS.contains(&name)).into_iter().chain(frames_note).collect(),
+        notes: keys
+            .note(path, |name| HARMLESS.contains(&name) || name.contains("error"))
+            .into_iter()
+            .chain(frames_note)
+            .collect(),
     })
 }
 
 /// The keys of a camera file.
 type Keys = Stated<Value>;
+
+/// Puts what the only camera of a file states (`cam0` of Kalibr, `camera`, `Camera.` of ORB-SLAM) among what the file states.
+fn of_one_camera(mut entries: Vec<(String, Value)>) -> Result<Keys, String> {
+    for (name, _) in &mut entries {
+        *name = ["Camera.", "Camera1."].iter().find_map(|head| name.strip_prefix(head)).unwrap_or(name).to_owned();
+    }
+    let is_counted = |name: &str| name.strip_prefix("cam").is_some_and(|n| n.parse::<u32>().is_ok());
+    let is_camera = |name: &str| ["camera", "intrinsics", "intrinsic"].contains(&name) || is_counted(name);
+    let (cameras, mut all): (Vec<_>, Vec<_>) = entries
+        .into_iter()
+        .partition(|(name, own)| is_camera(name) && own.as_object().is_some_and(|own| !own.contains_key("data")));
+    if cameras.len() > 1 {
+        let names = cameras.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>().join(", ");
+        return Err(format!("it has cameras {names}: expected the keys of one"));
+    }
+    for (_, camera) in cameras {
+        let Value::Object(own) = camera else { continue };
+        all.extend(own);
+    }
+    let twice = all.iter().enumerate().find(|(i, (name, _))| all[..*i].iter().any(|(own, _)| own == name));
+    match twice {
+        Some((_, (name, _))) => Err(format!("the key '{}' stands twice: expected it once", short(name))),
+        None => Ok(Stated::new("key", all)),
+    }
+}
 
 /// Puts what the frame of a picture states in the place of what is stated for all (`frames` of nerfstudio); of frames none of which is
 /// the picture's it is said where they state more than poses.
@@ -302,17 +367,18 @@ fn number(keys: &mut Keys, names: &[&str]) -> Result<Option<f64>, String> {
 
 /// Takes a number of samples along a side.
 fn side(keys: &mut Keys, names: &[&str]) -> Result<Option<usize>, String> {
-    match number(keys, names)? {
-        None => Ok(None),
-        Some(n) if n >= 1.0 && n.fract() == 0.0 && n < 1e6 => Ok(Some(n as usize)),
-        Some(n) => Err(format!("{} is {n}, expected a number of samples", names[0])),
-    }
+    number(keys, names)?.map(|n| n_samples(n, names[0])).transpose()
+}
+
+fn n_samples(n: f64, name: &str) -> Result<usize, String> {
+    let is_whole = n >= 1.0 && n.fract() == 0.0 && n < 1e6;
+    is_whole.then_some(n as usize).ok_or_else(|| format!("{name} is {n}, expected a number of samples"))
 }
 
 /// Whether the file names a model of fisheyes.
 fn is_of_fisheye(keys: &mut Keys) -> Result<bool, String> {
     let mut is_any = false;
-    for name in ["camera_model", "distortion_model", "model"] {
+    for name in ["camera_model", "distortion_model", "model", "type"] {
         let Some(model) = keys.get(name).and_then(Value::as_str).map(str::to_owned) else { continue };
         match is_fisheye(&model) {
             Some(is_fisheye) => {
@@ -320,7 +386,7 @@ fn is_of_fisheye(keys: &mut Keys) -> Result<bool, String> {
                 keys.take(name);
             }
             // Who made the camera may stand there as well, which is named.
-            None if name == "model" => {}
+            None if ["model", "type"].contains(&name) => {}
             None => return Err(unknown_model(&model)),
         }
     }
@@ -339,11 +405,20 @@ fn pinhole_of(keys: &mut Keys) -> Result<[Option<f64>; 4], String> {
         number(keys, &["cx_px", "cx", "ppx"])?,
         number(keys, &["cy_px", "cy", "ppy"])?,
     ];
-    let Some(matrix) = keys.take_any(&["intrinsic_matrix", "K"]) else { return Ok(named) };
-    let m = numbers_of(&matrix, "intrinsic_matrix")?;
-    if m.len() != 9 {
-        return Err(format!("its intrinsic_matrix has {} numbers, expected 9", m.len()));
-    }
+    const MATRICES: [&str; 6] = ["intrinsic_matrix", "camera_matrix", "Camera_Matrix", "cameraMatrix", "K", "k"];
+    let matrix = keys.take_any(&MATRICES).map(|own| (own, "intrinsic_matrix"));
+    let Some((matrix, name)) = matrix.or_else(|| Some((keys.take("intrinsics")?, "intrinsics"))) else {
+        return Ok(named);
+    };
+    let m = match numbers_of(&matrix, name)? {
+        m if m.len() == 9 => m,
+        // Those of Kalibr.
+        m if m.len() == 4 && name == "intrinsics" => vec![m[0], 0.0, m[2], 0.0, m[1], m[3], 0.0, 0.0, 1.0],
+        m => {
+            let expected = if name == "intrinsics" { "4, those of a pinhole, or" } else { "those" };
+            return Err(format!("its {name} has {} numbers, expected {expected} 9 of a matrix", m.len()));
+        }
+    };
     // Open3D's nine numbers run down the columns, rows of rows are a table.
     let is_table = matrix.as_array().is_some_and(|rows| rows.iter().any(Value::is_array));
     let [a, b] = if is_table || m[6] == 0.0 { [2, 5] } else { [6, 7] };
@@ -362,7 +437,20 @@ fn distortion_of(keys: &mut Keys, is_fisheye: bool, is_nerf: bool) -> Result<Dis
     for (place, name) in ["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"].iter().enumerate() {
         k[place] = number(keys, &[name])?.unwrap_or(0.0);
     }
-    let list = keys.take_any(&["distortion", "dist_coeffs", "distortion_coefficients", "D"]);
+    const LISTS: [&str; 11] = [
+        "distortion",
+        "dist_coeff",
+        "dist",
+        "coeffs",
+        "dist_coeffs",
+        "distortion_coefficients",
+        "Distortion_Coefficients",
+        "distortion_coeffs",
+        "distCoeffs",
+        "D",
+        "d",
+    ];
+    let list = keys.take_any(&LISTS);
     if let Some(list) = list.filter(|list| !list.is_null()) {
         if k.iter().any(|v| *v != 0.0) {
             return Err("it states its distortion twice, as a list and by names: expected one".to_owned());
@@ -385,7 +473,7 @@ fn distortion_of(keys: &mut Keys, is_fisheye: bool, is_nerf: bool) -> Result<Dis
 /// Takes what one code of the depth beside the picture stands for, m.
 fn depth_unit_of(keys: &mut Keys) -> Result<Option<f64>, String> {
     let unit_m = number(keys, &["depth_unit_m", "depth_unit_scale_factor", "integer_depth_scale"])?;
-    let of_scale = match number(keys, &["depth_scale"])? {
+    let of_scale = match number(keys, &["depth_scale", "DepthMapFactor", "RGBD.DepthMapFactor"])? {
         None => None,
         // So many codes a metre, as TUM and Open3D have it; small factors are metres to some and millimetres to others.
         Some(scale) if scale >= 10.0 => Some(1.0 / scale),
@@ -404,11 +492,12 @@ fn depth_unit_of(keys: &mut Keys) -> Result<Option<f64>, String> {
     }
 }
 
-/// Returns all numbers of a list, or of a table row by row.
+/// Returns all numbers of a list, of a table row by row, or of a matrix of `OpenCV` and ROS (`rows`, `cols`, `data`).
 fn numbers_of(value: &Value, name: &str) -> Result<Vec<f64>, String> {
     let wrong = || format!("{name} is no list of numbers");
+    let list = value.get("data").unwrap_or(value);
     let mut numbers = vec![];
-    for item in value.as_array().ok_or_else(wrong)? {
+    for item in list.as_array().ok_or_else(wrong)? {
         match item {
             Value::Array(row) => {
                 numbers.extend(row.iter().map(Value::as_f64).collect::<Option<Vec<f64>>>().ok_or_else(wrong)?);
@@ -416,13 +505,55 @@ fn numbers_of(value: &Value, name: &str) -> Result<Vec<f64>, String> {
             item => numbers.push(item.as_f64().ok_or_else(wrong)?),
         }
     }
+    let side = |side: &str| value.get(side).and_then(Value::as_f64);
+    if let (Some(rows), Some(columns)) = (side("rows"), side("cols"))
+        && rows * columns != numbers.len() as f64
+    {
+        return Err(format!("{name} has {} numbers, but {rows} rows and {columns} columns", numbers.len()));
+    }
     Ok(numbers)
 }
 
-/// Reads the first camera of COLMAP's `cameras.txt`: number, model, width, height and parameters, with centers of pixels at halves.
-fn of_colmap(path: &Path, text: &str) -> Result<CameraFile, String> {
-    let mut lines = text.lines().map(str::trim).filter(|line| !line.is_empty() && !line.starts_with('#'));
-    let line = lines.next().ok_or(EXPECTED)?;
+/// Returns the line of the camera of a picture in COLMAP's `cameras.txt`: that which `images.txt` beside it names, or else the only one of the picture's size, or
+/// the only one at all.
+fn colmap_line<'a>(path: &Path, lines: &[&'a str], picture: &Path) -> Result<&'a str, String> {
+    fn words(line: &str) -> Vec<&str> {
+        line.split_whitespace().collect()
+    }
+    let with_id = |id: &str| lines.iter().copied().find(|line| line.split_whitespace().next() == Some(id));
+    let images = dioptric_files::text::read(&path.with_file_name("images.txt")).unwrap_or_default();
+    // Number, rotation, place, camera and name of a picture.
+    let is_own = |line: &&str| {
+        let own = line.split_whitespace().collect::<Vec<&str>>();
+        own.len() == 10 && Path::new(own[9]).file_name() == picture.file_name()
+    };
+    if let Some(line) = images.lines().find(is_own) {
+        let id = line.split_whitespace().nth(8).unwrap_or_default();
+        return with_id(id).ok_or_else(|| format!("images.txt says that its camera is {id}, which it has not"));
+    }
+    let [first, others @ ..] = lines else { return Err(EXPECTED.to_owned()) };
+    if others.iter().all(|line| words(line).get(1..) == words(first).get(1..)) {
+        return Ok(*first);
+    }
+    let size = dioptric_pictures::size_of(picture).ok().map(|(columns, rows)| [columns.to_string(), rows.to_string()]);
+    let has_size =
+        |line: &&&str| size.as_ref().is_some_and(|size| words(line).get(2..4).is_some_and(|own| own == size));
+    let alike: Vec<&&str> = lines.iter().filter(has_size).collect();
+    match alike[..] {
+        [one] => Ok(*one),
+        _ => Err(format!(
+            "it has {} cameras, and no images.txt beside it says which {} has: expected one",
+            lines.len(),
+            name_of(picture)
+        )),
+    }
+}
+
+/// Reads the camera of a picture in COLMAP's `cameras.txt`: number, model, width, height and parameters, with centers of pixels at halves.
+fn of_colmap(path: &Path, text: &str, picture: &Path) -> Result<CameraFile, String> {
+    let lines: Vec<&str> =
+        text.lines().map(str::trim).filter(|line| !line.is_empty() && !line.starts_with('#')).collect();
+    let line = colmap_line(path, &lines, picture)?;
     let words: Vec<&str> = line.split_whitespace().collect();
     let [_, model, width, height, parameters @ ..] = &words[..] else { return Err(EXPECTED.to_owned()) };
     let side = |word: &str| word.parse::<usize>().ok().filter(|n| *n > 0).ok_or(EXPECTED);
@@ -444,7 +575,6 @@ fn of_colmap(path: &Path, text: &str) -> Result<CameraFile, String> {
             ));
         }
     };
-    let more: Vec<String> = lines.map(short).collect();
     Ok(CameraFile {
         file: path.to_owned(),
         size: Some(size),
@@ -454,7 +584,7 @@ fn of_colmap(path: &Path, text: &str) -> Result<CameraFile, String> {
         distortion: Distortion::of_list(k, model.ends_with("_FISHEYE"))?,
         depth_unit_m: None,
         depth_file: None,
-        notes: super::stated::note_of(path, "line", &more).into_iter().collect(),
+        notes: vec![],
     })
 }
 

@@ -3,8 +3,26 @@
 use super::stated::short;
 
 /// Keys that change nothing of what a scene is.
-pub(super) const HARMLESS: [&str; 8] =
-    ["source", "name", "comment", "comments", "description", "note", "notes", "license"];
+pub(super) const HARMLESS: [&str; 18] = [
+    "header",
+    "source",
+    "name",
+    "comment",
+    "comments",
+    "description",
+    "note",
+    "notes",
+    "license",
+    "calibration_time",
+    "calibration_Time",
+    "nframes",
+    "board_width",
+    "board_height",
+    "square_size",
+    "flags",
+    "camera_name",
+    "sensor_type",
+];
 /// What calibrations call the polynomial of `OpenCV`, or no distortion at all.
 const POLYNOMIALS: [&str; 12] = [
     "OPENCV",
@@ -21,10 +39,12 @@ const POLYNOMIALS: [&str; 12] = [
     "NONE",
 ];
 /// What they call a fisheye by the angle.
-const FISHEYES: [&str; 5] = ["OPENCV_FISHEYE", "FISHEYE", "EQUIDISTANT", "EQUI", "KANNALA_BRANDT"];
+const FISHEYES: [&str; 6] = ["OPENCV_FISHEYE", "FISHEYE", "EQUIDISTANT", "EQUI", "KANNALA_BRANDT", "KANNALABRANDT8"];
 
 /// Returns whether a model is a fisheye; `None` of one that is not known.
 pub(super) fn is_fisheye(model: &str) -> Option<bool> {
+    // RealSense has `distortion.brown_conrady`.
+    let model = model.rsplit('.').next().unwrap_or(model);
     let model = model.trim().trim_matches(['"', '\'']).to_uppercase().replace(['-', ' '], "_");
     if model.is_empty() || POLYNOMIALS.contains(&model.as_str()) {
         return Some(false);

@@ -130,9 +130,65 @@ fn other_programs_are_read() {
     let fisheye = Distortion::Fisheye([0.1, 0.0, 0.2, 0.0]);
     assert_eq!(same(ros, None), fisheye);
     assert_eq!(same("1 OPENCV_FISHEYE 640 480 525 526 320 240 0.1 0 0.2 0", None), fisheye);
+    for flow in [
+        "camera_matrix:\n- - 525.0\n  - 0.0\n  - 319.5\n- - 0.0\n  - 526.0\n  - 239.5\n- - 0.0\n  - 0.0\n  - 1.0\ndist_coeff:\n- - 0.0\n  - 0.0\n  - 0.0\n",
+        "image_width: 640\nimage_height: 480\ncamera_matrix: {rows: 3, cols: 3, dt: d, data: [525, 0, 319.5, 0, 526, 239.5, 0, 0, 1]}\n",
+        "{image_width: 640, image_height: 480, camera_matrix: {data: [525, 0, 319.5, 0, 526, 239.5, 0, 0, 1]}}",
+        "{width: 640, height: 480, K: [[525, 0, 319.5], [0, 526, 239.5], [0, 0, 1]]}",
+        "image_width: 640\nimage_height: 480\nK:\n- [525, 0, 319.5]\n- [0, 526, 239.5]\n- [0, 0, 1]\nD: !!opencv-matrix\n  {rows: 0, cols: 0, data: []}\n",
+        "width: 640 # columns\n'height': 480\nfx: 525.\nfy: 5.26e2\ncx: 319.5\ncy: 239.5\ncamera_name: \"a: b\"\n",
+        "header:\n  seq: 1\nheight: 480\nwidth: 640\ndistortion_model: ''\nD: []\nK: [525.0, 0.0, 319.5, 0.0, 526.0, 239.5, 0.0, 0.0, 1.0]\n---\n",
+        "cam0: {intrinsics: [525, 526, 319.5, 239.5], resolution: [640, 480]}\n",
+        r#"{"image_width": 640, "image_height": 480, "camera_matrix": {"type_id": "opencv-matrix", "rows": 3, "cols": 3, "dt": "d",
+            "data": [525, 0, 319.5, 0, 526, 239.5, 0, 0, 1]}}"#,
+    ] {
+        same(flow, None);
+    }
+    let slam = "%YAML:1.0\nCamera.type: \"PinHole\"\nCamera.fx: 525.0\nCamera.fy: 526.0\nCamera.cx: 319.5\nCamera.cy: 239.5\nCamera.width: 640\n\
+                Camera.height: 480\nDepthMapFactor: 5000.0\n";
+    same(slam, Some(2e-4));
+    same(
+        r#"{"camera": {"width": 640, "height": 480, "fx": 525, "fy": 526, "ppx": 319.5, "ppy": 239.5,
+        "model": "distortion.brown_conrady", "coeffs": [0, 0, 0, 0, 0]}}"#,
+        None,
+    );
+    for (text, word) in [
+        ("[LEFT_CAM_HD]\nfx=525\n", "it is an INI file"),
+        ("width: [640\nheight: 480\n", "it is no YAML"),
+        ("width: 640\nheight: 480\nfx: &a 525\nfy: *a\n", "alias"),
+        ("width: 640\n---\nheight: 480\n", "several documents"),
+        ("{width: 640, width: 641}", "the key 'width' stands twice"),
+        ("width: 640\nheight: 480\nK: {rows: 2, cols: 3, data: [1, 2, 3]}\n", "3 numbers, but 2 rows and 3 columns"),
+        ("width: 640\nheight: 480\nK: [525, 0, x, 0, 526, 239.5, 0, 0, 1]\n", "no list of numbers"),
+        (&format!("width: {}1{}\n", "[".repeat(40), "]".repeat(40)), "within each other"),
+    ] {
+        let message = read(text, 480, 640).unwrap_err().to_string();
+        assert!(message.contains(word) && !message.contains('\n'), "{text}: {message}");
+    }
     let kalibr = "resolution: [640, 480]\nintrinsics: [525, 526, 319.5, 239.5] # fu, fv, cu, cv\ndistortion_model: \
                   radial-tangential\ndistortion_coefficients: [0.1, -0.2, 0.001, 0.002]\n";
     assert_eq!(same(kalibr, None), bent([0.1, -0.2, 0.001, 0.002, 0.0, 0.0, 0.0, 0.0]));
+}
+
+/// Of several cameras of COLMAP that of the picture counts.
+#[test]
+fn the_camera_of_the_picture_is_taken() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    dioptric_pictures::save(&image::GrayImage::new(8, 6).into(), &at("a.png")).unwrap();
+    let read = |cameras: &str, images: Option<&str>| {
+        fs::write(at("cameras.txt"), cameras).unwrap();
+        let _ = fs::remove_file(at("images.txt"));
+        images.map(|text| fs::write(at("images.txt"), text).unwrap());
+        CameraFile::read(&at("cameras.txt"), &at("a.png"))?.of_size(&at("a.png"), 6, 8).map(|data| data.fx_px)
+    };
+    let two = "# cameras\n1 PINHOLE 8 6 10 10 4 3\n2 PINHOLE 8 6 20 20 4 3\n";
+    let images = "# images\n1 1 0 0 0 0 0 0 2 rgb/a.png\n1.5 2.5 -1\n2 1 0 0 0 0 0 0 1 b.png\n\n";
+    assert_eq!(read(two, Some(images)).unwrap(), 20.0);
+    assert!(read(two, None).unwrap_err().to_string().contains("2 cameras, and no images.txt"));
+    assert_eq!(read(&two.replace("1 PINHOLE 8 6", "1 PINHOLE 16 12"), None).unwrap(), 20.0);
+    assert_eq!(read(&two.replace("20 20", "10 10"), None).unwrap(), 10.0);
+    assert!(read(two, Some("1 1 0 0 0 0 0 0 7 a.png\n")).unwrap_err().to_string().contains("its camera is 7"));
 }
 
 #[test]
@@ -155,11 +211,13 @@ fn what_is_not_stated_is_told_and_what_is_stated_twice_must_agree() {
     let bare = read(r#"{"width":640,"height":480,"fx_px":525,"cy_px":239.5}"#, 480, 640).unwrap();
     assert!(bare.notes[0].contains("cx_px, which is taken for the middle, nor fy_px"), "{:?}", bare.notes);
     let normalized = r#"{"width":640,"height":480,"fx_px":0.82,"fy_px":1.09,"cx_px":0.5,"cy_px":0.5}"#;
-    assert!(read(normalized, 480, 640).unwrap_err().to_string().contains("expected it in samples"));
+    assert!(read(normalized, 480, 640).unwrap_err().to_string().contains("in samples"));
+    let shares = r#"{"K":[[1.25,0,0.44],[0,1.66,0.42],[0,0,1]]}"#;
+    assert!(read(shares, 6, 8).unwrap_err().to_string().contains("look like shares of the picture"));
     let camera = |name: &str| format!("{name}:\n  intrinsics: [525, 526, 319.5, 239.5]\n  resolution: [640, 480]\n");
     assert!(read(&camera("cam0"), 480, 640).unwrap().notes.is_empty());
     let two = camera("cam0") + &camera("cam1").replace("525", "530");
-    assert!(read(&two, 480, 640).unwrap_err().to_string().contains("several cameras, cam0, cam1"));
+    assert!(read(&two, 480, 640).unwrap_err().to_string().contains("it has cameras cam0, cam1"));
 }
 
 #[test]

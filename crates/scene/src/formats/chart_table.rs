@@ -65,14 +65,31 @@ pub(super) fn read_chart(path: &Path) -> Result<Cube, SceneError> {
             "it has no line of numbers: expected wavelengths in nm and a reflectance a column".to_owned(),
         ));
     }
-    const OTHERS: [&str; 7] = ["absorb", "radian", "emission", "photon", "w/m", "w m-2", "w/cm"];
-    let is_other = |name: &&String| OTHERS.iter().any(|other| name.to_lowercase().contains(other));
+    const OTHERS: [&str; 11] = [
+        "absorb",
+        "radian",
+        "emission",
+        "photon",
+        "w/m",
+        "w m-2",
+        "w/cm",
+        "counts",
+        "log(1/r)",
+        "log 1/r",
+        "optical density",
+    ];
+    let is_other = |name: &&String| {
+        let lower = name.to_lowercase();
+        let has_word = |word: &str| lower.split(|c: char| !c.is_alphabetic()).any(|own| own == word);
+        OTHERS.iter().any(|other| lower.contains(other)) || has_word("od") || has_word("dn")
+    };
     if let Some(other) = names.iter().find(is_other) {
         return Err(wrong(format!("its column '{}' says that it holds no reflectances, expected such", short(other))));
     }
     let wavelengths_nm = wavelengths_of_column(&first, &wavelengths_nm).map_err(wrong)?;
     let mut notes = vec![];
-    if names.iter().chain([&first]).any(|name| name.contains('%') || name.to_lowercase().contains("percent")) {
+    let is_percent = |name: &&String| name.contains('%') || name.to_lowercase().contains("percent");
+    if names.iter().chain([&first]).any(|name| is_percent(&name)) {
         lines.iter_mut().flatten().for_each(|value| *value /= 100.0);
         notes.push(format!("{}: its reflectances are in percent", name_of(path)));
     }
@@ -101,6 +118,7 @@ pub(super) fn read_chart(path: &Path) -> Result<Cube, SceneError> {
         wavelengths_nm: Some(wavelengths_nm),
         quantity: Some(FileQuantity::Reflectance),
         unit: None,
+        called: None,
         notes,
     })
 }

@@ -14,7 +14,7 @@ use super::{
     raw_depth::RawDepth,
     read_options::{Part, ReadOptions},
     reading::{FileQuantity, Frame, Panorama, Place, light_unit},
-    stated::short,
+    stated::{name_of, names_unit_of_light, short},
     unusable::unreadable,
     wavelength_unit::ascending,
 };
@@ -223,6 +223,8 @@ pub(super) struct Cube {
     pub(super) quantity: Option<FileQuantity>,
     /// The unit of light that the file states, and its words.
     pub(super) unit: Option<(LightUnit, String)>,
+    /// The name of its array.
+    pub(super) called: Option<String>,
     pub(super) notes: Vec<String>,
 }
 
@@ -239,6 +241,7 @@ impl Cube {
         let order = ascending(path, &wavelengths_nm, 0..wavelengths_nm.len())?;
         let unit = self.unit(path, options)?;
         let (level, what) = self.level(path, options, unit)?;
+        self.notes.extend(self.note_of_name(path, options));
         let values = |reason: SpectrumError| SceneError::Values { file: path.to_owned(), reason };
         let grid = WavelengthGrid::new(order.iter().map(|&band| wavelengths_nm[band]).collect()).map_err(values)?;
         let mut planes: Vec<Option<Array2<f32>>> = self.planes.into_iter().map(Some).collect();
@@ -255,6 +258,21 @@ impl Cube {
         let quantity = if unit.is_none() { Quantity::Reflectance } else { Quantity::Radiance };
         let image = SpectralImage::new(quantity, grid, planes).map_err(values)?;
         Ok(Contents { notes: self.notes, ..Contents::of(Image::Spectral(image), what) })
+    }
+
+    /// Returns what is said of a unit in the name of the array, or of the file, where nothing else says what the numbers are.
+    fn note_of_name(&self, path: &Path, options: &ReadOptions) -> Option<String> {
+        let is_told = self.unit.is_some()
+            || self.quantity.is_some()
+            || options.reading.unit.is_some()
+            || options.reading.scale.is_some()
+            || options.white_level.is_some();
+        let stem = path.file_stem()?.to_string_lossy();
+        let name = self.called.as_deref().into_iter().chain([&*stem]).find(|name| names_unit_of_light(name))?;
+        let (file, name) = (name_of(path), short(name));
+        let note =
+            || format!("{file}: the unit in the name '{name}' is not used: --unit, --scale or --white-level says it");
+        (!is_told).then(note)
     }
 
     /// Returns the wavelength of each band: those of the file, or those told.

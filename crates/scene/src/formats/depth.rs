@@ -11,8 +11,9 @@ use super::{
     depth_names::SaidOfDepth,
     depth_numbers::{DepthNumbers, depth_numbers},
     raw_depth::{DepthWords, RawDepth},
+    read_contents::note_of_gdal,
     reading::{DepthKind, DepthUnit},
-    stated::name_of,
+    stated::{name_of, short},
     unusable::{check_whole, unreadable},
 };
 use crate::SceneError;
@@ -113,7 +114,21 @@ pub(super) fn read_depth(path: &Path, words: DepthWords<'_>) -> Result<RawDepth,
     }
     // Distances that are counted from the camera say so by the name of their channel, or their file.
     let kind = if is_of_hypersim(path) { DepthKind::Radial } else { numbers.kind };
-    let unit_m = unit_m_of(path, &numbers, words)?;
+    notes.extend(note_of_gdal(path));
+    let (unit_m, is_stated) = unit_m_of(path, &numbers, words)?;
+    // Whole metres, and many of them, are rarely measured.
+    let most = numbers.values.iter().copied().filter(|v| v.is_finite() && *v < NEVER_M).fold(0.0, f32::max);
+    let are_whole = || numbers.values.iter().all(|v| !v.is_finite() || v.fract() == 0.0);
+    notes.extend((!is_stated && unit_m == 1.0 && most >= MANY_M && are_whole()).then(|| {
+        let name = name_of(path);
+        format!(
+            "{name}: its depths are whole numbers, up to {most}, and taken for metres: millimetres are --depth-unit mm"
+        )
+    }));
+    notes.extend(numbers.length_in.filter(|_| words.unit.is_none()).map(|name| {
+        let (file, name) = (name_of(path), short(&name));
+        format!("{file}: the length in the name '{name}' is not used: --depth-unit says what 1 of its numbers is")
+    }));
     let depth = RawDepth {
         kind,
         unit: DepthUnit::Metres(unit_m),
@@ -129,8 +144,12 @@ pub(super) fn read_depth(path: &Path, words: DepthWords<'_>) -> Result<RawDepth,
     depth.told(words)
 }
 
-/// Returns what 1 of a file's numbers is, m; 1 where something says what else they are.
-fn unit_m_of(path: &Path, numbers: &DepthNumbers, words: DepthWords<'_>) -> Result<f64, SceneError> {
+/// Whole numbers up to so many are not likely to be metres; those from this on stand for a sky.
+const MANY_M: f32 = 256.0;
+const NEVER_M: f32 = 1e9;
+
+/// Returns what 1 of a file's numbers is, m, and whether something says so; 1 where something says what else they are.
+fn unit_m_of(path: &Path, numbers: &DepthNumbers, words: DepthWords<'_>) -> Result<(f64, bool), SceneError> {
     let wrong = |reason: &str| Err(unreadable(path, reason));
     let of_other_kind = words.kind.is_some_and(|kind| kind != DepthKind::Axial && kind != DepthKind::Radial);
     if let (Some(lacks), None, None) = (numbers.lacks, words.kind, words.unit) {
@@ -141,18 +160,18 @@ fn unit_m_of(path: &Path, numbers: &DepthNumbers, words: DepthWords<'_>) -> Resu
         if of_other_kind || told.is_some_and(|told| told != DepthUnit::Metres(own_m)) {
             return wrong("it states the unit of its lengths: --depth-unit or --depth-kind says something else");
         }
-        return Ok(own_m);
+        return Ok((own_m, true));
     }
     if words.unit.is_some() || of_other_kind {
-        return Ok(1.0);
+        return Ok((1.0, true));
     }
     if let Some(unit_m) = words.unit_m {
-        return Ok(unit_m);
+        return Ok((unit_m, true));
     }
     let own = SaidOfDepth::of_file(&path.file_stem().unwrap_or_default().to_string_lossy()).unit_m;
     // Codes of metres would be of whole ones.
     if let Some(own_m) = own.filter(|own_m| numbers.top.is_none() || *own_m < 1.0) {
-        return Ok(own_m);
+        return Ok((own_m, true));
     }
     match numbers.top {
         Some(..=255.0) => wrong(
@@ -167,13 +186,13 @@ fn unit_m_of(path: &Path, numbers: &DepthNumbers, words: DepthWords<'_>) -> Resu
                      --depth-kind, as inverse:0.5,inf",
                 );
             }
-            Ok(UNIT_M)
+            Ok((UNIT_M, false))
         }
-        Some(_) => Ok(UNIT_M),
+        Some(_) => Ok((UNIT_M, false)),
         None if is_of(path, &["pfm"]) => wrong(
             "whether it holds depths or disparities is not known: expected --depth-unit m, or --depth-kind, as disparity:BASELINE_M",
         ),
-        None => Ok(1.0),
+        None => Ok((1.0, false)),
     }
 }
 

@@ -11,6 +11,8 @@ pub(super) struct SaidOfDepth {
     pub(super) is_radial: Option<bool>,
     /// What is asked for where the numbers are no lengths of a known unit.
     pub(super) lacks: Option<&'static str>,
+    /// Whether they have a number with a unit of length, as `lens_50_mm`, which may be that of a lens, of a place or of a step.
+    pub(super) has_length: bool,
 }
 
 const DEPTHS: [&str; 4] = ["depth", "depths", "depthmap", "z"];
@@ -28,7 +30,12 @@ impl SaidOfDepth {
         let radial = has(&RAYS) || has(&DISTANCES) || has(&["perspective"]);
         let is_axial = has(&["axial", "axis", "planar", "perpendicular"]) || has_pair(&own, &["image"], &["plane"]);
         let is_radial = if is_axial { Some(false) } else { radial.then_some(true) };
-        Self { unit_m: unit_of(&own), is_radial, lacks: lacks(&own) }
+        Self {
+            unit_m: unit_of(&own),
+            is_radial,
+            lacks: lacks(&own),
+            has_length: (0..own.len()).any(|i| is_counted(&own, i)),
+        }
     }
 
     /// Of the stem of a file, which may be called after what it shows.
@@ -49,7 +56,12 @@ impl SaidOfDepth {
             || has_pair(&own, &["ray"], &LENGTHS)
             || has_pair(&own, &LENGTHS, &["ray"]);
         let is_radial = if is_axial { Some(false) } else { radial.then_some(true) };
-        Self { unit_m: unit_of(&own), is_radial, lacks: lacks(&own) }
+        Self {
+            unit_m: unit_of(&own),
+            is_radial,
+            lacks: lacks(&own),
+            has_length: (0..own.len()).any(|i| is_counted(&own, i)),
+        }
     }
 }
 
@@ -62,7 +74,7 @@ pub(super) fn is_called(name: &str, wanted: &str) -> bool {
 }
 
 /// Returns the words of a name, as `inv`, `depth` and `mm` of `invDepth_mm`, in small letters.
-fn words_of(name: &str) -> Vec<String> {
+pub(super) fn words_of(name: &str) -> Vec<String> {
     let mut apart = String::new();
     for c in name.chars() {
         // A capital behind a small letter begins a word.
@@ -89,11 +101,20 @@ fn has_pair(words: &[String], first: &[&str], second: &[&str]) -> bool {
     words.windows(2).any(|pair| first.contains(&pair[0].as_str()) && second.contains(&pair[1].as_str()))
 }
 
+/// Whether a word is a unit of length behind a number that counts it, and not frames, as `0001` does.
+fn is_counted(words: &[String], i: usize) -> bool {
+    let is_frame = |word: &str| word.len() > 1 && word.starts_with('0');
+    let (number, unit) = words[i].split_at(words[i].find(|c: char| !c.is_ascii_digit()).unwrap_or(0));
+    match number {
+        "" => length_m(unit).is_some() && i > 0 && is_number(&words[i - 1]) && !is_frame(&words[i - 1]),
+        number => length_m(unit).is_some() && !is_frame(number),
+    }
+}
+
 /// Returns the metres of the one unit of length among some words, beside others; a unit behind a number is of what it counts, as in `lens_50_mm`.
 fn unit_of(words: &[String]) -> Option<f64> {
-    let is_counted = |i: usize| i > 0 && is_number(&words[i - 1]);
-    let units = words.iter().enumerate().filter(|(i, _)| words.len() > 1 && !is_counted(*i));
-    let mut found: Vec<f64> = units.filter_map(|(_, word)| length_m(word)).collect();
+    let units = (0..words.len()).filter(|i| words.len() > 1 && !is_counted(words, *i));
+    let mut found: Vec<f64> = units.filter_map(|i| length_m(&words[i])).collect();
     found.dedup();
     Some(found).filter(|found| found.len() == 1).map(|found| found[0])
 }
@@ -153,11 +174,23 @@ mod tests {
                 "depth_mm_0001",
                 "0001_depth_mm",
                 "frame12.depth_mm",
+                "depth_0001_mm",
             ] {
                 assert_eq!(of(name).unit_m, Some(1e-3), "{name}");
             }
             for name in ["mm", "_mm", "depth_map", "View.Depth.Z", "m_or_mm", "lens_50_mm_depth", "50mm_depth"] {
                 assert_eq!(of(name).unit_m, None, "{name}");
+            }
+            for (name, has_length) in [
+                ("lens_50_mm_depth", true),
+                ("50mm_depth", true),
+                ("depth_0.5_m", true),
+                ("depth_2_mm_x", true),
+                ("depth_0001_mm", false),
+                ("depth_2_x", false),
+                ("depth_12", false),
+            ] {
+                assert_eq!(of(name).has_length, has_length, "{name}");
             }
             assert_eq!(
                 [of("depth_inches"), of("depth_dm"), of("z_feet")].map(|own| own.unit_m),

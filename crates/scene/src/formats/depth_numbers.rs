@@ -38,6 +38,8 @@ pub(super) struct DepthNumbers {
     pub(super) frame: Option<Frame>,
     /// Where they are.
     pub(super) from: String,
+    /// A name of theirs that has a number with a unit of length.
+    pub(super) length_in: Option<String>,
 }
 
 /// Reads the numbers of a file of depth; of several arrays, channels or planes that of the name or number told.
@@ -50,6 +52,7 @@ pub(super) fn depth_numbers(path: &Path, told: Option<&str>) -> Result<Noted<Dep
         unit_m: None,
         frame: None,
         from: name_of(path),
+        length_in: None,
     };
     let mut notes = vec![];
     let named = |name: &str| format!("'{name}' of {}", name_of(path));
@@ -127,6 +130,8 @@ pub(super) fn depth_numbers(path: &Path, told: Option<&str>) -> Result<Noted<Dep
         numbers.kind = DepthKind::Radial;
     }
     numbers.lacks = numbers.lacks.or_else(|| said.iter().find_map(|own| own.lacks));
+    let own = [names.as_str(), &stem].into_iter().zip(&said[1..]).find(|(_, said)| said.has_length);
+    numbers.length_in = own.map(|(name, _)| name.to_owned());
     Ok(Noted::new(numbers, notes))
 }
 

@@ -302,8 +302,11 @@ impl EnviFile {
                 short(unit)
             ));
         }
-        if wants_light == Some(true) && is_reflecting {
-            return units("its header states the number of a perfect white, so that it is a reflectance: expected it without a unit or quantity of light".to_owned());
+        let words = header.data_units.as_deref().unwrap_or_default().trim().to_lowercase();
+        if wants_light == Some(true) && (is_reflecting || ["reflectance", "transmittance"].contains(&words.as_str())) {
+            return units(
+                "its header says that it is a reflectance: expected it without a unit or quantity of light".to_owned(),
+            );
         }
         if let (Some(own), Some(told)) = (own_level, options.white_level)
             && own != told

@@ -233,6 +233,8 @@ pub(crate) fn from_layer(layer: &LayerAttributes) -> Attributes {
         ("lookModTransform", layer.look_modification_transform_name.is_some()),
         ("renderingTransform", layer.rendering_transform_name.is_some()),
         ("multiView", layer.multi_view_names.is_some()),
+        ("near", layer.near_clip_plane.is_some()),
+        ("far", layer.far_clip_plane.is_some()),
         ("fieldOfViewHorizontal", layer.horizontal_field_of_view.is_some()),
         ("fieldOfViewVertical", layer.vertical_field_of_view.is_some()),
         ("screenWindowWidth", layer.screen_window_width != 1.0),

@@ -39,6 +39,7 @@ pub(super) fn read_gray(path: &Path, wanted: TiffAs, told: Option<&str>) -> Resu
         let gray = of_tiff(path, file, told, &mut notes)?;
         // Depths have lengths.
         notes.extend(gray.page.note_of_unit(path).filter(|_| wanted != TiffAs::Depths));
+        notes.extend(note_of_colors(path).filter(|_| wanted != TiffAs::Depths));
         return Ok(Noted::new(gray, notes));
     }
     if told.is_some() {
@@ -46,13 +47,20 @@ pub(super) fn read_gray(path: &Path, wanted: TiffAs, told: Option<&str>) -> Resu
     }
     let mut notes = notes_on_parts(path)?;
     notes.extend(note_of_orientation(path));
-    // What cannot be converted to light is a number all the same.
-    let colors = StatedColors::of(path).unwrap_or_else(|reason| Some(StatedColors::linear(reason, [[0.0; 3]; 3])));
-    notes.extend(colors.map(|colors| {
-        format!("{}: its codes are taken as numbers, and not as it states their light: {}", name_of(path), colors.name)
-    }));
+    notes.extend(note_of_colors(path));
     let gray = codes_of(path, &mut notes)?;
     Ok(Noted::new(gray, notes))
+}
+
+/// Returns what is said of the light of codes that a file states, be it sRGB's, where they are taken as numbers.
+fn note_of_colors(path: &Path) -> Option<String> {
+    let stated = match StatedColors::of_floats(path) {
+        Ok(None) => StatedColors::are_in_chunks(path).then(|| "sRGB".to_owned())?,
+        Ok(Some(colors)) => colors.name,
+        // What cannot be converted to light is a number all the same.
+        Err(reason) => reason,
+    };
+    Some(format!("{}: its codes are taken as numbers, and not as it states their light: {stated}", name_of(path)))
 }
 
 fn of_tiff(

@@ -13,7 +13,7 @@ use super::{
     axes,
     contents::Cube,
     depth_names::is_called,
-    mat::{DEPTHS, rank_of_waves},
+    mat::{DEPTHS, Nearness, nearest_list, rank_of_waves},
     npy::{NpyArray, is_array_of, npy_bytes, parse, parse_complex},
     read_options::ReadOptions,
     stated::{Noted, name_of, note_of, short},
@@ -130,20 +130,29 @@ pub(super) fn read_npz(path: &Path, options: &ReadOptions) -> Result<Cube, Scene
         },
     };
     let array = archive.read(&chosen)?;
-    let lists = archive.names.iter().filter(|name| **name != chosen && rank_of_waves(bare(name)).is_some());
-    let named = lists.min_by_key(|name| rank_of_waves(bare(name))).cloned();
-    let own: Option<Vec<f64>> = match &named {
-        Some(name) => {
-            // Singles of decimals, as they were written.
-            let numbers = archive.read(name)?.values.into_iter().map(|v| v.to_string().parse().unwrap_or(f64::NAN));
-            let unit = unit_in(bare(name));
-            match listed_nm(bare(name), unit, &numbers.collect::<Vec<f64>>()) {
-                Err(_) if reading.wavelengths_nm.is_some() => None,
-                own => own.map_err(wrong)?,
-            }
+    let is_list = |name: &&String| **name != chosen && rank_of_waves(bare(name)).is_some();
+    let mut lists: Vec<String> = archive.names.iter().filter(is_list).cloned().collect();
+    let nearness = |name: &str| Nearness::of(bare(&chosen), bare(name));
+    lists.sort_by_key(|name| (nearness(name), rank_of_waves(bare(name))));
+    let mut found = vec![];
+    for name in &lists {
+        let list = archive.read(name)?;
+        // Singles of decimals, as they were written.
+        let numbers = list.values.iter().map(|v| v.to_string().parse().unwrap_or(f64::NAN)).collect::<Vec<f64>>();
+        if lists.len() > 1 && !array.sides.contains(&numbers.len()) {
+            continue;
         }
-        None => None,
+        match listed_nm(bare(name), unit_in(bare(name)), &numbers) {
+            Ok(Some(nm)) => found.push((bare(name).to_owned(), nearness(name), nm)),
+            Err(reason) if found.is_empty() && reading.wavelengths_nm.is_none() => return Err(wrong(reason)),
+            Ok(None) | Err(_) => {}
+        }
+    }
+    let nearest = match nearest_list(found) {
+        Err(_) if reading.wavelengths_nm.is_some() => None,
+        own => own.map_err(wrong)?,
     };
+    let (named, own) = nearest.unzip();
     // A list that counts bands is none of wavelengths.
     let list = named.filter(|_| own.is_some());
     let told = reading.wavelengths_nm.as_ref().map(Vec::len);
@@ -153,12 +162,20 @@ pub(super) fn read_npz(path: &Path, options: &ReadOptions) -> Result<Cube, Scene
     let at = |index: usize| array.values[index];
     let planes = axes::planes(&array.sides, reading.axes.as_deref(), n_bands, true, at).map_err(wrong)?;
     let is_depth = |name: &str| reading.depth.is_none() && reading.depth_variable.as_deref() == Some(bare(name));
-    let is_unused = |name: &&String| **name != chosen && Some(*name) != list.as_ref() && !is_depth(name);
+    let is_unused = |name: &&String| **name != chosen && Some(bare(name)) != list.as_deref() && !is_depth(name);
     let unused: Vec<String> = archive.names.iter().filter(is_unused).map(|name| bare(name).to_owned()).collect();
-    let ambiguous = axes::note(&array.sides, reading.axes.as_deref(), n_bands);
+    let ambiguous = axes::note(&array.sides, reading.axes.as_deref(), n_bands, true);
     let ambiguous = ambiguous.map(|note| format!("{}: '{}': {note}", name_of(path), bare(&chosen)));
     let notes = archive.notes.into_iter().chain(note_of(path, "array", &unused)).chain(ambiguous).collect();
-    Ok(Cube { planes, top: array.top, wavelengths_nm: own, quantity: None, unit: None, notes })
+    Ok(Cube {
+        planes,
+        top: array.top,
+        wavelengths_nm: own,
+        quantity: None,
+        unit: None,
+        called: Some(bare(&chosen).to_owned()),
+        notes,
+    })
 }
 
 /// Reads the depth of an archive: the array that is told, that which is called one, or the only one of two axes; with its name.

@@ -392,9 +392,6 @@ fn undecodable(path: &Path, error: &ImageError) -> SceneError {
             "its rows and columns are in the order {}, expected -Y +X (save it anew)",
             said.split("Orientation ").nth(1).unwrap_or_default()
         ),
-        ImageError::Unsupported(_) if said.contains("xyze") => {
-            "its colors are X, Y and Z, expected red, green and blue (ra_xyze -r)".to_owned()
-        }
         ImageError::Unsupported(_) if said.contains("color type `Unknown") => {
             "its samples are of other bits or channels than those of pictures: expected gray, or red, green and blue with or without \
              opacity, of 8 or 16 bits, or bands of a TIFF, which --scene-wavelengths-nm tells"

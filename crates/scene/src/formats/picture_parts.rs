@@ -224,6 +224,9 @@ fn of_xmp(content: &[u8]) -> Vec<String> {
             ("tiff", "Orientation") if value != "1" => format!("orientation {}", short(value)),
             ("photoshop", "ICCProfile") if !value.contains("sRGB") => format!("{name} '{}'", short(value)),
             (_, "ApproximateFocusDistance") => short(&name),
+            ("crs", "AlreadyApplied") if !value.eq_ignore_ascii_case("true") => {
+                "development that is not applied (crs)".to_owned()
+            }
             (prefix, _) if HARMLESS_XMP.contains(&prefix) => return None,
             _ => short(&name),
         };

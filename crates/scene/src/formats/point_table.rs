@@ -188,15 +188,9 @@ impl Color {
         match self {
             Self::Of(illuminant) => illuminant.on_bands(grid),
             Self::Line(nm) => {
-                let (centers, widths) = (grid.centers_nm(), grid.widths_nm());
-                let bands = centers.iter().zip(widths);
-                bands
-                    .map(
-                        |(center, width)| {
-                            if (-0.5..0.5).contains(&((nm - center) / width)) { 1.0 / width } else { 0.0 }
-                        },
-                    )
-                    .collect()
+                let bands = grid.middles_nm().into_iter().zip(grid.widths_nm());
+                let is_within = |middle: f64, width: f64| (-0.5..0.5).contains(&((nm - middle) / width));
+                bands.map(|(middle, width)| if is_within(middle, *width) { 1.0 / width } else { 0.0 }).collect()
             }
         }
     }

@@ -6,6 +6,7 @@ use std::{
     path::Path,
 };
 
+use dioptric_pictures::is_xyze;
 use exr::{meta::attribute::Chromaticities, prelude::Vec2};
 use ndarray::Array2;
 
@@ -41,6 +42,10 @@ impl RadianceHeader {
         let file = File::open(path).map_err(|error| unreadable(path, error))?;
         let mut lines = BufReader::new(file.take(LIMIT_BYTES)).split(b'\n');
         let mut header = Self { factors: [1.0; 3], chromaticities: None, notes: vec![] };
+        let is_xyze = is_xyze(path);
+        if is_xyze {
+            header.notes.push(format!("{}: its X, Y and Z become red, green and blue of sRGB", name_of(path)));
+        }
         let mut unused = vec![];
         // The first says what kind of file it is.
         lines.next();
@@ -68,9 +73,14 @@ impl RadianceHeader {
                 "EXPOSURE" => header.multiply([numbers(1)?[0]; 3], path, key)?,
                 "COLORCORR" => {
                     let rgb = numbers(3)?;
+                    if is_xyze && rgb.iter().any(|factor| *factor != rgb[0]) {
+                        let reason =
+                            format!("its {key} is of X, Y and Z, expected one of red, green and blue (ra_xyze -r)");
+                        return Err(unreadable(path, reason));
+                    }
                     header.multiply([rgb[0], rgb[1], rgb[2]], path, key)?;
                 }
-                "PRIMARIES" => {
+                "PRIMARIES" if !is_xyze => {
                     let xy: Vec<f32> = numbers(8)?.into_iter().map(|v| v as f32).collect();
                     let [red, green, blue, white] = [0, 1, 2, 3].map(|i| Vec2(xy[2 * i], xy[2 * i + 1]));
                     header.chromaticities = Some(Chromaticities { red, green, blue, white });

@@ -40,8 +40,28 @@ use crate::{SceneError, View};
 const RAW_ENDINGS: &[&str] =
     &["dng", "cr2", "cr3", "nef", "nrw", "arw", "raf", "orf", "rw2", "pef", "srw", "3fr", "iiq"];
 
-/// Reads what is in a file of a scene, by its name and its first bytes.
+/// Endings of worlds.
+const WORLD_ENDINGS: &[&str] = &["pbrt", "gltf", "glb", "obj", "ply", "stl"];
+
+/// Reads what is in a file of a scene, by its name and its first bytes; what GDAL puts beside it is named.
 pub(super) fn contents_of(path: &Path, options: &ReadOptions) -> Result<Contents, SceneError> {
+    let mut contents = contents_of_file(path, options)?;
+    contents.notes.extend(note_of_gdal(path));
+    Ok(contents)
+}
+
+/// Returns what is said of units, scales and masks that GDAL has put beside a file.
+pub(super) fn note_of_gdal(path: &Path) -> Option<String> {
+    let beside = |ending: &str| {
+        let mut name = path.file_name()?.to_owned();
+        name.push(ending);
+        path.with_file_name(&name).is_file().then(|| name.to_string_lossy().into_owned())
+    };
+    let names: Vec<String> = [".aux.xml", ".msk"].into_iter().filter_map(beside).collect();
+    note_of(path, "companion of GDAL", &names)
+}
+
+fn contents_of_file(path: &Path, options: &ReadOptions) -> Result<Contents, SceneError> {
     if path.is_dir() {
         if let Some(cube) = CubeFolder::find(path) {
             return cube.read(path, |face| contents_of(face, options));
@@ -78,6 +98,9 @@ pub(super) fn contents_of(path: &Path, options: &ReadOptions) -> Result<Contents
         "png" | "jpg" | "jpeg" | "webp" | "bmp" | "ppm" | "pgm" | "pnm" if is_tiff(path) => of_tiff(path, options),
         "png" | "jpg" | "jpeg" | "webp" | "bmp" | "ppm" | "pgm" | "pnm" | "hdr" => of_picture(path, options, vec![]),
         _ if is_of(path, RAW_ENDINGS) => Err(unreadable(path, RAW)),
+        _ if is_of(path, WORLD_ENDINGS) => {
+            Err(unreadable(path, "it is a world, of which `dioptric render` makes a picture"))
+        }
         _ => match header_of(path) {
             Some(header) => contents_of_envi(&header, options),
             None => Err(SceneError::UnknownKind { file: path.to_owned() }),
@@ -192,7 +215,7 @@ fn pages_of_tiff(path: &Path, options: &ReadOptions) -> Result<Contents, SceneEr
                 }
                 UnitOf::Unknown => notes.extend(page.note_of_unit(path)),
             }
-            Cube { planes, top, wavelengths_nm, quantity, unit, notes }.into_contents(path, options)
+            Cube { planes, top, wavelengths_nm, quantity, unit, called: None, notes }.into_contents(path, options)
         }
     }
 }
@@ -205,9 +228,9 @@ fn of_npy(path: &Path, options: &ReadOptions) -> Result<Contents, SceneError> {
     let at = |index: usize| array.values[index];
     let planes = super::axes::planes(&array.sides, options.reading.axes.as_deref(), n_bands, true, at)
         .map_err(|reason| unreadable(path, reason))?;
-    let note = super::axes::note(&array.sides, options.reading.axes.as_deref(), n_bands);
+    let note = super::axes::note(&array.sides, options.reading.axes.as_deref(), n_bands, true);
     notes.extend(note.map(|note| format!("{}: {note}", name_of(path))));
-    Cube { planes, top: array.top, wavelengths_nm: None, quantity: None, unit: None, notes }
+    Cube { planes, top: array.top, wavelengths_nm: None, quantity: None, unit: None, called: None, notes }
         .into_contents(path, options)
 }
 

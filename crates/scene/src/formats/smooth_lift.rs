@@ -192,8 +192,16 @@ mod tests {
 
     fn grids() -> Vec<WavelengthGrid> {
         let uniform = |step: f64| WavelengthGrid::uniform(400.0, 700.0, step).unwrap();
-        let uneven = WavelengthGrid::new(vec![405.0, 440.0, 470.0, 525.0, 560.0, 610.0, 670.0]).unwrap();
-        vec![uniform(1.0), uniform(5.0), uniform(10.0), uniform(20.0), uneven]
+        let uneven = |centers_nm: [f64; 7]| WavelengthGrid::new(centers_nm.to_vec()).unwrap();
+        vec![
+            uniform(1.0),
+            uniform(5.0),
+            uniform(10.0),
+            uniform(20.0),
+            uneven([405.0, 440.0, 470.0, 525.0, 560.0, 610.0, 670.0]),
+            uneven([405.0, 450.0, 500.0, 540.0, 590.0, 640.0, 690.0]),
+            uneven([410.0, 440.0, 490.0, 530.0, 580.0, 620.0, 680.0]),
+        ]
     }
 
     fn lights() -> [Illuminant; 4] {

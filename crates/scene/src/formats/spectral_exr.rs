@@ -273,7 +273,8 @@ fn joined(
         |layer: &RawLayer| layer.planes.iter().filter_map(|(name, _)| band_name::parse(name)).collect::<Vec<_>>();
     let repeats =
         |layer: &RawLayer, own: &RawLayer| wavelengths(layer).iter().any(|band| wavelengths(own).contains(band));
-    let is_picture = first.name.is_empty() || is_called_picture(&first.name) || asked.layer == Some(&first.name);
+    let is_told = first.has_bands() && asked.layer == Some(&first.name);
+    let is_picture = first.name.is_empty() || is_called_picture(&first.name) || is_told;
     let alike = layers.iter().filter(|layer| layer.size == first.size && repeats(layer, &first));
     let alike: Vec<String> = std::iter::once(&first).chain(alike).map(|layer| format!("'{}'", layer.name)).collect();
     if has_bands && !is_picture && alike.len() > 1 {
@@ -284,8 +285,10 @@ fn joined(
     if !has_bands {
         first.name_channels();
     }
+    let mut joined = vec![];
     for mut layer in layers {
-        if repeats(&layer, &first) || (layer.size, layer.position) != (first.size, first.position) {
+        let is_other = is_told && layer.has_bands();
+        if is_other || repeats(&layer, &first) || (layer.size, layer.position) != (first.size, first.position) {
             unused.push(layer.name);
         } else {
             if layer.has_bands() && layer.attributes.unit != first.attributes.unit {
@@ -295,10 +298,19 @@ fn joined(
             let kind = "attribute of its further parts";
             notes.extend(note_of(path, kind, &first.attributes.other_of(&layer.attributes)));
             stated.merge(layer.attributes.others.clone());
+            joined.extend((wavelengths(&layer).len() > 1).then(|| format!("'{}'", layer.name)));
             layer.name_channels();
             first.planes.append(&mut layer.planes);
         }
     }
+    notes.extend((!joined.is_empty()).then(|| {
+        format!(
+            "{}: the bands of its layers '{}' and {} are taken for one cube (--variable takes those of one)",
+            name_of(path),
+            first.name,
+            joined.join(", ")
+        )
+    }));
     notes.extend(stated.note(path, |name| is_harmless(name) || asked.texts.contains(&name)));
     notes.extend(note_of(path, "part", &unused));
     Ok(first)

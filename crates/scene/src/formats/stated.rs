@@ -154,7 +154,7 @@ pub(super) fn short(text: &str) -> String {
 
 /// Whether a text says something of numbers or of a view, and not who made them when: a unit, or a quantity with a number.
 pub(super) fn tells(text: &str) -> bool {
-    const UNITS: [&str; 39] = [
+    const UNITS: [&str; 44] = [
         "mm",
         "cm",
         "km",
@@ -194,16 +194,66 @@ pub(super) fn tells(text: &str) -> bool {
         "rotated",
         "upside",
         "linear",
+        "ray",
+        "rays",
+        "normalized",
+        "normalised",
+        "uncalibrated",
     ];
     const PARTS: [&str; 4] = ["metre", "meter", "micron", "angstrom"];
-    const QUANTITIES: [&str; 11] =
-        ["depth", "scale", "unit", "focal", "fov", "wavelength", "gain", "offset", "baseline", "exposure", "gamma"];
+    const QUANTITIES: [&str; 19] = [
+        "depth",
+        "scale",
+        "unit",
+        "focal",
+        "fov",
+        "wavelength",
+        "gain",
+        "offset",
+        "baseline",
+        "exposure",
+        "gamma",
+        "divide",
+        "divided",
+        "multiply",
+        "multiplied",
+        "times",
+        "factor",
+        "dark",
+        "bands",
+    ];
     let lower = text.to_lowercase();
     let words: Vec<&str> = lower.split(|c: char| !c.is_alphabetic()).filter(|word| !word.is_empty()).collect();
     let has = |known: &str| words.iter().any(|word| *word == known || (known.len() > 3 && word.contains(known)));
     let has_digit = lower.contains(|c: char| c.is_ascii_digit());
     words.iter().any(|word| UNITS.contains(word) || PARTS.iter().any(|part| word.contains(part)))
         || has_digit && QUANTITIES.iter().any(|known| has(known))
+}
+
+/// Whether a name has a unit of light, or of a share, among its words, as `radiance_uW` and `reflectance_percent`.
+pub(super) fn names_unit_of_light(name: &str) -> bool {
+    const UNITS: [&str; 14] = [
+        "kw",
+        "mw",
+        "uw",
+        "µw",
+        "μw",
+        "watt",
+        "watts",
+        "milliwatt",
+        "milliwatts",
+        "microwatt",
+        "microwatts",
+        "percent",
+        "pct",
+        "%",
+    ];
+    let words = name.split(|c: char| !c.is_alphanumeric() && c != '%').filter(|word| !word.is_empty());
+    let is_unit = |(i, word): (usize, &str)| {
+        let unit = word.trim_start_matches(|c: char| c.is_ascii_digit());
+        UNITS.contains(&unit.to_lowercase().as_str()) || i > 0 && unit == "W"
+    };
+    words.enumerate().any(is_unit)
 }
 
 /// Returns a number of a file for a message, however large or small.
@@ -226,6 +276,18 @@ mod tests {
         let mut all = vec!["before".to_owned()];
         assert_eq!(Noted::new(4, told).told_in(&mut all), 4);
         assert_eq!(all.len(), 3);
+    }
+
+    #[test]
+    fn names_have_units() {
+        for name in
+            ["radiance_uW", "radiance_2_uW", "refl_percent", "cube (mW/m2)", "L_W_m2_sr_um", "2uW_cube", "refl_%"]
+        {
+            assert!(names_unit_of_light(name), "{name}");
+        }
+        for name in ["radiance", "W", "cube_1", "window", "Wcube", "scene_450_700nm"] {
+            assert!(!names_unit_of_light(name), "{name}");
+        }
     }
 
     #[test]

@@ -95,6 +95,40 @@ fn names_of_depths_state_their_unit() {
 }
 
 #[test]
+fn numbers_and_units_in_names_are_named() {
+    let plane = npy("<f4", false, "(2, 3)", &floats(&[2.0; 6]));
+    for (array, file) in [("depth_2_mm_x", "a.npz"), ("depth", "lens_50mm.npz"), ("depth_0.5_m", "a.npz")] {
+        let archive = zip_of(&[(array, plane.clone())], false);
+        let scene = with_depth(file, &archive, None).unwrap();
+        check_noted(&scene, &["the length in the name", "--depth-unit"]);
+        assert!(with_depth(file, &archive, Some("m")).unwrap().notes.iter().all(|note| !note.contains("in the name")));
+    }
+    let folder = tempfile::tempdir().unwrap();
+    for (array, file, is_named) in [
+        ("radiance_2_uW", "a.npz", true),
+        ("radiance_mW_m2_sr_nm", "a.npz", true),
+        ("refl_percent", "a.npz", true),
+        ("radiance", "cube_uW.npz", true),
+        ("radiance", "a.npz", false),
+    ] {
+        let path = folder.path().join(file);
+        fs::write(&path, zip_of(&[(array, npy("<f4", false, "(2, 3, 1)", &floats(&[0.5; 6])))], false)).unwrap();
+        let told = |scale| FileReading {
+            quantity: Some(FileQuantity::Radiance),
+            wavelengths_nm: Some(vec![550.0]),
+            axes: Some("yxb".to_owned()),
+            scale,
+            ..FileReading::default()
+        };
+        let is_noted = |scale| {
+            let scene = read_scene(&path, &options(told(scale))).unwrap();
+            scene.notes.iter().any(|note| note.contains("the unit in the name"))
+        };
+        assert_eq!([is_noted(None), is_noted(Some(1e-3))], [is_named, false], "{array} of {file}");
+    }
+}
+
+#[test]
 fn comments_of_depths_are_named() {
     let codes: Vec<u8> = [2000_u16; 6].iter().flat_map(|v| v.to_be_bytes()).collect();
     let scene = with_depth("a.pgm", &[&b"P5\n# depth_scale 5000\n3 2\n65535\n"[..], &codes].concat(), None).unwrap();
@@ -397,4 +431,151 @@ fn radiance_pictures_are_turned_upright() {
         let by_columns: Vec<u8> = (0..6).map(|k| seen[row(k % 2)][column(k / 2)]).collect();
         assert_eq!(read(&format!("{right} 3 {down} 2"), &by_columns), upright, "{right} {down}");
     }
+}
+
+/// X, Y and Z of 1, 2 and 3 times the white of D65 are gray.
+#[test]
+fn radiance_pictures_of_xyz_are_those_of_rgb() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.hdr");
+    let read = |head: &str, pixels: &[u8]| {
+        fs::write(&path, [head.as_bytes(), b"\n-Y 1 +X 2\n", pixels].concat()).unwrap();
+        read_scene(&path, &options(FileReading::default()))
+    };
+    let rgb = read("#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n", &[128, 128, 128, 129, 64, 64, 64, 129]).unwrap();
+    // 0.9505, 1 and 1.089 in steps of 1/128: 122, 128 and 139 of 256 / 2.
+    let head = "#?RADIANCE\nEXPOSURE=1\nFORMAT=32-bit_rle_xyze\n";
+    let xyz = read(head, &[122, 128, 139, 129, 61, 64, 70, 129]).unwrap();
+    check_noted(&xyz, &["its X, Y and Z become red, green and blue"]);
+    for column in 0..2 {
+        let (own, expected) = (xyz.radiance.spectrum_at(0, column), rgb.radiance.spectrum_at(0, column));
+        for (own, expected) in own.iter().zip(&expected) {
+            assert!((own - expected).abs() < 0.02 * expected + 1e-6, "{own} for {expected}");
+        }
+    }
+    let corrected = read(&format!("{head}COLORCORR=1 2 3\n"), &[0; 8]);
+    check_refused(corrected, &["COLORCORR is of X, Y and Z"]);
+}
+
+/// The list of wavelengths is that of the cube's group, or of its name, or known to be none of these.
+#[test]
+fn lists_belong_to_the_cube_that_is_near() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.npz");
+    let cube = || npy("<f4", false, "(2, 3, 2)", &floats(&[0.5; 12]));
+    let list = |nm: [f32; 2]| npy("<f4", false, "(2,)", &floats(&nm));
+    let (near, far) = ([450.0, 550.0], [900.0, 1000.0]);
+    let read = |arrays: &[(&str, Option<[f32; 2]>)], told: &str| {
+        let arrays: Vec<(&str, Vec<u8>)> =
+            arrays.iter().map(|(name, own)| (*name, own.map_or_else(cube, list))).collect();
+        fs::write(&path, zip_of(&arrays, false)).unwrap();
+        let reading = FileReading {
+            variable: Some(told.to_owned()),
+            quantity: Some(FileQuantity::Radiance),
+            axes: Some("yxb".to_owned()),
+            ..FileReading::default()
+        };
+        read_scene(&path, &options(reading))
+    };
+    for (arrays, told, expected) in [
+        (
+            [("swir", None), ("swir_wavelengths", Some(far)), ("vnir", None), ("vnir_wavelengths", Some(near))],
+            "swir",
+            far,
+        ),
+        (
+            [("swir", None), ("swir_wavelengths", Some(far)), ("vnir", None), ("vnir_wavelengths", Some(near))],
+            "vnir",
+            near,
+        ),
+        (
+            [("a/cube", None), ("a/wavelength", Some(near)), ("b/cube", None), ("b/wavelength", Some(far))],
+            "b/cube",
+            far,
+        ),
+        (
+            [("cube", None), ("wavelength", Some(near)), ("cube_raw", None), ("wavelength_raw", Some(far))],
+            "cube_raw",
+            far,
+        ),
+        ([("cube", None), ("wavelength", Some(near)), ("cube_raw", None), ("wavelength_raw", Some(far))], "cube", near),
+        ([("cube", None), ("wavelength", Some(near)), ("other", None), ("wavelengths_nm", Some(near))], "other", near),
+    ] {
+        let scene = read(&arrays, told).unwrap();
+        assert_eq!(scene.radiance.grid().centers_nm(), expected.map(f64::from), "{told} of {arrays:?}");
+    }
+    let twice = [("cube", None), ("wavelength", Some(near)), ("wavelengths", Some(far))];
+    check_refused(read(&twice, "cube"), &["'wavelength' and 'wavelengths' differ", "--scene-wavelengths-nm"]);
+}
+
+/// Layers of other bands are one cube unless one of them is asked for.
+#[test]
+fn a_layer_of_bands_that_is_asked_for_is_all() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.exr");
+    let channels = [("vnir.S0.450nm", 1.0), ("vnir.S0.550nm", 1.0), ("swir.S0.900nm", 1.0), ("swir.S0.950nm", 1.0)];
+    write_exr(&path, &[("", (ROWS, COLUMNS), &channels)]);
+    let read = |told: Option<&str>| {
+        let scene =
+            read_scene(&path, &options(FileReading { variable: told.map(str::to_owned), ..FileReading::default() }));
+        let scene = scene.unwrap();
+        (scene.radiance.grid().len(), scene.notes.iter().any(|note| note.contains("are taken for one cube")))
+    };
+    assert_eq!([read(None), read(Some("vnir")), read(Some("swir"))], [(4, true), (2, false), (2, false)]);
+}
+
+/// A mask beside a picture, as GDAL writes it, is named.
+#[test]
+fn masks_of_tiff_files_are_named() {
+    use tiff::{
+        encoder::{
+            TiffEncoder,
+            colortype::{Gray8, RGB8},
+        },
+        tags::Tag,
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.tif");
+    let mut encoder = TiffEncoder::new(fs::File::create(&path).unwrap()).unwrap();
+    encoder.write_image::<RGB8>(3, 2, &[99; 18]).unwrap();
+    let mut mask = encoder.new_image::<Gray8>(3, 2).unwrap();
+    mask.encoder().write_tag(Tag::NewSubfileType, 4_u32).unwrap();
+    mask.encoder().write_tag(Tag::PhotometricInterpretation, 4_u16).unwrap();
+    mask.write_data(&[255; 6]).unwrap();
+    drop(encoder);
+    check_noted(&read_scene(&path, &options(FileReading::default())).unwrap(), &["its page '2 (a mask)' is not used"]);
+}
+
+/// tifffile's description in JSON states the unit of numbers and of wavelengths.
+#[test]
+fn units_of_tifffile_are_obeyed() {
+    use tiff::{
+        encoder::{TiffEncoder, colortype::Gray32Float},
+        tags::Tag,
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.tif");
+    let write = |description: &str| {
+        let mut encoder = TiffEncoder::new(fs::File::create(&path).unwrap()).unwrap();
+        for _ in 0..2 {
+            let mut page = encoder.new_image::<Gray32Float>(3, 2).unwrap();
+            page.encoder().write_tag(Tag::ImageDescription, description).unwrap();
+            page.write_data(&[2.0; 6]).unwrap();
+        }
+    };
+    let read = |description: &str| {
+        write(description);
+        let reading = FileReading { quantity: Some(FileQuantity::Radiance), ..FileReading::default() };
+        read_scene(&path, &options(reading)).unwrap()
+    };
+    let micrometres = read(r#"{"shape": [2, 2, 3], "wavelengths": [450, 550], "unit": "W/m2/sr/um"}"#);
+    let found = micrometres.radiance.spectrum_at(0, 0);
+    assert!(found.iter().all(|v| (v - 2e-3).abs() < 1e-9), "{found:?}");
+    let angstroms = read(r#"{"shape": [2, 2, 3], "wavelengths": [4500, 5500], "unit": "angstrom"}"#);
+    assert_eq!(angstroms.radiance.grid().centers_nm(), [450.0, 550.0]);
+    let other = read(r#"{"shape": [2, 2, 3], "wavelengths": [450, 550], "unit": "zorp", "mode": "x", "min": 0}"#);
+    check_noted(&other, &["'min', 'mode', 'unit'"]);
+    write(r#"{"shape": [2, 2, 3], "unit": "mm"}"#);
+    let depth = with_depth("d.tif", &fs::read(&path).unwrap(), None).unwrap().depth.unwrap();
+    assert!((depth.range_m().0 - 0.002).abs() < 1e-9);
 }

@@ -13,7 +13,7 @@ use tiff::{
 
 use super::{
     picture_parts::{comment, notes_on_page},
-    stated::{Noted, name_of, note_of},
+    stated::{Noted, name_of, note_of, tells},
     tiff_bands::{AsGray, planes_of},
     tiff_directory::{BELOW, Directory},
     tiff_gdal::{GDAL, GdalWords},
@@ -28,6 +28,17 @@ const DESCRIPTION: u16 = 270;
 const DOCUMENT: u16 = 269;
 const XMP: u16 = 700;
 const EXIF: u16 = 34_665;
+/// The tags of who made the file, when and with what.
+const MADE_BY: [(u16, &str); 8] = [
+    (271, "Make"),
+    (272, "Model"),
+    (305, "Software"),
+    (306, "DateTime"),
+    (315, "Artist"),
+    (316, "HostComputer"),
+    (337, "TargetPrinter"),
+    (33_432, "Copyright"),
+];
 /// The tag of what samples are marked as.
 const PHOTOMETRIC: u16 = 262;
 /// What of it is decoded, and a depth map.
@@ -168,16 +179,20 @@ pub(super) fn read_tiff(path: &Path, wanted: TiffAs) -> Result<Noted<TiffFile>, 
     notes.extend(words.note_of_orientation(path));
     let mut planes = planes_of_pages(path, &pages)?;
     let first = &pages[0].0;
-    let words = unpacked(first, words, &mut planes);
+    let words = unpacked(&pages, words, &mut planes);
     if is_picture {
         if first.unknown_sample().is_none() {
             notes.extend(without_opacity(path, first, &mut planes));
         }
         return Ok(Noted::new(TiffFile::Linear(colors_of(path, planes)?, words), notes));
     }
-    let top = first.top().filter(|_| !first.gdal.is_packed());
+    let top = first.top().filter(|_| pages.iter().all(|(page, _)| !page.gdal.is_packed()));
+    if pages.iter().any(|(page, _)| page.gdal.unit != first.gdal.unit) {
+        return Err(unreadable(path, "its metadata of GDAL state several units: expected one for all pages"));
+    }
     // That of a page is of its samples.
-    let gdal_nm = first.gdal.wavelengths_nm.clone().filter(|own| own.len() == planes.len());
+    let of_pages = pages.iter().filter_map(|(page, _)| page.gdal.wavelengths_nm.clone()).collect::<Vec<_>>().concat();
+    let gdal_nm = Some(of_pages).filter(|own| own.len() == planes.len());
     let own: Vec<Page> = pages.into_iter().map(|(page, _)| page).collect();
     // Where there are as many wavelengths as samples, what is marked as an opacity is a band.
     let mut bands = StatedBands::of(&own).map_err(|reason| unreadable(path, reason))?;
@@ -200,7 +215,9 @@ pub(super) fn read_tiff(path: &Path, wanted: TiffAs) -> Result<Noted<TiffFile>, 
     }
     notes.extend(note_of(path, "description key", &bands.keys));
     notes.extend(note_of(path, "page name", &bands.names));
-    let document: Vec<String> = own[0].document.iter().filter_map(|text| comment(text.as_bytes())).collect();
+    let mut document: Vec<String> =
+        own.iter().flat_map(|page| &page.document).filter_map(|text| comment(text.as_bytes())).collect();
+    document.dedup();
     notes.extend(note_of(path, "document name", &document));
     let mut page = words;
     page.descriptions = described(&own, bands.are_described);
@@ -208,12 +225,12 @@ pub(super) fn read_tiff(path: &Path, wanted: TiffAs) -> Result<Noted<TiffFile>, 
 }
 
 /// Makes the quantities of numbers that are packed, those that stand for none being none.
-fn unpacked(first: &Page, mut words: PageWords, planes: &mut [Array2<f32>]) -> PageWords {
-    if first.gdal.is_packed() {
-        planes.iter_mut().for_each(|plane| words.ignore(plane));
-        words.no_data = None;
-        first.gdal.unpack(planes);
+fn unpacked(pages: &[(Page, u64)], mut words: PageWords, planes: &mut [Array2<f32>]) -> PageWords {
+    for ((page, _), own) in pages.iter().zip(planes.chunks_mut(pages[0].0.n_samples)) {
+        own.iter_mut().for_each(|plane| page.words().ignore(plane));
+        page.gdal.unpack(own);
     }
+    words.no_data = None;
     words
 }
 
@@ -224,6 +241,24 @@ fn described(pages: &[Page], are_bands: bool) -> Vec<String> {
     let mut known = std::collections::HashSet::new();
     all.retain(|text| known.insert(text.clone()));
     all
+}
+
+/// Returns the number of a tag, with its name where that is known.
+fn named_tag(tag: u16) -> String {
+    const NAMES: [(u16, &str); 10] = [
+        (282, "XResolution, pixels that are not square"),
+        (283, "YResolution, pixels that are not square"),
+        (301, "TransferFunction"),
+        (330, "SubIFDs"),
+        (532, "ReferenceBlackWhite"),
+        (PROFILE, "ICC profile"),
+        (33_550, "ModelPixelScale"),
+        (33_922, "ModelTiepoint"),
+        (34_735, "GeoKeyDirectory"),
+        (37_510, "UserComment"),
+    ];
+    let name = NAMES.iter().find(|(own, _)| *own == tag);
+    name.map_or_else(|| tag.to_string(), |(_, name)| format!("{tag} ({name})"))
 }
 
 /// The pages of a file that are like its first, with the places of their directories.
@@ -242,7 +277,8 @@ fn pages_of(path: &Path, wanted: TiffAs) -> Result<Pages, SceneError> {
     let length = fs::metadata(path).map_err(|error| unreadable(path, error))?.len();
     let mut decoder = Decoder::new(reader).map_err(broken)?.with_limits(Limits::default());
     let mut pages: Vec<(Page, u64)> = vec![];
-    let (mut bytes, mut unused, mut unknown, mut notes) = (0, vec![], vec![], vec![]);
+    let (mut bytes, mut unused, mut unknown) = (0, vec![], vec![]);
+    let (mut told, mut xmp, mut items) = (vec![], vec![], vec![]);
     for index in 1.. {
         if index > LIMIT_PAGES {
             return Err(unreadable(path, format!("it has more than {LIMIT_PAGES} pages")));
@@ -266,7 +302,7 @@ fn pages_of(path: &Path, wanted: TiffAs) -> Result<Pages, SceneError> {
             unused.extend((is_depth && wanted == TiffAs::Planes(None)).then(|| format!("{index} (a depth map)")));
             continue;
         }
-        if pages.is_empty() && !page.is_reduced {
+        if page.aside.is_none() {
             let mut file = File::open(path).map_err(|error| unreadable(path, error))?;
             let directory = Directory::read(&mut file, at).map_err(|error| unreadable(path, error))?;
             let mut texts =
@@ -274,12 +310,21 @@ fn pages_of(path: &Path, wanted: TiffAs) -> Result<Pages, SceneError> {
             // What decodes the file keeps the last of two.
             page.descriptions = texts(DESCRIPTION)?;
             page.document = texts(DOCUMENT)?.into_iter().next();
-            let (xmp, gdal) = (texts(XMP)?, texts(GDAL)?.join(" "));
+            for (tag, name) in MADE_BY {
+                let own = texts(tag)?.into_iter().filter(|text| tells(text));
+                told.extend(own.map(|text| format!("{name}: {text}")));
+            }
+            let (own_xmp, gdal) = (texts(XMP)?, texts(GDAL)?.join(" "));
             page.gdal = GdalWords::of(&gdal, page.n_samples);
-            let read = [(XMP, !xmp.is_empty()), (GDAL, !gdal.is_empty()), (EXIF, true)];
+            let read = [(XMP, !own_xmp.is_empty()), (GDAL, !gdal.is_empty()), (EXIF, true)];
             page.unknown.retain(|tag| !read.contains(&(*tag, true)));
-            notes.extend(notes_on_page(path, &xmp, matches!(wanted, TiffAs::Marked | TiffAs::Planes(Some(_)))));
-            notes.extend(note_of(path, "item of GDAL", &page.gdal.left));
+            xmp.extend(own_xmp);
+            items.append(&mut page.gdal.left);
+            // A page that says nothing of its samples has them as the first has.
+            if let Some((first, _)) = pages.first().filter(|_| gdal.is_empty()) {
+                page.gdal = first.gdal.clone();
+                page.gdal.wavelengths_nm = None;
+            }
         }
         bytes += page.bytes();
         // Its numbers as they stand, and as single floats.
@@ -287,18 +332,30 @@ fn pages_of(path: &Path, wanted: TiffAs) -> Result<Pages, SceneError> {
         if page.is_raw {
             return Err(unreadable(path, RAW));
         }
-        if let (Marked::Unread(what), false) = (page.marked, page.is_reduced) {
+        if let (Marked::Unread(what), false) = (page.marked, page.aside.is_some()) {
             let reason = format!("it holds {what}, expected gray or red, green and blue: convert it to sRGB");
             return Err(unreadable(path, reason));
         }
         // A picture is in the colors of its profile; bands and depths are numbers.
         let is_picture = !page.is_stack() && matches!(wanted, TiffAs::Marked | TiffAs::Planes(None));
         page.unknown.retain(|tag| *tag != PROFILE || !is_picture);
-        unknown.extend(page.unknown.iter().map(ToString::to_string));
+        unknown.extend(page.unknown.iter().map(|tag| named_tag(*tag)));
         let first = pages.first().map(|(first, _)| first);
-        let is_like = first.is_none_or(|first| first.size == page.size && first.n_samples == page.n_samples);
-        if page.is_reduced || (!is_like && first.is_some_and(|first| !first.is_stack())) {
-            unused.push(if page.is_reduced { format!("{index} (reduced)") } else { index.to_string() });
+        let is_like = first.is_none_or(|first| {
+            let is_kind = first.depth == page.depth || !first.is_colored();
+            first.size == page.size && first.n_samples == page.n_samples && is_kind
+        });
+        if page.aside.is_some() || (!is_like && first.is_some_and(|first| !first.is_stack())) {
+            unused.push(page.aside.map_or_else(|| index.to_string(), |what| format!("{index} ({what})")));
+        } else if let Some(first) = first.filter(|first| is_like && first.depth != page.depth) {
+            let of = |page: &Page| match page.depth {
+                SampleDepth::Float => format!("floats of {} bits", page.bits),
+                SampleDepth::Signed(bits) => format!("whole numbers of {bits} bits with a sign"),
+                SampleDepth::Unsigned(bits) => format!("whole numbers of {bits} bits"),
+            };
+            let reason =
+                format!("its page {index} holds {}, its first {}: expected pages of one kind", of(&page), of(first));
+            return Err(unreadable(path, reason));
         } else if is_like {
             pages.push((page, at));
         } else {
@@ -309,9 +366,15 @@ fn pages_of(path: &Path, wanted: TiffAs) -> Result<Pages, SceneError> {
             return Err(unreadable(path, reason));
         }
     }
-    unknown.sort();
-    unknown.dedup();
-    notes.extend(note_of(path, "tag", &unknown));
+    let mut notes = vec![];
+    if !pages.is_empty() {
+        notes = notes_on_page(path, &xmp, matches!(wanted, TiffAs::Marked | TiffAs::Planes(Some(_))));
+    }
+    for (kind, mut names) in [("item of GDAL", items), ("text", told), ("tag", unknown)] {
+        names.sort();
+        names.dedup();
+        notes.extend(note_of(path, kind, &names));
+    }
     Ok(Pages { pages, unused, notes })
 }
 
@@ -332,7 +395,7 @@ pub(super) fn float_planes(path: &Path) -> Result<Option<Noted<Vec<Array2<f32>>>
         }
     }
     let mut planes = planes_of_pages(path, &pages)?;
-    let words = unpacked(first, first.words(), &mut planes);
+    let words = unpacked(&pages, first.words(), &mut planes);
     planes.iter_mut().for_each(|plane| words.count_from_black(plane, None));
     let note = without_opacity(path, &pages[0].0, &mut planes);
     Ok(Some(Noted::new(planes, note)))
@@ -486,7 +549,7 @@ mod tests {
             std::fs::write(&path, tiff(3, 8, &[(532, 5, range)])).unwrap();
             let mut notes = vec![];
             read_tiff(&path, TiffAs::Marked).unwrap().told_in(&mut notes);
-            assert_eq!(notes.join(" ").contains("'532'"), is_named, "{notes:?}");
+            assert_eq!(notes.join(" ").contains("'532 (Ref"), is_named, "{notes:?}");
         }
     }
 

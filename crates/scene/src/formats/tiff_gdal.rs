@@ -74,7 +74,7 @@ impl GdalWords {
             packing.clear();
         }
         items.retain(|own| match own.role.as_str() {
-            "colorinterp" => false,
+            "colorinterp" => ["alpha", "palette"].contains(&own.text.to_lowercase().as_str()),
             "description" => comment(own.text.as_bytes()).is_some(),
             _ => {
                 const HARMLESS: [&str; 4] = ["STATISTICS_", "AREA_OR_POINT", "TIFFTAG_", "FWHM_UM"];
@@ -189,6 +189,34 @@ mod tests {
         // Of a picture it is named.
         write(&path, &xml(&items[2..4]));
         assert!(read(&path).notes.join("\n").contains("'scale 0.5, offset 1'"));
+    }
+
+    /// A page a band: each with its own scale, wavelength and words.
+    #[test]
+    fn every_page_is_heard() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.tif");
+        let mut encoder = TiffEncoder::new(File::create(&path).unwrap()).unwrap();
+        for (um, scale, code) in [("0.45", "0.5", 100), ("0.55", "0.25", 400)] {
+            let mut page = encoder.new_image::<colortype::Gray16>(1, 1).unwrap();
+            let items = [
+                ("CENTRAL_WAVELENGTH_UM", 0, "", um),
+                ("SCALE", 0, "role=\"scale\"", scale),
+                ("UNITTYPE", 0, "role=\"unittype\"", "W/m2/sr/nm"),
+                ("BAND_GAIN", 0, "", um),
+            ];
+            page.encoder().write_tag(Tag::Unknown(GDAL), xml(&items).as_str()).unwrap();
+            page.encoder().write_tag(Tag::Software, "radiance in percent").unwrap();
+            page.encoder().write_tag(Tag::Artist, "A. Nobody").unwrap();
+            page.write_data(&[code]).unwrap();
+        }
+        let scene = read(&path);
+        assert_eq!(scene.radiance.grid().centers_nm(), [450.0, 550.0]);
+        assert_eq!(scene.radiance.spectrum_at(0, 0), [50.0, 100.0]);
+        let notes = scene.notes.join("\n");
+        for word in ["'BAND_GAIN=0.45', 'BAND_GAIN=0.55'", "'Software: radiance in percent'"] {
+            assert!(notes.contains(word) && !notes.contains("42112") && !notes.contains("Nobody"), "{word}: {notes}");
+        }
     }
 
     #[test]

@@ -13,20 +13,22 @@ use tiff::{
 };
 
 use super::{
+    length_unit::length_m,
+    mat::UnitOf,
     picture_parts::differ,
     stated::{name_of, note_of},
     tiff_depth_map::{DEPTH_TAGS, DepthMapTags},
     tiff_gdal::GdalWords,
-    wavelength_unit::wavelength_in,
+    wavelength_unit::{in_nm, wavelength_in},
 };
 
 /// The name of a page.
 const PAGE_NAME: Tag = Tag::Unknown(285);
 /// Tags that say how samples lie in the file, or what changes nothing: from sizes and strips to who made it when.
-const HARMLESS: [u16; 46] = [
+const HARMLESS: [u16; 47] = [
     254, 255, 256, 257, 258, 259, 262, 263, 266, 269, 270, 271, 272, 273, 274, 277, 278, 279, 282, 283, 284, 285, 288,
-    289, 292, 293, 296, 297, 305, 306, 315, 316, 317, 320, 322, 323, 324, 325, 338, 339, 347, 530, 531, 33432, 34853,
-    42113,
+    289, 292, 293, 296, 297, 305, 306, 315, 316, 317, 320, 322, 323, 324, 325, 337, 338, 339, 347, 530, 531, 33432,
+    34853, 42113,
 ];
 
 /// The codes of black and of white of each sample.
@@ -34,6 +36,9 @@ const REFERENCE_BLACK_WHITE: Tag = Tag::Unknown(532);
 
 /// Keys of a description under which its wavelengths stand, nm.
 const WAVELENGTHS: [&str; 4] = ["wavelengths_nm", "wavelength_nm", "wavelengths", "wavelength"];
+
+/// Keys under which its unit stands.
+const UNITS: [&str; 2] = ["unit", "units"];
 
 /// How large the numbers of a page can be.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -58,9 +63,8 @@ pub(super) enum Marked {
 }
 
 /// What samples are marked as that are not read (TIFF 6.0, and its technical notes).
-const UNREAD: [(u16, &str); 7] = [
+const UNREAD: [(u16, &str); 6] = [
     (3, "a table of colors (palette)"),
-    (4, "a mask"),
     (5, "inks (CMYK)"),
     (6, "brightness and differences of colors (YCbCr, as JPEG within TIFF has it)"),
     (8, "colors of CIE L*a*b*"),
@@ -86,7 +90,8 @@ pub(super) struct Page {
     pub(super) marked: Marked,
     /// What each of the last samples is: 0 unspecified, 1 and 2 an opacity.
     pub(super) extra: Vec<u16>,
-    pub(super) is_reduced: bool,
+    /// Whether it is a reduced one or a mask, in a word.
+    pub(super) aside: Option<&'static str>,
     /// What it says of its depths, where it is marked as a map of them.
     pub(super) depth_map: Option<DepthMapTags>,
     /// Whether it is a page of a raw photograph.
@@ -174,7 +179,12 @@ impl Page {
                 }
             },
             extra,
-            is_reduced: kind & 1 != 0,
+            aside: match kind {
+                kind if kind & 1 != 0 => Some("reduced"),
+                // Of GDAL and others, 0 where there are no data.
+                kind if kind & 4 != 0 || photometric == 4 => Some("a mask"),
+                _ => None,
+            },
             depth_map,
             is_raw: unknown.contains(&DNG_VERSION),
             has_tiles_of_planes: is_planar && n_samples > 1 && has_tiles,
@@ -196,7 +206,8 @@ impl Page {
             is_white_zero: self.marked == Marked::Gray { is_white_zero: true } && self.n_samples == 1,
             descriptions: self.descriptions.clone(),
             called: self.names().chain(self.descriptions.iter()).cloned().collect::<Vec<_>>().join("; "),
-            unit: self.gdal.unit.clone(),
+            unit: self.gdal.unit.clone().or_else(|| self.descriptions.iter().find_map(|text| unit_of_numbers(text))),
+            is_packed: self.gdal.is_packed(),
             orientation: self.orientation,
             depth_map: self.depth_map,
         }
@@ -296,6 +307,8 @@ pub(super) struct PageWords {
     pub(super) called: String,
     /// The unit of its numbers.
     pub(super) unit: Option<String>,
+    /// Whether its numbers were packed, so that they are quantities.
+    pub(super) is_packed: bool,
     orientation: u16,
     pub(super) depth_map: Option<DepthMapTags>,
 }
@@ -333,9 +346,7 @@ impl PageWords {
         let (mut keys, mut described) = (vec![], vec![]);
         for text in &self.descriptions {
             match written_keys(text) {
-                Some(own) => {
-                    keys.extend(own.into_iter().filter(|(key, value)| !is_usual(key, value)).map(|(key, _)| key))
-                }
+                Some(own) => keys.extend(own),
                 None => described.push(text.clone()),
             }
         }
@@ -344,48 +355,57 @@ impl PageWords {
     }
 }
 
-/// Returns the keys of a description that tifffile or `ImageJ` wrote, with their values; none of another.
-fn written_keys(text: &str) -> Option<Vec<(String, String)>> {
+/// Returns the keys of a description that tifffile or `ImageJ` wrote that say more than the shape of the array, in rows before columns, and how `ImageJ`
+/// shows it; none of another description.
+fn written_keys(text: &str) -> Option<Vec<String>> {
     if text.starts_with("ImageJ=") {
-        let pairs = text.lines().filter_map(|line| line.split_once('='));
-        return Some(pairs.map(|(key, value)| (key.trim().to_owned(), value.trim().to_owned())).collect());
+        const KEYS: [&str; 17] = [
+            "ImageJ",
+            "images",
+            "channels",
+            "slices",
+            "frames",
+            "hyperstack",
+            "mode",
+            "loop",
+            "yunit",
+            "zunit",
+            "tunit",
+            "spacing",
+            "finterval",
+            "fps",
+            "min",
+            "max",
+            "axes",
+        ];
+        let is_usual = |key: &str, value: &str| KEYS.contains(&key) || key == "unit" && value.starts_with("pixel");
+        let pairs = text.lines().filter_map(|line| line.split_once('=')).map(|(key, value)| (key.trim(), value.trim()));
+        return Some(pairs.filter(|(key, value)| !is_usual(key, value)).map(|(key, _)| key.to_owned()).collect());
     }
     match serde_json::from_str(text) {
         Ok(Json::Object(map)) if map.contains_key("shape") => {
-            Some(map.into_iter().map(|(key, value)| (key, words(&value))).collect())
+            Some(map.iter().filter(|(key, value)| !is_of_shape(key, value)).map(|(key, _)| key.clone()).collect())
         }
         _ => None,
     }
 }
 
-fn words(value: &Json) -> String {
-    value.as_str().map_or_else(|| value.to_string(), str::to_owned)
+/// Returns the unit of light, of shares or of lengths that a description in JSON states.
+fn unit_of_numbers(text: &str) -> Option<String> {
+    let Ok(Json::Object(map)) = serde_json::from_str(text) else { return None };
+    UNITS.iter().find_map(|key| map.get(*key)?.as_str()).filter(|unit| is_of_numbers(unit)).map(str::to_owned)
 }
 
-/// Whether a key of a description is one of the shape of the array, in rows before columns, or of how `ImageJ` shows it.
-fn is_usual(key: &str, value: &str) -> bool {
-    const KEYS: [&str; 19] = [
-        "ImageJ",
-        "shape",
-        "truncated",
-        "images",
-        "channels",
-        "slices",
-        "frames",
-        "hyperstack",
-        "mode",
-        "loop",
-        "unit",
-        "yunit",
-        "zunit",
-        "tunit",
-        "spacing",
-        "finterval",
-        "fps",
-        "min",
-        "max",
-    ];
-    KEYS.contains(&key) || (key == "axes" && value.to_uppercase().contains("YX"))
+fn is_of_numbers(unit: &str) -> bool {
+    length_m(unit).is_some() || !matches!(UnitOf::read(Some(unit)), UnitOf::Unknown)
+}
+
+/// Whether a key of tifffile is one of the shape of the array, in rows before columns, or the unit of its numbers.
+fn is_of_shape(key: &str, value: &Json) -> bool {
+    let text = value.as_str().unwrap_or_default();
+    let is_read =
+        (key == "axes" && text.to_uppercase().contains("YX")) || (UNITS.contains(&key) && is_of_numbers(text));
+    ["shape", "truncated"].contains(&key) || is_read
 }
 
 /// What pages say of their bands.
@@ -435,7 +455,19 @@ fn listed_in(page: &Page) -> Option<(Vec<f64>, Vec<String>)> {
     let mut map = maps.into_iter().find(|map| WAVELENGTHS.iter().any(|key| map.contains_key(*key)))?;
     let list = WAVELENGTHS.iter().find_map(|key| map.remove(*key))?;
     let list = list.as_array()?.iter().map(Json::as_f64).collect::<Option<Vec<f64>>>()?;
-    // The shape of the array is written by tifffile.
-    let left = map.into_iter().filter(|(key, value)| !is_usual(key, &words(value))).map(|(key, _)| key).collect();
+    // The unit beside a list is that of the list, where it is one of wavelengths.
+    let unit =
+        ["wavelength_unit", "wavelength_units", "wavelengths_unit", "unit", "units"].into_iter().find_map(|key| {
+            let own = in_nm(map.get(key)?.as_str()?, &list)?;
+            Some((key, own))
+        });
+    let list = match unit {
+        Some((key, own)) => {
+            map.remove(key);
+            own
+        }
+        None => list,
+    };
+    let left = map.into_iter().filter(|(key, value)| !is_of_shape(key, value)).map(|(key, _)| key).collect();
     Some((list, left))
 }

@@ -507,6 +507,30 @@ mod tests {
         assert!(plane[(30, 40)] > 0.0 && plane[(50, 20)] > 0.0);
     }
 
+    /// Bands lie side by side, however far apart their centers are, and have what the light has over their width.
+    #[test]
+    fn white_keeps_its_color_on_any_bands() {
+        use dioptric_spectrum::{Xyz, delta_e_2000};
+        let wide = |step: f64| WavelengthGrid::uniform(380.0, 780.0, step).unwrap();
+        let seven = vec![405.0, 440.0, 470.0, 525.0, 560.0, 610.0, 670.0];
+        let fine = WavelengthGrid::uniform(360.0, 830.0, 1.0).unwrap();
+        for light in [Illuminant::D65, Illuminant::D50, Illuminant::A, Illuminant::parse("5500K").unwrap()] {
+            let light = TargetLight::Illuminant(light);
+            let target = Target { light: light.clone(), luminance_cd_m2: 1.0, ..of(Pattern::Uniform) };
+            let white = Observer::Cie1931.xyz(&fine, &target.white_radiance(&fine).unwrap());
+            for (grid, most) in [
+                (wide(5.0), 0.02),
+                (wide(10.0), 0.02),
+                (wide(20.0), 0.2),
+                (WavelengthGrid::new(seven.clone()).unwrap(), 1.6),
+            ] {
+                let found = Observer::Cie1931.xyz(&grid, &target.white_radiance(&grid).unwrap());
+                let off = delta_e_2000(found.to_lab(white), Xyz([1.0; 3]).to_lab(Xyz([1.0; 3])));
+                assert!(off < most, "{light:?} on {} bands: {off}", grid.len());
+            }
+        }
+    }
+
     #[test]
     fn the_chart_shows_its_patches() {
         let target = Target { rows: 120, columns: 180, ..of(Pattern::ColorChart) };

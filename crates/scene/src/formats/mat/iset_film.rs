@@ -13,7 +13,7 @@ use super::{
         stated::{name_of, note_of},
         unusable::{unreadable, unwritable},
     },
-    container::{Content, MatArray, MatFile},
+    container::{MatArray, MatFile},
     elements::{self, Listed},
     iset_kinds::{self, OPTICAL_IMAGES, structure_of},
     iset_write::{data, named, spectrum},
@@ -91,11 +91,7 @@ pub fn read_iset_irradiance(path: &Path) -> Result<IsetIrradiance, SceneError> {
     let others: Vec<String> = file.listed.iter().map(|own| own.name.clone()).filter(|own| own != name).collect();
     let mut notes = vec![understood];
     notes.extend(note_of(path, "variable", &others));
-    if let Content::Fields(fields) = &oi.content {
-        let is_known = |own: &str| HARMLESS.contains(&own) || iset_kinds::HARMLESS.contains(&own);
-        let left = fields.iter().filter(|(own, array)| array.len() > 0 && !is_known(own));
-        notes.extend(note_of(path, "field", &left.map(|(own, _)| format!("{name}.{own}")).collect::<Vec<_>>()));
-    }
+    notes.extend(note_of(path, "field", &iset_kinds::left_of(&oi, name, &HARMLESS)));
     Ok(IsetIrradiance { image, light, notes })
 }
 

@@ -22,7 +22,7 @@ use super::{
     container::{Content, MatArray, MatFile, WHOLE},
     elements::Listed,
     iset_kinds,
-    packing::{Packing, is_wave_unit, rank_of_waves},
+    packing::{Nearness, Packing, Value, is_wave_unit, nearest_list, rank_of_waves},
 };
 use crate::{SceneError, SceneLight};
 
@@ -32,9 +32,21 @@ const WANTED: [&str; 10] =
 /// The most that reflectances are, and the least that photons of any lit scene are.
 const MOST_REFLECTANCE: f64 = 10.0;
 const LEAST_PHOTONS: f64 = 1e9;
-/// Fields of a scene that change nothing of what it is, beside those of all objects.
-const HARMLESS: [&str; 7] =
-    ["chartP", "chartparameters", "cornerpoints", "rect", "color", "vAngular", "lightFieldType"];
+/// Fields of a scene that are read, or change nothing of what it is, beside those of all objects.
+const HARMLESS: [&str; 12] = [
+    "depthMap",
+    "distance",
+    "wave",
+    "data.dmin",
+    "data.dmax",
+    "chartP",
+    "chartparameters",
+    "cornerpoints",
+    "rect",
+    "color",
+    "vAngular",
+    "lightFieldType",
+];
 /// The published cubes that do not list their wavelengths, by variable and bands: first and last, nm.
 const KNOWN: [(&str, usize, [f64; 2]); 4] = [
     // Chakrabarti & Zickler 2011 (Harvard).
@@ -236,8 +248,9 @@ fn cube_of(path: &Path, file: &MatFile, name: &str, reading: &FileReading) -> Re
         unused.extend(fields.into_iter().filter(|own| !used(own)));
     }
     let mut notes: Vec<String> = note_of(path, "variable", &unused).into_iter().collect();
+    notes.extend(note_of_elements(path, file, name));
     let file_name = name_of(path);
-    let ambiguous = axes::note(&array.sides, order.as_deref(), n_bands);
+    let ambiguous = axes::note(&array.sides, order.as_deref(), n_bands, file.is_row_major);
     notes.extend(named.into_iter().chain(ambiguous).map(|note| format!("{file_name}: '{name}': {note}")));
     let of_file = file.attributes_of(WHOLE).iter().map(|own| own.name.clone());
     let mut left = packing.left(!matches!(unit, UnitOf::Unknown), stated.is_some());
@@ -259,7 +272,7 @@ fn cube_of(path: &Path, file: &MatFile, name: &str, reading: &FileReading) -> Re
     }
     let top = (is_integer && percent == 1.0).then(|| numbers.top());
     let unit = if let UnitOf::Light(unit, text) = unit { Some((unit, text)) } else { None };
-    Ok(NumberCube { planes, top, wavelengths_nm: own, quantity, unit, notes })
+    Ok(NumberCube { planes, top, wavelengths_nm: own, quantity, unit, called: Some(last_part(name).to_owned()), notes })
 }
 
 /// What the unit of numbers says that they are.
@@ -305,26 +318,51 @@ fn waves_of(file: &MatFile, cube: &str, sides: &[usize], is_told: bool) -> Resul
     let mut lists: Vec<&String> = names.filter(|own| *own != cube && rank(own).is_some()).collect();
     // Those along a dimension of the cube before others.
     let axes = file.words_of(cube).1;
-    let is_along = |own: &String| file.words_of(own).1.iter().any(|axis| axes.contains(axis));
-    lists.sort_by_key(|own| (!is_along(own), rank(own)));
+    // As netCDF has them ("Climate and Forecast", 5).
+    let coordinates = file.attributes_of(cube).iter().find_map(|own| match &own.value {
+        Value::Text(text) if own.name == "coordinates" => Some(text.as_str()),
+        _ => None,
+    });
+    let is_along = |own: &String| {
+        let is_scale = file.words_of(own).1.iter().any(|axis| axes.contains(axis));
+        is_scale || coordinates.is_some_and(|all| all.split_whitespace().any(|word| word == last_part(own)))
+    };
+    lists.sort_by_key(|own| (!is_along(own), Nearness::of(cube, own), rank(own)));
+    let (mut found, mut lefts) = (vec![], vec![]);
     for own in lists {
-        let numbers = file.array(own)?.and_then(|array| array.list());
-        let Some(numbers) = numbers.filter(|list| sides.contains(&list.len())) else { continue };
+        let Some(array) = file.array(own)?.filter(|array| array.sides.iter().filter(|side| **side != 1).count() <= 1)
+        else {
+            continue;
+        };
+        let Some(numbers) = array.list().filter(|list| sides.contains(&list.len())) else { continue };
         let packing = Packing::of(file.attributes_of(own));
         let numbers: Vec<f64> = numbers.into_iter().map(|number| packing.unpacked(number)).collect();
         let stated = packing.unit.as_deref().or(packing.wave_unit());
         let unit = stated.or_else(|| unit_in(last_part(own)));
-        return match listed_nm(own, unit, &numbers) {
-            Ok(list) => Ok(list.map(|nm| {
+        match listed_nm(own, unit, &numbers) {
+            Ok(Some(nm)) => {
                 let mut left = packing.left(true, false);
                 left.retain(|name| packing.unit.is_some() || !is_wave_unit(name));
-                Waves { name: own.clone(), nm, left }
-            })),
-            Err(_) if is_told => Ok(None),
-            Err(reason) => Err(reason),
-        };
+                lefts.push(left);
+                found.push((own.clone(), Nearness::of(cube, own), nm));
+                // One that is along an axis is that of the cube.
+                if is_along(own) {
+                    break;
+                }
+            }
+            // A list that counts bands is none.
+            Ok(None) if found.is_empty() => return Ok(None),
+            Err(_) if is_told && found.is_empty() => return Ok(None),
+            Err(reason) if found.is_empty() => return Err(reason),
+            Ok(None) | Err(_) => {}
+        }
     }
-    Ok(None)
+    let nearest = match nearest_list(found) {
+        Err(_) if is_told => None,
+        own => own?,
+    };
+    let left = lefts.into_iter().next().unwrap_or_default();
+    Ok(nearest.map(|(name, nm)| Waves { name, nm, left }))
 }
 
 /// Reads a scene of `ISETCam`.
@@ -338,7 +376,7 @@ fn of_iset(path: &Path, file: &MatFile) -> Result<IsetScene, SceneError> {
     let planes = order.iter().filter_map(|&band| planes[band].take()).collect();
     let image = SpectralImage::new(Quantity::Radiance, grid, planes).map_err(values)?;
     let light = light.map(|spectrum| light_of(&spectrum)).transpose().map_err(wrong)?;
-    let mut notes = unused_of(path, file).map_err(wrong)?;
+    let mut notes = unused_of(path, file, light.is_some()).map_err(wrong)?;
     if let (Some(map), Some(distance_m)) = (&depth_m, distance_m) {
         let measured = map.iter().map(|z| f64::from(*z)).filter(|z| z.is_finite() && *z > 0.0);
         let [near_m, far_m] = measured.fold([f64::INFINITY, 0.0], |[near, far], z| [near.min(z), far.max(z)]);
@@ -354,23 +392,37 @@ fn of_iset(path: &Path, file: &MatFile) -> Result<IsetScene, SceneError> {
     Ok(IsetScene { image, depth_m, distance_m, horizontal_fov_deg, light, notes })
 }
 
+/// Returns what is said of arrays of structures, of which the first element is taken.
+fn note_of_elements(path: &Path, file: &MatFile, name: &str) -> Option<String> {
+    let outer = name.match_indices('.').map(|(at, _)| &name[..at]).chain([name]);
+    let has_more = |own: &&str| {
+        let array = file.array(own).ok().flatten();
+        array.is_some_and(|array| matches!(array.content, Content::Fields(_)) && array.len() > 1)
+    };
+    let own = outer.into_iter().find(has_more)?;
+    Some(format!("{}: of the structures in its '{own}' the first is taken, and the others are not used", name_of(path)))
+}
+
 /// Returns notes of the variables and the fields of a scene that are not used.
-fn unused_of(path: &Path, file: &MatFile) -> Result<Vec<String>, String> {
+fn unused_of(path: &Path, file: &MatFile, is_lit: bool) -> Result<Vec<String>, String> {
     let names = file.listed.iter().map(|own| own.name.clone());
     let ours = |name: &str| WANTED.contains(&name) || ["dist", "data", "comment", "name"].contains(&name);
     let scene = file.array("scene")?;
     let is_only = |name: &str| scene.is_none() || name == "scene";
     let variables: Vec<String> = names.filter(|name| !(ours(name) && is_only(name))).collect();
     let mut notes: Vec<String> = note_of(path, "variable", &variables).into_iter().collect();
-    if let Some(MatArray { content: Content::Fields(fields), .. }) = &scene {
-        let ours = ["depthMap", "distance", "illuminant", "wave"];
-        let left = fields.iter().filter(|(name, array)| {
-            let is_known =
-                [&ours[..], &HARMLESS, &iset_kinds::HARMLESS].iter().any(|known| known.contains(&name.as_str()));
-            array.len() > 0 && !is_known
-        });
-        notes.extend(note_of(path, "field", &left.map(|(name, _)| format!("scene.{name}")).collect::<Vec<_>>()));
+    notes.extend(scene.as_ref().and_then(|_| note_of_elements(path, file, "scene")));
+    if let Some(scene) = &scene {
+        notes.extend(note_of(path, "field", &iset_kinds::left_of(scene, "scene", &HARMLESS)));
     }
+    let light = match &scene {
+        Some(scene) => scene.field("illuminant").cloned(),
+        None => file.array("illuminant")?,
+    };
+    let has_light = light.is_some_and(|own| own.field("data").is_some());
+    notes.extend((has_light && !is_lit).then(|| {
+        format!("{}: its illuminant is not one spectrum of light for all samples, and is not used", name_of(path))
+    }));
     Ok(notes)
 }
 

@@ -23,6 +23,6 @@ pub use iset_write::write_iset_scene;
 #[cfg(test)]
 use isetcam::IsetScene;
 pub(super) use isetcam::{MatScene, UnitOf, read_mat};
-pub(super) use packing::rank_of_waves;
+pub(super) use packing::{Nearness, nearest_list, rank_of_waves};
 pub use plane::read_mat_matrices;
 pub(super) use plane::{DEPTHS, Plane, read_plane};

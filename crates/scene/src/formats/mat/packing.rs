@@ -1,19 +1,70 @@
 //! What the attributes of an array of HDF5 say of its numbers, by the conventions of netCDF ("Climate and Forecast", 8.1 and 2.5.1).
 
-use super::super::wavelength_unit::{listed_nm, unit_in};
+use super::super::{
+    depth_names::words_of,
+    stated::short,
+    wavelength_unit::{in_nm, listed_nm, unit_in},
+};
 
 /// Names of the list of wavelengths beside a cube, the likelier first.
 const WAVES: [&str; 9] =
     ["wave", "wavelength", "wavelengths", "wavelengths_nm", "waves", "lambda", "bands", "wl", "wlens"];
 /// Words in the names of lists of other numbers of wavelengths.
-const NO_WAVES: [&str; 13] =
-    ["width", "fwhm", "error", "uncert", "offset", "shift", "delta", "good", "bad", "mask", "flag", "valid", "unit"];
+const NO_WAVES: [&str; 15] = [
+    "bnds", "bounds", "width", "fwhm", "error", "uncert", "offset", "shift", "delta", "good", "bad", "mask", "flag",
+    "valid", "unit",
+];
 
 /// Returns how likely a name is that of a list of wavelengths, 0 the most; none of other names.
 pub(in super::super) fn rank_of_waves(name: &str) -> Option<usize> {
     let lower = name.to_lowercase();
     let is_like = lower.contains("wavelength") && !NO_WAVES.iter().any(|word| lower.contains(word));
     WAVES.iter().position(|own| *own == lower).or_else(|| is_like.then_some(WAVES.len()))
+}
+
+/// How near a list of wavelengths is to a cube, the lesser the nearer: whether it is in the cube's group or structure, or how far above; then whether what
+/// its name has beside words of wavelengths is in the cube's name, as of `swir_wavelengths` and `swir`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(in super::super) struct Nearness {
+    group: usize,
+    words: usize,
+}
+
+impl Nearness {
+    pub(in super::super) fn of(cube: &str, list: &str) -> Self {
+        const ELSEWHERE: usize = 100;
+        const PLAIN: [&str; 8] = ["lambda", "wl", "wlens", "band", "bands", "center", "centers", "list"];
+        let parts = |name: &str| name.split(['/', '.']).filter(|part| !part.is_empty()).map(str::to_owned).collect();
+        let (mut of_cube, mut of_list): (Vec<String>, Vec<String>) = (parts(cube), parts(list));
+        let (cube, list) = (of_cube.pop().unwrap_or_default(), of_list.pop().unwrap_or_default());
+        let group = if of_cube.starts_with(&of_list) { of_cube.len() - of_list.len() } else { ELSEWHERE };
+        let own = words_of(&cube);
+        let is_plain =
+            |word: &String| word.contains("wave") || PLAIN.contains(&word.as_str()) || in_nm(word, &[]).is_some();
+        let rest: Vec<String> = words_of(&list).into_iter().filter(|word| !is_plain(word)).collect();
+        let words = match rest.iter().all(|word| own.contains(word)) {
+            true if !rest.is_empty() => 0,
+            true => 1,
+            false => 2,
+        };
+        Self { group, words }
+    }
+}
+
+/// Returns the first of lists of wavelengths, the nearest first, or what is wrong where another that is as near says something else.
+pub(in super::super) fn nearest_list(
+    lists: Vec<(String, Nearness, Vec<f64>)>,
+) -> Result<Option<(String, Vec<f64>)>, String> {
+    let Some((name, nearness, nm)) = lists.first() else { return Ok(None) };
+    let are_alike = |own: &[f64]| own.len() == nm.len() && own.iter().zip(nm).all(|(a, b)| (a - b).abs() <= 1e-3 * b);
+    match lists.iter().skip(1).find(|(_, own, list)| own == nearness && !are_alike(list)) {
+        Some((other, ..)) => Err(format!(
+            "its lists of wavelengths '{}' and '{}' differ, and which is whose is not known: expected --scene-wavelengths-nm",
+            short(name),
+            short(other)
+        )),
+        None => Ok(Some((name.clone(), nm.clone()))),
+    }
 }
 
 /// An attribute of an array.
@@ -143,7 +194,10 @@ impl<'a> Packing<'a> {
             WHITE => self.white.is_some(),
             name if self.is_taken(&SCALES, name) || self.is_taken(&OFFSETS, name) => true,
             name if MISSING.contains(&name) => matches!(own.value, Value::Numbers(_)),
-            name if UNITS.iter().any(|unit| name.eq_ignore_ascii_case(unit)) => is_unit_used,
+            // Of two that differ one is used.
+            name if UNITS.iter().any(|unit| name.eq_ignore_ascii_case(unit)) => {
+                is_unit_used && matches!(&own.value, Value::Text(text) if Some(text.trim()) == self.unit.as_deref())
+            }
             name => are_waves_used && (is_wave_unit(name) || self.waves().is_some_and(|(waves, _)| waves == name)),
         };
         self.attributes.iter().filter(|own| !is_used(own)).map(|own| own.name.clone()).collect()

@@ -13,7 +13,6 @@ use super::{
         unusable::unreadable,
     },
     container::{MatFile, WHOLE},
-    elements::Listed,
     hdf5::NAMING,
     packing::Packing,
 };
@@ -67,28 +66,38 @@ pub fn read_mat_matrices(path: &Path, wanted: &[&str]) -> Result<Vec<(String, Ar
 /// # Errors
 /// When it has none, or several of other names.
 pub(in super::super) fn read_plane(path: &Path, told: Option<&str>) -> Result<Noted<Plane>, SceneError> {
-    let sides_of = |own: &Listed| own.sides.iter().copied().filter(|side| *side != 1).collect::<Vec<usize>>();
-    let is_plane = |own: &Listed| own.is_numeric && sides_of(own).len() == 2;
-    let file = MatFile::read(path, &is_plane)?;
+    let are_plane = |sides: &[usize]| sides.iter().filter(|side| **side != 1).count() == 2;
+    let file = MatFile::read(path, &|own| !own.is_numeric || are_plane(&own.sides))?;
     let wrong = |reason: String| unreadable(path, reason);
-    let planes: Vec<&Listed> = file.listed.iter().filter(|own| is_plane(own)).collect();
-    let last = |own: &Listed| own.name.rsplit('/').next().unwrap_or_default().to_lowercase();
+    // Those of the file, and those in its structures as `s.depth`.
+    let mut arrays: Vec<(String, Vec<usize>)> = vec![];
+    for own in &file.listed {
+        match own.is_numeric {
+            true => arrays.push((own.name.clone(), own.sides.clone())),
+            false => {
+                let array = file.array(&own.name).ok().flatten();
+                arrays.extend(array.map(|array| array.numeric_fields(&own.name)).unwrap_or_default());
+            }
+        }
+    }
+    let planes: Vec<&(String, Vec<usize>)> = arrays.iter().filter(|(_, sides)| are_plane(sides)).collect();
+    let last = |name: &str| name.rsplit(['/', '.']).next().unwrap_or_default().to_lowercase();
     let named = match told {
-        Some(told) => planes.iter().find(|own| own.name == told),
-        None => DEPTHS.iter().find_map(|name| planes.iter().find(|own| is_called(&last(own), name))),
+        Some(told) => planes.iter().find(|(name, _)| name == told),
+        None => DEPTHS.iter().find_map(|wanted| planes.iter().find(|(name, _)| is_called(&last(name), wanted))),
     };
-    let chosen = match (named, &planes[..]) {
+    let (chosen, sides) = match (named, &planes[..]) {
         (Some(named), _) => named,
         (None, _) if told.is_some() => {
-            let names = file.listed.iter().map(|own| own.name.as_str()).collect::<Vec<_>>().join(", ");
             let told = told.unwrap_or_default();
-            if let Some(own) = file.listed.iter().find(|own| own.name == told && own.is_numeric) {
-                let sides = own.sides.iter().map(usize::to_string).collect::<Vec<_>>().join(" × ");
+            if let Some((_, own)) = arrays.iter().find(|(name, _)| name == told) {
+                let sides = own.iter().map(usize::to_string).collect::<Vec<_>>().join(" × ");
                 return Err(wrong(format!(
                     "its '{told}' has {} axes ({sides}), expected rows and columns: save one picture's of them alone",
-                    own.sides.len()
+                    own.len()
                 )));
             }
+            let names = arrays.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>().join(", ");
             return Err(wrong(format!("it has no array '{told}' of rows and columns, expected one of {names}")));
         }
         (None, [only]) => only,
@@ -97,26 +106,30 @@ pub(in super::super) fn read_plane(path: &Path, told: Option<&str>) -> Result<No
         }
         (None, []) => return Err(wrong("it has no array of rows and columns, expected one of depth".to_owned())),
         (None, _) => {
-            let names = planes.iter().map(|own| own.name.as_str()).collect::<Vec<_>>().join(", ");
+            let names = planes.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>().join(", ");
             return Err(wrong(format!("it has several arrays, {names}: expected one, or its name (--depth-variable)")));
         }
     };
-    let array = file.array(&chosen.name).map_err(wrong)?.ok_or_else(|| wrong("its depth is not there".to_owned()))?;
-    let numbers =
-        array.numbers().map_err(|what| wrong(format!("its '{}' is {what}, expected numbers", chosen.name)))?;
-    let sides = sides_of(chosen);
-    let (words, axes) = file.words_of(&chosen.name);
+    let all_sides = sides;
+    let sides: Vec<usize> = all_sides.iter().copied().filter(|side| *side != 1).collect();
+    let array = file.array(chosen).map_err(wrong)?.ok_or_else(|| wrong("its depth is not there".to_owned()))?;
+    let numbers = array.numbers().map_err(|what| wrong(format!("its '{chosen}' is {what}, expected numbers")))?;
+    let (words, axes) = file.words_of(chosen);
     let axes: Vec<String> =
-        axes.iter().zip(&chosen.sides).filter(|(_, side)| **side != 1).map(|(axis, _)| axis.clone()).collect();
+        axes.iter().zip(all_sides).filter(|(_, side)| **side != 1).map(|(axis, _)| axis.clone()).collect();
     let is_turned = axes::are_turned(&axes);
     let [rows, columns] = if is_turned { [sides[1], sides[0]] } else { [sides[0], sides[1]] };
     let at = |(row, column): (usize, usize)| {
         // Where the first axis is that of the columns its neighbors are those of a row.
         if file.is_row_major != is_turned { column + columns * row } else { row + rows * column }
     };
-    let others: Vec<String> =
-        file.listed.iter().map(|own| own.name.clone()).filter(|own| *own != chosen.name).collect();
-    let packing = Packing::of(file.attributes_of(&chosen.name));
+    let mut others: Vec<String> = vec![];
+    for own in &file.listed {
+        let array = file.array(&own.name).ok().flatten().filter(|_| !own.is_numeric);
+        others.extend(array.map_or_else(|| vec![own.name.clone()], |array| array.leaves(&own.name)));
+    }
+    others.retain(|own| own != chosen);
+    let packing = Packing::of(file.attributes_of(chosen));
     // What it is called may have its unit.
     let called_m = SaidOfDepth::of(words).unit_m;
     let unit_m = packing.unit.as_deref().and_then(length_m).or(called_m);
@@ -126,7 +139,7 @@ pub(in super::super) fn read_plane(path: &Path, told: Option<&str>) -> Result<No
     left.retain(|name| called_m.is_none() || called_m != unit_m || !NAMING.contains(&name.as_str()));
     notes.extend(note_of(path, "attribute", &of_file.chain(left).collect::<Vec<_>>()));
     let plane = Plane {
-        name: chosen.name.clone(),
+        name: chosen.clone(),
         values: Array2::from_shape_fn((rows, columns), |place| packing.unpacked(numbers.at(at(place))) as f32),
         top: (numbers.is_integer && !packing.is_packed()).then(|| numbers.top()),
         unit_m,
