@@ -5,7 +5,7 @@ use std::{any::TypeId, ffi::OsString, path::PathBuf};
 use clap::{Arg, Args, CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 use dioptric_pipeline::{
-    BlurSpec, BorderSpec, Crop, DualPixelSpec, ExrSamples, FilterSpec, LensReflections, PipelineError,
+    BlurSpec, BorderSpec, Crop, DngRendering, DualPixelSpec, ExrSamples, FilterSpec, LensReflections, PipelineError,
 };
 
 pub(crate) use crate::common::Common;
@@ -375,11 +375,14 @@ pub(crate) struct FrameArgs {
 /// A raw file to be developed.
 #[derive(Debug, Args)]
 pub(crate) struct DevelopArgs {
-    /// Raw frame, DNG: a mosaic or linear planes of 8 to 16 bits, plain or as lossless JPEG
+    /// Raw frame, DNG: a mosaic or linear planes of 8 to 16 bits or floats, plain, deflated, as JPEG or JPEG XL
     pub(crate) raw: PathBuf,
     /// Takes the frame as the sensor gave it: without the corrections that the file asks for (opcodes: gains, bad pixels, distortion)
     #[arg(long, help_heading = heading::EXPOSURE)]
     pub(crate) ignore_opcodes: bool,
+    /// How far the profile of the file makes the picture [default: colors]
+    #[arg(long, value_enum, hide_possible_values = false, help_heading = heading::EXPOSURE)]
+    pub(crate) rendering: Option<RenderingKind>,
     /// Folder for the results
     #[arg(long, short, value_name = "DIR", help_heading = heading::RESULTS)]
     pub(crate) out: PathBuf,
@@ -391,6 +394,27 @@ pub(crate) struct DevelopArgs {
     pub(crate) also: Option<String>,
     #[command(flatten)]
     pub(crate) picture: PictureArgs,
+}
+
+/// How far the profile of a raw file makes its picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum RenderingKind {
+    /// By its color matrices alone
+    Matrices,
+    /// Also by its map of hues and saturations
+    Colors,
+    /// Also as bright as it asks, with its look table and its tone curve
+    Look,
+}
+
+impl From<RenderingKind> for DngRendering {
+    fn from(kind: RenderingKind) -> Self {
+        match kind {
+            RenderingKind::Matrices => Self::Matrices,
+            RenderingKind::Colors => Self::Colors,
+            RenderingKind::Look => Self::Look,
+        }
+    }
 }
 
 /// What diffraction to compute.

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use dioptric_sensor::{Developed, DngFile, DngOpcodes, Picture, Processing, SensorError};
+use dioptric_sensor::{Developed, DngFile, DngOpcodes, DngRendering, Picture, Processing, SensorError};
 
 use crate::{FrameFile, PipelineError, picture_png, write_file};
 
@@ -24,15 +24,21 @@ impl DevelopedFile {
     /// When it cannot be read, or the processing asks for what such a file does not hold: corrections of a simulated lens, roots
     /// of channels, and what [`DngFile::develop`] refuses.
     pub fn read(path: &Path, processing: Processing) -> Result<Self, PipelineError> {
-        Self::of(DngFile::read(path)?, processing)
+        Self::read_with(path, processing, (DngOpcodes::default(), DngRendering::default()))
     }
 
-    /// Reads a DNG file and develops its frame as the sensor gave it, without the corrections that the file asks for.
+    /// Reads a DNG file and develops its frame with or without the corrections that the file asks for, and as far by its profile as is told.
     ///
     /// # Errors
     /// As [`read`](Self::read).
-    pub fn read_uncorrected(path: &Path, processing: Processing) -> Result<Self, PipelineError> {
-        Self::of(DngFile::read_with(path, DngOpcodes::Ignored)?, processing)
+    pub fn read_with(
+        path: &Path,
+        processing: Processing,
+        (opcodes, rendering): (DngOpcodes, DngRendering),
+    ) -> Result<Self, PipelineError> {
+        let mut file = DngFile::read_with(path, opcodes)?;
+        file.rendering = rendering;
+        Self::of(file, processing)
     }
 
     /// Develops the frame of a file, or one that a program holds as such.

@@ -46,6 +46,7 @@ pub use dioptric_scene::{
     DepthKind, ExrSamples, FileQuantity, FileReading, FillDepth, NoData, Panorama,
     may_be_read_with as may_be_read_with_scene,
 };
+pub use dioptric_sensor::{DngOpcodes, DngRendering};
 
 pub use camera::{
     BlurSpec, BorderSpec, CAMERA_SCHEMA, Camera, CameraTurn, CoatingSpec, Crop, DrawnEye, DualPixelSpec, Exposed,

@@ -6,7 +6,9 @@ use std::{
 };
 
 use dioptric_analysis::DngReport;
-use dioptric_pipeline::{DevelopedFile, PipelineError, SensorSpec, Staged, picture_png, write_json};
+use dioptric_pipeline::{
+    DevelopedFile, DngOpcodes, DngRendering, PipelineError, SensorSpec, Staged, picture_png, write_json,
+};
 use dioptric_sensor::{
     ColorCorrection, Developed as DevelopedPicture, DngFile, Exposure, OwnMosaic, Picture, Processing, Raw,
     Sensor as SensorSheet, ToneCurve,
@@ -166,6 +168,9 @@ impl Developed {
 ///     With ``sensor`` how the frame was exposed (1 s, 1).
 /// illuminant : str, optional
 ///     With ``sensor`` the light on the scene, as ``"D65"``; without it white is the mean of the frame.
+/// rendering : str, optional
+///     How far the profile of a file makes its picture: ``"matrices"``, ``"colors"`` (also its map of hues and saturations; the default)
+///     or ``"look"`` (also its exposure, look table and tone curve).
 /// white, demosaic, denoise, highlights, color, sharpen_px, local_tone, perspective, brightness, curve, space, defect_threshold
 ///     As of `Camera.with_`. ``lens_corrections`` need a simulated lens and are refused.
 ///
@@ -181,8 +186,8 @@ impl Developed {
 ///     The processing asks for what the frame does not hold.
 #[pyfunction]
 #[pyo3(signature = (source, *, cfa=None, black=None, saturation=None, color_matrix=None, sensor=None, exposure_s=None,
-    analog_gain=None, illuminant=None, **options), text_signature = "(source, *, cfa=None, black=None, saturation=None, \
-color_matrix=None, sensor=None, exposure_s=None, analog_gain=None, illuminant=None, white=None, demosaic=None, denoise=None, \
+    analog_gain=None, illuminant=None, rendering=None, **options), text_signature = "(source, *, cfa=None, black=None, saturation=None, \
+color_matrix=None, sensor=None, exposure_s=None, analog_gain=None, illuminant=None, rendering=None, white=None, demosaic=None, denoise=None, \
 highlights=None, lens_corrections=None, color=None, sharpen_px=None, local_tone=None, perspective=None, brightness=None, curve=None, \
 space=None, defect_threshold=None)")]
 #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
@@ -197,6 +202,7 @@ pub(crate) fn develop(
     exposure_s: Option<f64>,
     analog_gain: Option<f64>,
     illuminant: Option<&Bound<'_, PyAny>>,
+    rendering: Option<&str>,
     options: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<Developed> {
     let processing = changed_processing("develop", options)?;
@@ -217,9 +223,11 @@ pub(crate) fn develop(
         let with = [("cfa", cfa.is_some()), ("sensor", sensor.is_some())];
         beside(given(&with).or(given(&of_mosaic)).or(given(&of_sensor)), "it for arrays alone: a file states its own")?;
         let path: PathBuf = source.extract()?;
-        let of = run_apart(py, move |_| DevelopedFile::read(&path, processing))?;
+        let choices = (DngOpcodes::default(), rendering.map_or(Ok(DngRendering::default()), rendering_of)?);
+        let of = run_apart(py, move |_| DevelopedFile::read_with(&path, processing, choices))?;
         return Ok(Developed::new(Frame::File(Box::new(of))));
     }
+    beside(rendering.map(|_| "rendering"), "it for files, which have profiles")?;
     match (cfa, sensor) {
         (Some(_), Some(_)) => Err(wrong("sensor", "given beside cfa", "either of them")),
         (None, None) => Err(wrong("cfa", "missing", "the mosaic of the array, as 'RGGB', or sensor")),
@@ -258,6 +266,12 @@ pub(crate) fn develop(
 }
 
 /// Develops an array as the frame of a file; without a matrix colors are those of the filters, unless others are asked for.
+fn rendering_of(name: &str) -> PyResult<DngRendering> {
+    let known = DngRendering::NAMES;
+    let found = known.iter().find(|(word, _)| *word == name).map(|(_, rendering)| *rendering);
+    found.ok_or_else(|| wrong("rendering", format!("'{name}'"), &known.map(|(word, _)| word).join(", ")))
+}
+
 fn of_mosaic_frame(
     mosaic: OwnMosaic,
     mut processing: Processing,

@@ -5,11 +5,13 @@ mod color;
 mod corrections;
 mod file_camera;
 mod file_color;
+mod file_look;
 mod file_profile;
 mod levels;
 mod lossless_jpeg;
 mod opcodes;
 mod own_mosaic;
+mod pictured;
 mod predictor;
 mod read;
 #[cfg(test)]
@@ -31,6 +33,7 @@ use self::{
 };
 pub use self::{
     file_color::{DngColor, DngLight},
+    file_look::{ColorMap, DngLook, DngRendering},
     file_profile::{DngNoise, DngProfile},
     own_mosaic::OwnMosaic,
     read::{DngFile, DngOpcodes, DngShot, raw_format_by_name, raw_format_of},

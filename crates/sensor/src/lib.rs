@@ -90,8 +90,8 @@ pub use color::{ColorCorrection, ColorMatrix};
 pub use demosaic::{Demosaic, demosaic};
 pub use disparity::{DisparityAxis, DisparityMap, DisparitySearch};
 pub use dng::{
-    DngColor, DngDetails, DngFile, DngLight, DngNoise, DngOpcodes, DngProfile, DngShot, OwnMosaic, raw_format_by_name,
-    raw_format_of,
+    ColorMap, DngColor, DngDetails, DngFile, DngLight, DngLook, DngNoise, DngOpcodes, DngProfile, DngRendering,
+    DngShot, OwnMosaic, raw_format_by_name, raw_format_of,
 };
 pub use error::SensorError;
 pub use exit_pupil::ExitPupil;

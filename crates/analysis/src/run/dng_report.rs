@@ -79,7 +79,7 @@ impl DngReport {
             brightness: developed.brightness,
             processing: processing.clone(),
             opcodes: file.opcodes.clone(),
-            notes: file.notes.iter().cloned().chain(white_note(of)).collect(),
+            notes: file.notes.iter().cloned().chain(file.left_out()).chain(white_note(of)).collect(),
         }
     }
 }

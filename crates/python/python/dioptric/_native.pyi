@@ -329,6 +329,7 @@ def develop(
     exposure_s: float | None = None,
     analog_gain: float | None = None,
     illuminant: str | None = None,
+    rendering: str | None = None,
     white: str | None = ...,
     demosaic: str | None = ...,
     denoise: float | None = ...,

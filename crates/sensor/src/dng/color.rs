@@ -133,7 +133,7 @@ fn balanced_from_xyz(srgb_from_balanced: [[f64; 3]; 3], light: &Illuminant) -> [
 }
 
 /// Returns the inverse of a matrix.
-fn inverse(m: [[f64; 3]; 3]) -> [[f64; 3]; 3] {
+pub(super) fn inverse(m: [[f64; 3]; 3]) -> [[f64; 3]; 3] {
     let minor = |r: usize, c: usize| {
         let (r1, r2, c1, c2) = ((r + 1) % 3, (r + 2) % 3, (c + 1) % 3, (c + 2) % 3);
         m[r1][c1] * m[r2][c2] - m[r1][c2] * m[r2][c1]

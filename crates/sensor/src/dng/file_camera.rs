@@ -4,12 +4,14 @@ use dioptric_spectrum::{Observer, WavelengthGrid, Xyz};
 
 use super::{
     file_color::{DngColor, DngLight},
+    file_look::hue_sat_map,
     file_profile::DngNoise,
     tags::{
         ANALOG_BALANCE, AS_SHOT_NEUTRAL, AS_SHOT_WHITE_XY, CALIBRATION_ILLUMINANT_1, CALIBRATION_ILLUMINANT_2,
         CALIBRATION_ILLUMINANT_3, CAMERA_CALIBRATION_1, CAMERA_CALIBRATION_2, CAMERA_CALIBRATION_3, COLOR_MATRIX_1,
         COLOR_MATRIX_2, COLOR_MATRIX_3, FORWARD_MATRIX_1, FORWARD_MATRIX_2, FORWARD_MATRIX_3, ILLUMINANT_DATA_1,
-        ILLUMINANT_DATA_2, ILLUMINANT_DATA_3, NOISE_PROFILE,
+        ILLUMINANT_DATA_2, ILLUMINANT_DATA_3, NOISE_PROFILE, PROFILE_HUE_SAT_MAP_DATA_1, PROFILE_HUE_SAT_MAP_DATA_2,
+        PROFILE_HUE_SAT_MAP_DATA_3,
     },
     tiff_reader::Fields,
 };
@@ -20,10 +22,19 @@ pub(super) fn color(first: &Fields<'_>, n: usize) -> Result<(Option<DngColor>, O
         return Ok((None, None));
     }
     let mut lights = Vec::new();
-    for (matrix, forward, calibration, illuminant, data) in [
-        (COLOR_MATRIX_1, FORWARD_MATRIX_1, CAMERA_CALIBRATION_1, CALIBRATION_ILLUMINANT_1, ILLUMINANT_DATA_1),
-        (COLOR_MATRIX_2, FORWARD_MATRIX_2, CAMERA_CALIBRATION_2, CALIBRATION_ILLUMINANT_2, ILLUMINANT_DATA_2),
-        (COLOR_MATRIX_3, FORWARD_MATRIX_3, CAMERA_CALIBRATION_3, CALIBRATION_ILLUMINANT_3, ILLUMINANT_DATA_3),
+    for ((matrix, forward, calibration, illuminant, data), map) in [
+        (
+            (COLOR_MATRIX_1, FORWARD_MATRIX_1, CAMERA_CALIBRATION_1, CALIBRATION_ILLUMINANT_1, ILLUMINANT_DATA_1),
+            PROFILE_HUE_SAT_MAP_DATA_1,
+        ),
+        (
+            (COLOR_MATRIX_2, FORWARD_MATRIX_2, CAMERA_CALIBRATION_2, CALIBRATION_ILLUMINANT_2, ILLUMINANT_DATA_2),
+            PROFILE_HUE_SAT_MAP_DATA_2,
+        ),
+        (
+            (COLOR_MATRIX_3, FORWARD_MATRIX_3, CAMERA_CALIBRATION_3, CALIBRATION_ILLUMINANT_3, ILLUMINANT_DATA_3),
+            PROFILE_HUE_SAT_MAP_DATA_3,
+        ),
     ] {
         let Some(rows) = first.finite(matrix, 3 * n)? else { continue };
         let unit = |i: usize| (0..n).map(|j| f64::from(u8::from(i == j))).collect::<Vec<f64>>();
@@ -39,6 +50,7 @@ pub(super) fn color(first: &Fields<'_>, n: usize) -> Result<(Option<DngColor>, O
             camera_from_xyz: rows.chunks_exact(3).map(|row| [row[0], row[1], row[2]]).collect(),
             xyz_d50_from_balanced: forward.map(|rows| [0, 1, 2].map(|i| rows[i * n..(i + 1) * n].to_vec())),
             calibration,
+            map: hue_sat_map(first, map)?,
         });
     }
     let analog_balance = first.finite(ANALOG_BALANCE, n)?.unwrap_or(vec![1.0; n]);

@@ -3,10 +3,11 @@
 use dioptric_spectrum::{ColorTemperature, Illuminant, Xyz, adapt_bradford};
 use serde::Serialize;
 
+use super::file_look::ColorMap;
 use crate::ColorMatrix;
 
 /// The white of the profile connection space, D50.
-const D50_XY: [f64; 2] = [0.3457, 0.3585];
+pub(super) const D50_XY: [f64; 2] = [0.3457, 0.3585];
 
 /// The color matrices of a file, rows by its planes.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -30,6 +31,8 @@ pub struct DngLight {
     pub xyz_d50_from_balanced: Option<[Vec<f64>; 3]>,
     /// A row a plane: what this camera gives of what one of its model gives (`CameraCalibration`).
     pub calibration: Vec<Vec<f64>>,
+    /// What is changed of colors by their hue, saturation and value (`ProfileHueSatMap`); `None` where the file has none.
+    pub map: Option<ColorMap>,
 }
 
 impl DngLight {
@@ -147,6 +150,13 @@ impl DngColor {
         }
     }
 
+    /// Returns the map of hues, saturations and values for a neutral, if the file has any.
+    pub(super) fn map(&self, neutral: &[f64]) -> Option<ColorMap> {
+        let shares = self.shares(self.white_of(neutral));
+        let maps = shares.into_iter().zip(&self.lights).filter_map(|(share, light)| Some((share, light.map.as_ref()?)));
+        ColorMap::mixed(&maps.filter(|(share, _)| *share > 0.0).collect::<Vec<_>>())
+    }
+
     /// Returns what the file's planes are of those of the model: analog balance × calibration.
     fn of_model(&self, at: &AtWhite) -> Vec<Vec<f64>> {
         let scaled = |(row, balance): (&Vec<f64>, &f64)| row.iter().map(|v| v * balance).collect();
@@ -241,7 +251,7 @@ fn to_srgb(to_d50: &[Vec<f64>]) -> Option<ColorMatrix> {
     is_finite.then(|| ColorMatrix { rows, has_roots: false, delta_e: Vec::new() })
 }
 
-fn xyz_of([x, y]: [f64; 2]) -> Xyz {
+pub(super) fn xyz_of([x, y]: [f64; 2]) -> Xyz {
     Xyz([x / y, 1.0, (1.0 - x - y) / y])
 }
 
@@ -286,6 +296,7 @@ mod tests {
             xyz_d50_from_balanced: forward
                 .then(|| [vec![0.6, 0.2, 0.16], vec![0.25, 0.7, 0.05], vec![0.01, 0.02, 0.79]]),
             calibration: (0..3).map(|i| (0..3).map(|j| f64::from(u8::from(i == j))).collect()).collect(),
+            map: None,
         }
     }
 

@@ -7,6 +7,7 @@ use serde::Serialize;
 use super::{
     corrections::{Corrections, Place},
     file_color::DngColor,
+    file_look::DngLook,
 };
 use crate::{
     ColorCorrection, ColorMatrix, Processing, Raw, SensorError, WhiteBalance, denoise::SampleNoise,
@@ -20,6 +21,8 @@ pub struct DngProfile {
     pub filter_names: Vec<String>,
     /// Its colors; `None` of a single filter, and where the file states none.
     pub color: Option<DngColor>,
+    /// What it adds to colors for a look.
+    pub look: DngLook,
     /// Its noise: none where the file states none, one for all filters, or one each.
     pub noise: Vec<DngNoise>,
     /// What is done to demosaiced channels.

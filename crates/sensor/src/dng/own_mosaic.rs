@@ -4,6 +4,7 @@ use ndarray::Array2;
 
 use super::{
     file_color::{DngColor, DngLight},
+    file_look::{DngLook, DngRendering},
     file_profile::DngProfile,
     read::{DngFile, DngShot},
 };
@@ -77,6 +78,7 @@ impl DngFile {
                     camera_from_xyz,
                     xyz_d50_from_balanced: None,
                     calibration: (0..n).map(unit).collect(),
+                    map: None,
                 };
                 Some(DngColor { lights: vec![light], analog_balance: vec![1.0; n] })
             }
@@ -100,10 +102,17 @@ impl DngFile {
             bits: u16::BITS,
             stored: (columns, rows),
             origin: (0, 0),
-            profile: DngProfile { filter_names: names, color, noise: Vec::new(), corrections: None },
+            profile: DngProfile {
+                filter_names: names,
+                color,
+                look: DngLook::default(),
+                noise: Vec::new(),
+                corrections: None,
+            },
             neutral: None,
             orientation: 1,
             shot: DngShot::default(),
+            rendering: DngRendering::default(),
             opcodes: Vec::new(),
             notes: Vec::new(),
             with_border: None,

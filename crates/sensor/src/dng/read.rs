@@ -11,22 +11,22 @@ use super::{
     color::FILTERS,
     corrections::{Corrections, Place},
     file_camera,
+    file_look::{self, DngLook, DngRendering},
     file_profile::{ChannelCorrections, DngProfile},
     levels::FileLevels,
     samples::{self, Codes, Samples},
     tags::{
-        BASELINE_EXPOSURE, CFA_LAYOUT, CFA_PATTERN, CFA_PLANE_COLOR, CFA_REPEAT_PATTERN_DIM, COLOR_FILTER_ARRAY,
-        DEFAULT_SCALE, DNG_VERSION, EXIF_DIRECTORY, EXPOSURE_TIME, F_NUMBER, FOCAL_LENGTH, IMAGE_DESCRIPTION,
-        IMAGE_LENGTH, IMAGE_WIDTH, LENS_MODEL, LINEAR_RAW, MAKE, MODEL, NEW_SUBFILE_TYPE, OPCODE_LIST_1, OPCODE_LIST_2,
+        CFA_LAYOUT, CFA_PATTERN, CFA_PLANE_COLOR, CFA_REPEAT_PATTERN_DIM, COLOR_FILTER_ARRAY, DEFAULT_SCALE,
+        DNG_VERSION, EXIF_DIRECTORY, EXPOSURE_TIME, F_NUMBER, FOCAL_LENGTH, IMAGE_DESCRIPTION, IMAGE_LENGTH,
+        IMAGE_WIDTH, LENS_MODEL, LINEAR_RAW, MAKE, MODEL, NEW_SUBFILE_TYPE, OPCODE_LIST_1, OPCODE_LIST_2,
         OPCODE_LIST_3, ORIENTATION, OWN_MAKE, PHOTOGRAPHIC_SENSITIVITY, PHOTOMETRIC_INTERPRETATION,
-        PROFILE_GAIN_TABLE_MAP, PROFILE_HUE_SAT_MAP_DATA_1, PROFILE_LOOK_TABLE_DATA, PROFILE_TONE_CURVE, RGB_TABLES,
-        SUB_DIRECTORIES,
+        PROFILE_GAIN_TABLE_MAP, RGB_TABLES, SUB_DIRECTORIES,
     },
     tiff_reader::{Fields, TiffReader},
 };
 use crate::{
-    Cfa, Developed, Exposure, Levels, Processing, Raw, RawPlane, SensorError, Tile, WhiteBalance,
-    process::develop_linear,
+    Cfa, ColorCorrection, Developed, Exposure, Levels, LinearPicture, Processing, Raw, RawPlane, SensorError, Tile,
+    WhiteBalance, process::develop_linear,
 };
 
 /// The longest side of a mosaic's tile that is read.
@@ -60,6 +60,8 @@ pub struct DngFile {
     pub orientation: usize,
     /// The camera and how it was set.
     pub shot: DngShot,
+    /// How far its profile makes its picture.
+    pub rendering: DngRendering,
     /// The corrections that the file asks for and that are made, by the names of their opcodes: to the frame, or to its picture.
     pub opcodes: Vec<String>,
     /// What the file asks for and is not done, a sentence each.
@@ -190,7 +192,7 @@ impl DngFile {
             bits: stored.bits,
             stored: (stored.columns, stored.rows),
             origin: (area.left, area.top),
-            profile: DngProfile { filter_names, color, noise, corrections },
+            profile: DngProfile { filter_names, color, look: DngLook::read(&first)?, noise, corrections },
             neutral,
             orientation: Some(first.one_or(ORIENTATION, 1)?).filter(|n| (1..=8).contains(n)).unwrap_or(1),
             shot: DngShot {
@@ -203,6 +205,7 @@ impl DngFile {
                 focal_length_mm: number(FOCAL_LENGTH)?,
                 iso_speed: number(PHOTOGRAPHIC_SENSITIVITY)?,
             },
+            rendering: DngRendering::default(),
             opcodes: lists.names,
             notes,
             with_border,
@@ -232,10 +235,51 @@ impl DngFile {
         let processing = Processing { white, ..processing.clone() };
         self.profile.check_processing(&processing)?;
         let raw = self.with_border.as_ref().unwrap_or(&self.raw);
-        let linear = develop_linear(&self.profile, raw, &processing, None)?;
+        let mut linear = develop_linear(&self.profile, raw, &processing, None)?;
+        // A matrix of one's own, or none, is no part of the profile.
+        if matches!(
+            processing.color,
+            ColorCorrection::Auto | ColorCorrection::AutoUnder(_) | ColorCorrection::Fitted(_)
+        ) {
+            self.render(&mut linear);
+        }
         let mut developed = linear.encode(processing.brightness, processing.curve, processing.space);
         developed.picture = developed.picture.oriented(self.orientation);
         Ok(developed)
+    }
+}
+
+impl DngFile {
+    /// Changes colors as far as the profile is to be followed.
+    fn render(&self, linear: &mut LinearPicture) {
+        let Some(color) = self.profile.color.as_ref().filter(|_| self.rendering != DngRendering::Matrices) else {
+            return;
+        };
+        let neutral: Vec<f64> = linear.balance.iter().map(|gain| 1.0 / gain).collect();
+        let none = DngLook::default();
+        let look = if self.rendering == DngRendering::Look { &self.profile.look } else { &none };
+        file_look::render(&mut linear.light, color.map(&neutral).as_ref(), look);
+    }
+
+    /// Returns what its profile has and its rendering leaves out, a sentence each.
+    pub fn left_out(&self) -> Vec<String> {
+        let look = &self.profile.look;
+        let maps = self.profile.color.iter().flat_map(|color| &color.lights).any(|light| light.map.is_some());
+        let (no_map, no_look) = (self.rendering == DngRendering::Matrices, self.rendering != DngRendering::Look);
+        let parts = [
+            (maps && no_map, "a map of hues and saturations".to_owned()),
+            (
+                look.exposure_stops != 0.0 && no_look,
+                format!("{} stops more brightness (BaselineExposure)", look.exposure_stops),
+            ),
+            (look.table.is_some() && no_look, "a look table".to_owned()),
+            (look.curve.is_some() && no_look, "a tone curve".to_owned()),
+        ];
+        let parts: Vec<String> = parts.into_iter().filter_map(|(is_left, part)| is_left.then_some(part)).collect();
+        if parts.is_empty() {
+            return Vec::new();
+        }
+        vec![format!("the file's profile has {}, left out as the rendering is not `look`", parts.join(", "))]
     }
 }
 
@@ -438,29 +482,13 @@ fn notes(first: &Fields<'_>, frame: &Fields<'_>) -> Result<Vec<String>, String> 
     if let (Some(OWN_MAKE), Some(description)) = (first.text(MAKE).as_deref(), first.text(IMAGE_DESCRIPTION)) {
         notes.push(description);
     }
-    // Some writers state 0 over 0, which is none.
-    let stops = first.numbers(BASELINE_EXPOSURE)?.first().copied().filter(|stops| stops.is_finite()).unwrap_or(0.0);
-    if stops != 0.0 {
-        notes.push(format!(
-            "the file asks for {stops} stops more brightness (BaselineExposure), which is left to `brightness`"
-        ));
-    }
     if frame.numbers(DEFAULT_SCALE)?.iter().any(|scale| *scale != 1.0) {
         notes.push("the file's pixels are not square (DefaultScale), which is left as it is".to_owned());
     }
-    let look = [
-        (PROFILE_HUE_SAT_MAP_DATA_1, "a map of hues and saturations"),
-        (PROFILE_TONE_CURVE, "a tone curve"),
-        (PROFILE_LOOK_TABLE_DATA, "a look table"),
-        (PROFILE_GAIN_TABLE_MAP, "a local map of gains"),
-        (RGB_TABLES, "tables of colors"),
-    ];
+    let look = [(PROFILE_GAIN_TABLE_MAP, "a local map of gains"), (RGB_TABLES, "tables of colors")];
     let look: Vec<&str> = look.into_iter().filter(|(tag, _)| first.has(*tag)).map(|(_, name)| name).collect();
     if !look.is_empty() {
-        notes.push(format!(
-            "the file's profile has {}, which is left out: colors are those of its matrices",
-            look.join(", ")
-        ));
+        notes.push(format!("the file's profile has {}, which is left out", look.join(", ")));
     }
     Ok(notes)
 }

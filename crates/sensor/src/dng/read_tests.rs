@@ -4,7 +4,7 @@ use dioptric_spectrum::{Illuminant, Quantity, SpectralImage, WavelengthGrid};
 use ndarray::Array2;
 
 use super::{
-    DngDetails, DngFile, DngNoise, DngOpcodes,
+    DngDetails, DngFile, DngNoise, DngOpcodes, DngRendering,
     lossless_jpeg::tests::{Coding, encode, uneven},
     tags::*,
     tiff_file::{Directory, Value},
@@ -751,12 +751,19 @@ fn files_that_are_no_such_frames_are_refused_in_a_sentence() {
         let reason = DngFile::from_bytes(&PLAIN.file(change)).unwrap_err();
         assert!(reason.contains(word) && !reason.contains('\n'), "{word}: {reason}");
     };
-    refused("compression 34892", &|d| d.set(COMPRESSION, Value::Short(vec![34_892])));
+    refused("compression 34892 of 14 bits", &|d| d.set(COMPRESSION, Value::Short(vec![34_892])));
+    refused("compression 34713", &|d| d.set(COMPRESSION, Value::Short(vec![34_713])));
     refused("[32] bits", &|d| d.set(BITS_PER_SAMPLE, Value::Short(vec![32])));
     refused("no whole numbers", &|d| d.set(SAMPLE_FORMAT, Value::Short(vec![2])));
     refused("floats of [14] bits", &|d| d.set(SAMPLE_FORMAT, Value::Short(vec![3])));
     refused("deflated samples of 14 bits", &|d| d.set(COMPRESSION, Value::Short(vec![8])));
-    refused("JPEG XL", &|d| d.set(COMPRESSION, Value::Short(vec![52_546])));
+    refused("JPEG XL that cannot be decoded", &|d| d.set(COMPRESSION, Value::Short(vec![52_546])));
+    refused("rows of 14 and columns of 1 fields", &|d| d.set(ROW_INTERLEAVE_FACTOR, Value::Short(vec![14])));
+    refused("color map in field 50938 of 6 numbers", &|d| {
+        d.set(PROFILE_HUE_SAT_MAP_DIMS, Value::Long(vec![1, 3, 1]));
+        d.set(PROFILE_HUE_SAT_MAP_DATA_1, Value::Double(vec![0.0, 1.0, 1.0, 0.0, 1.0, 1.0]));
+    });
+    refused("tone curve", &|d| d.set(PROFILE_TONE_CURVE, Value::Double(vec![0.5, 0.0, 0.5, 1.0])));
     refused("planes one after the other", &|d| d.set(PLANAR_CONFIGURATION, Value::Short(vec![2])));
     refused("no raw frame", &|d| d.set(PHOTOMETRIC_INTERPRETATION, Value::Short(vec![2])));
     refused("mosaic of the size", &|d| d.set(CFA_REPEAT_PATTERN_DIM, Value::Short(vec![2, 99])));
@@ -782,6 +789,80 @@ fn files_that_are_no_such_frames_are_refused_in_a_sentence() {
     refused("ends before", &|d| d.set(STRIP_OFFSETS, Value::Long(vec![1 << 30; 4])));
 }
 
+/// Files of libjxl and libjpeg-turbo (`scripts/dng_pictured.py`), of codes by a formula.
+const PICTURED: [(&str, &[u8]); 7] = [
+    ("mosaic", include_bytes!("../../tests/dng/mosaic.dng")),
+    ("mosaic-10", include_bytes!("../../tests/dng/mosaic-10.dng")),
+    ("mosaic-jpeg", include_bytes!("../../tests/dng/mosaic-jpeg.dng")),
+    ("planes", include_bytes!("../../tests/dng/planes.dng")),
+    ("planes-half", include_bytes!("../../tests/dng/planes-half.dng")),
+    ("planes-jpeg", include_bytes!("../../tests/dng/planes-jpeg.dng")),
+    ("planes-jpeg-rgb", include_bytes!("../../tests/dng/planes-jpeg-rgb.dng")),
+];
+
+#[test]
+fn tiles_that_are_pictures_are_read() {
+    let uneven = |row: usize, column: usize| (row * 977 + column * 701 + (row * column * 37) % 251 * 50) % 65_536;
+    let smooth = |row: usize, column: usize| {
+        [10_000 + 300 * row + 400 * column, 20_000 + 500 * column, 40_000 - 700 * row].map(|code| code as f32)
+    };
+    for (name, bytes) in PICTURED {
+        let file = DngFile::from_bytes(bytes).unwrap_or_else(|reason| panic!("{name} {reason}"));
+        assert_eq!(file.stored, (44, 30), "{name}");
+        // Without loss to the bit; with it within a hundredth of the range, a half float by its own steps.
+        let tolerance = match name {
+            "mosaic" | "mosaic-10" => 1e-6,
+            "planes-half" => 2.5e-4,
+            _ => 0.01,
+        };
+        for (plane, light) in file.raw.linear().iter().enumerate() {
+            for ((row, column), light) in light.indexed_iter() {
+                let wanted = match name {
+                    "mosaic" => uneven(row, column) as f32 / 65_535.0,
+                    "mosaic-10" => (uneven(row, column) >> 6) as f32 / 1023.0,
+                    name if name.contains("jpeg") => (smooth(row, column)[plane] / 256.0).floor() / 255.0,
+                    _ => smooth(row, column)[plane] / 65_535.0,
+                };
+                assert!((light - wanted).abs() <= tolerance, "{name} {plane} {row} {column}: {light} {wanted}");
+            }
+        }
+        file.develop(&Processing::plain()).unwrap();
+    }
+}
+
+/// The map of a profile is followed, its look where that is asked for, and what is left out is said.
+#[test]
+fn profiles_are_followed_as_far_as_asked() {
+    let file = PLAIN.file(|d| {
+        d.set(PROFILE_HUE_SAT_MAP_DIMS, Value::Long(vec![1, 2, 1]));
+        d.set(PROFILE_HUE_SAT_MAP_DATA_1, Value::Double([0.0, 0.0, 1.0].repeat(2)));
+        d.set(BASELINE_EXPOSURE, Value::SignedRational(vec![(-1, 1)]));
+        d.set(PROFILE_TONE_CURVE, Value::Double(vec![0.0, 0.0, 1.0, 0.5]));
+    });
+    let file = DngFile::from_bytes(&file).unwrap();
+    let picture = |rendering: DngRendering| {
+        let file = DngFile { rendering, ..file.clone() };
+        let curve = crate::ToneCurve::Linear;
+        let picture = file.develop(&Processing { curve, ..Processing::plain() }).unwrap().picture.codes;
+        (picture, file.left_out().concat())
+    };
+    let [(plain, left), (gray, less), (look, nothing)] =
+        [DngRendering::Matrices, DngRendering::Colors, DngRendering::Look].map(picture);
+    assert!(left.contains("hues") && left.contains("-1 stops") && less.contains("tone curve"), "{left} {less}");
+    assert!(!less.contains("hues") && nothing.is_empty());
+    let mut colored = 0;
+    for ((plain, gray), look) in plain.outer_iter().zip(gray.outer_iter()).zip(look.outer_iter()) {
+        for ((plain, gray), look) in plain.outer_iter().zip(gray.outer_iter()).zip(look.outer_iter()) {
+            colored += usize::from((plain[0] - plain[1]).abs() > 0.01);
+            // Without saturation all parts are alike; half the light is halved again by the curve.
+            let inside = gray[1] < 0.99;
+            assert!((gray[0] - gray[1]).abs() < 1e-4 && (gray[2] - gray[1]).abs() < 1e-4, "{gray}");
+            assert!(!inside || (look[1] - 0.25 * gray[1]).abs() < 1e-4, "{look} {gray}");
+        }
+    }
+    assert!(colored > 0);
+}
+
 #[test]
 fn mutations_are_read_or_refused() {
     let sensor = small("imx363").with_size(12, 16);
@@ -802,7 +883,8 @@ fn mutations_are_read_or_refused() {
         (state >> 33) as usize % below
     };
     let mut n_read = 0;
-    for whole in [own, jpeg, PLAIN.file(|_| ())] {
+    let pictured = PICTURED.map(|(_, bytes)| bytes.to_vec());
+    for whole in [own, jpeg, PLAIN.file(|_| ())].into_iter().chain(pictured) {
         for _ in 0..1500 {
             let mut bytes = whole.clone();
             for _ in 0..=next(3) {

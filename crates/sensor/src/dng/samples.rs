@@ -1,4 +1,4 @@
-//! The samples of a raw frame in a DNG file: strips or tiles, plain, as lossless JPEG or deflated, whole numbers or floats.
+//! The samples of a raw frame in a DNG file: strips or tiles, plain, deflated, as JPEG without and with loss or as JPEG XL, whole numbers or floats.
 
 use std::{borrow::Cow, io::Read};
 
@@ -7,7 +7,7 @@ use flate2::read::ZlibDecoder;
 use rayon::prelude::*;
 
 use super::{
-    lossless_jpeg,
+    lossless_jpeg, pictured,
     predictor::Predictor,
     tags::{
         BITS_PER_SAMPLE, COLUMN_INTERLEAVE_FACTOR, COMPRESSION, IMAGE_LENGTH, IMAGE_WIDTH, PLANAR_CONFIGURATION,
@@ -27,6 +27,8 @@ const PLAIN: usize = 1;
 const LOSSLESS_JPEG: usize = 7;
 /// Deflated: the number that Adobe uses, and the older one.
 const DEFLATED: [usize; 2] = [8, 32_946];
+const LOSSY_JPEG: usize = 34_892;
+const JPEG_XL: usize = 52_546;
 /// Values of the tag `SampleFormat`.
 const WHOLE: usize = 1;
 const FLOAT: usize = 3;
@@ -68,6 +70,45 @@ impl Samples {
     }
 }
 
+/// A sample of one of the two kinds.
+trait Sample: Copy + Default + Send + Sync {
+    /// Unpacks a row of bytes of so many bits a sample.
+    fn unpack(file: TiffReader<'_>, bits: u32, stored: &[u8], row: &mut [Self]);
+
+    fn of_code(code: u16) -> Self;
+
+    /// Of a share of the highest code.
+    fn of_share(share: f32, top: f32) -> Self;
+}
+
+impl Sample for u16 {
+    fn unpack(file: TiffReader<'_>, bits: u32, stored: &[u8], row: &mut [Self]) {
+        unpack_codes(file, bits, stored, row);
+    }
+
+    fn of_code(code: u16) -> Self {
+        code
+    }
+
+    fn of_share(share: f32, top: f32) -> Self {
+        (share * top).round() as Self
+    }
+}
+
+impl Sample for f32 {
+    fn unpack(file: TiffReader<'_>, bits: u32, stored: &[u8], row: &mut [Self]) {
+        unpack_floats(file, bits, stored, row);
+    }
+
+    fn of_code(code: u16) -> Self {
+        Self::from(code)
+    }
+
+    fn of_share(share: f32, _: f32) -> Self {
+        finite(share)
+    }
+}
+
 /// How the codes of a frame are stored.
 struct Storage<'a> {
     file: TiffReader<'a>,
@@ -84,6 +125,8 @@ struct Storage<'a> {
     /// Whether the last rows of tiles are filled up.
     is_tiled: bool,
     blocks: Vec<&'a [u8]>,
+    /// Of how many fields the rows and the columns are, one field after the other.
+    fields: [usize; 2],
 }
 
 /// Reads the codes of the frame of a directory.
@@ -93,11 +136,7 @@ struct Storage<'a> {
 pub(super) fn read(file: TiffReader<'_>, fields: &Fields<'_>) -> Result<Samples, String> {
     let storage = Storage::new(file, fields)?;
     let Storage { rows, columns, n_planes, bits, .. } = storage;
-    let codes = if storage.is_float {
-        Codes::Floats(storage.samples(0.0, unpack_floats)?)
-    } else {
-        Codes::Whole(storage.samples(0, unpack)?)
-    };
+    let codes = if storage.is_float { Codes::Floats(storage.samples()?) } else { Codes::Whole(storage.samples()?) };
     Ok(Samples { rows, columns, n_planes, bits, codes })
 }
 
@@ -128,24 +167,31 @@ impl<'a> Storage<'a> {
         for (tag, expected, what) in [
             (SAMPLE_FORMAT, if is_float { FLOAT } else { WHOLE }, "samples that are no whole numbers and no floats"),
             (PLANAR_CONFIGURATION, 1, "planes one after the other"),
-            (ROW_INTERLEAVE_FACTOR, 1, "interleaved rows"),
-            (COLUMN_INTERLEAVE_FACTOR, 1, "interleaved columns"),
             (SUB_TILE_BLOCK_SIZE, 1, "blocks within tiles"),
         ] {
             if let Some(other) = fields.whole(tag)?.into_iter().find(|value| *value != expected) {
                 return Err(format!("has {what} (field {tag} is {other}), which is not read"));
             }
         }
-        let is_deflated = DEFLATED.contains(&compression);
-        if ![PLAIN, LOSSLESS_JPEG].contains(&compression) && !is_deflated || (is_float && compression == LOSSLESS_JPEG)
-        {
-            let name = match compression {
-                34_892 => " (lossy JPEG)",
-                52_546 => " (JPEG XL)",
-                _ => "",
-            };
+        let interleaved = [fields.one_or(ROW_INTERLEAVE_FACTOR, 1)?, fields.one_or(COLUMN_INTERLEAVE_FACTOR, 1)?];
+        if !(1..=rows).contains(&interleaved[0]) || !(1..=columns).contains(&interleaved[1]) {
+            let [down, across] = interleaved;
             return Err(format!(
-                "has compression {compression}{name}, expected none (1), lossless JPEG (7) or deflate (8); a DNG converter makes such a file"
+                "has rows of {down} and columns of {across} fields, expected at least 1 and no more than there are"
+            ));
+        }
+        let is_deflated = DEFLATED.contains(&compression);
+        let is_known = match compression {
+            PLAIN | JPEG_XL => true,
+            LOSSLESS_JPEG => !is_float,
+            LOSSY_JPEG => !is_float && depth == 8,
+            _ => is_deflated,
+        };
+        if !is_known {
+            return Err(format!(
+                "has compression {compression} of {}, expected none (1), lossless JPEG of whole numbers (7), deflate (8), JPEG of 8 bits (34892) \
+                 or JPEG XL (52546); a DNG converter makes such a file",
+                if is_float { "floats".to_owned() } else { format!("{depth} bits") }
             ));
         }
         if is_deflated && ![8, 16, 24, 32].contains(&depth) {
@@ -190,19 +236,18 @@ impl<'a> Storage<'a> {
             tile_columns,
             is_tiled,
             blocks,
+            fields: interleaved,
         })
     }
 
-    /// Reads all samples; `unpack` takes a row of a block's bytes apart.
-    fn samples<T: Copy + Send + Sync + From<u16>>(
-        &self,
-        none: T,
-        unpack: impl Fn(TiffReader<'_>, u32, &[u8], &mut [T]) + Sync,
-    ) -> Result<Vec<T>, String> {
+    /// Reads all samples.
+    fn samples<T: Sample>(&self) -> Result<Vec<T>, String> {
         let line = self.columns * self.n_planes;
         let n_samples = self.rows.checked_mul(line).filter(|n| match self.compression {
             PLAIN => n / 8 * self.bits as usize <= self.file.n_bytes(),
             LOSSLESS_JPEG => n / 8 <= self.file.n_bytes(),
+            // An even picture takes no more than its header.
+            LOSSY_JPEG | JPEG_XL => true,
             _ => n / MOST_DEFLATED <= self.file.n_bytes(),
         });
         let Some(n_samples) = n_samples else {
@@ -213,7 +258,7 @@ impl<'a> Storage<'a> {
                 self.file.n_bytes()
             ));
         };
-        let mut codes = vec![none; n_samples];
+        let mut codes = vec![T::default(); n_samples];
         let n_across = self.columns.div_ceil(self.tile_columns);
         // One row of tiles after the other; the first reason counts, whatever the threads.
         let reasons: Vec<Result<(), String>> = codes
@@ -222,22 +267,39 @@ impl<'a> Storage<'a> {
             .map(|(rows, blocks)| {
                 let n_rows = rows.len() / line;
                 for (number, block) in blocks.iter().enumerate() {
-                    self.read_block(block, number * self.tile_columns, (&mut *rows, n_rows), &unpack)?;
+                    self.read_block(block, number * self.tile_columns, (&mut *rows, n_rows))?;
                 }
                 Ok(())
             })
             .collect();
         reasons.into_iter().collect::<Result<(), _>>()?;
-        Ok(codes)
+        Ok(if self.fields == [1, 1] { codes } else { self.woven(&codes) })
+    }
+
+    /// Returns samples whose rows and columns stand field by field, the first of each n, then the second of each, in their order (DNG 1.7,
+    /// `RowInterleaveFactor`).
+    fn woven<T: Sample>(&self, stored: &[T]) -> Vec<T> {
+        let places = |n: usize, fields: usize| -> Vec<usize> {
+            (0..fields).flat_map(|field| (field..n).step_by(fields)).collect()
+        };
+        let (to_rows, to_columns) = (places(self.rows, self.fields[0]), places(self.columns, self.fields[1]));
+        let line = self.columns * self.n_planes;
+        let mut woven = vec![T::default(); stored.len()];
+        for (stored, row) in stored.chunks_exact(line).zip(to_rows) {
+            let woven = &mut woven[row * line..][..line];
+            for (pixel, column) in stored.chunks_exact(self.n_planes).zip(&to_columns) {
+                woven[column * self.n_planes..][..self.n_planes].copy_from_slice(pixel);
+            }
+        }
+        woven
     }
 
     /// Reads a strip or tile whose first column is given into the rows that it covers.
-    fn read_block<T: Copy + From<u16>>(
+    fn read_block<T: Sample>(
         &self,
         block: &[u8],
         first: usize,
         (rows, n_rows): (&mut [T], usize),
-        unpack: &impl Fn(TiffReader<'_>, u32, &[u8], &mut [T]),
     ) -> Result<(), String> {
         let line = self.columns * self.n_planes;
         let stored_line = self.tile_columns * self.n_planes;
@@ -245,22 +307,34 @@ impl<'a> Storage<'a> {
         let n = self.tile_columns.min(self.columns - first) * self.n_planes;
         let from = first * self.n_planes;
         let lines = rows.chunks_exact_mut(line).map(|row| &mut row[from..from + n]);
-        if self.compression == LOSSLESS_JPEG {
-            let n_stored = stored_rows.checked_mul(stored_line).ok_or("has tiles without end")?;
-            let decoded =
-                lossless_jpeg::decode(block, n_stored).map_err(|reason| format!("has samples that {reason}"))?;
+        let n_stored = stored_rows.checked_mul(stored_line).ok_or("has tiles without end")?;
+        let size = pictured::Size { rows: stored_rows, columns: self.tile_columns, n_planes: self.n_planes };
+        let samples: Vec<T> = match self.compression {
             // However many rows and components these are: the samples of a tile follow one another.
-            lines.zip(decoded.samples.chunks_exact(stored_line)).for_each(|(row, stored)| {
-                row.iter_mut().zip(stored).for_each(|(sample, &code)| *sample = T::from(code));
-            });
-            return Ok(());
-        }
-        let n_bytes = stored_line.checked_mul(self.bits as usize).ok_or("has tiles without end")?.div_ceil(8);
-        let block = self.inflated(block, n_bytes, stored_rows)?;
-        if n_bytes.checked_mul(n_rows).is_none_or(|all| all > block.len()) {
-            return Err(format!("has {} bytes in a strip or tile, expected {n_rows} rows of {n_bytes}", block.len()));
-        }
-        lines.zip(block.chunks_exact(n_bytes)).for_each(|(row, stored)| unpack(self.file, self.bits, stored, row));
+            LOSSLESS_JPEG => {
+                let decoded =
+                    lossless_jpeg::decode(block, n_stored).map_err(|reason| format!("has samples that {reason}"))?;
+                decoded.samples.into_iter().map(T::of_code).collect()
+            }
+            LOSSY_JPEG => pictured::jpeg(block, size)?.into_iter().map(|code| T::of_code(u16::from(code))).collect(),
+            JPEG_XL => {
+                let top = ((1_u64 << self.bits) - 1) as f32;
+                pictured::jpeg_xl(block, size)?.into_iter().map(|share| T::of_share(share, top)).collect()
+            }
+            _ => {
+                let n_bytes = stored_line.checked_mul(self.bits as usize).ok_or("has tiles without end")?.div_ceil(8);
+                let block = self.inflated(block, n_bytes, stored_rows)?;
+                if n_bytes.checked_mul(n_rows).is_none_or(|all| all > block.len()) {
+                    let n = block.len();
+                    return Err(format!("has {n} bytes in a strip or tile, expected {n_rows} rows of {n_bytes}"));
+                }
+                lines
+                    .zip(block.chunks_exact(n_bytes))
+                    .for_each(|(row, stored)| T::unpack(self.file, self.bits, stored, row));
+                return Ok(());
+            }
+        };
+        lines.zip(samples.chunks_exact(stored_line)).for_each(|(row, stored)| row.copy_from_slice(&stored[..n]));
         Ok(())
     }
 
@@ -284,7 +358,7 @@ impl<'a> Storage<'a> {
 }
 
 /// Unpacks a row of whole numbers: bytes, shorts, or bits of which the first are highest (DNG 1.4, `BitsPerSample`).
-fn unpack(file: TiffReader<'_>, bits: u32, stored: &[u8], row: &mut [u16]) {
+fn unpack_codes(file: TiffReader<'_>, bits: u32, stored: &[u8], row: &mut [u16]) {
     match bits {
         8 => row.iter_mut().zip(stored).for_each(|(code, &byte)| *code = u16::from(byte)),
         16 => row.iter_mut().zip(stored.chunks_exact(2)).for_each(|(code, pair)| {
@@ -316,8 +390,12 @@ fn unpack_floats(file: TiffReader<'_>, bits: u32, stored: &[u8], row: &mut [f32]
             24 => small_float(word, 7, 16),
             _ => f32::from_bits(word),
         };
-        *value = if float.is_finite() { float } else { 0.0 };
+        *value = finite(float);
     }
+}
+
+fn finite(value: f32) -> f32 {
+    if value.is_finite() { value } else { 0.0 }
 }
 
 /// Returns a float of a sign, so many bits of exponent and so many of fraction.

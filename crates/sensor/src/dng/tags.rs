@@ -94,9 +94,17 @@ pub(super) const ILLUMINANT_DATA_1: u16 = 52533;
 pub(super) const ILLUMINANT_DATA_2: u16 = 52534;
 pub(super) const ILLUMINANT_DATA_3: u16 = 52535;
 
-/// Fields of a profile's look, which are noted.
+/// Fields of a profile's look.
+pub(super) const PROFILE_HUE_SAT_MAP_DIMS: u16 = 50937;
 pub(super) const PROFILE_HUE_SAT_MAP_DATA_1: u16 = 50938;
+pub(super) const PROFILE_HUE_SAT_MAP_DATA_2: u16 = 50939;
 pub(super) const PROFILE_TONE_CURVE: u16 = 50940;
+pub(super) const PROFILE_LOOK_TABLE_DIMS: u16 = 50981;
 pub(super) const PROFILE_LOOK_TABLE_DATA: u16 = 50982;
+pub(super) const PROFILE_HUE_SAT_MAP_ENCODING: u16 = 51107;
+pub(super) const PROFILE_LOOK_TABLE_ENCODING: u16 = 51108;
+pub(super) const BASELINE_EXPOSURE_OFFSET: u16 = 51109;
+pub(super) const PROFILE_HUE_SAT_MAP_DATA_3: u16 = 52537;
+/// Those of it that are noted.
 pub(super) const PROFILE_GAIN_TABLE_MAP: u16 = 52525;
 pub(super) const RGB_TABLES: u16 = 52543;
