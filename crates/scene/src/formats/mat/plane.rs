@@ -13,6 +13,7 @@ use super::{
         unusable::unreadable,
     },
     container::{MatFile, WHOLE},
+    elements::Listed,
     hdf5::NAMING,
     packing::Packing,
 };
