@@ -204,15 +204,16 @@ fn listing(folder: &Path) -> Result<Listing, SceneError> {
             None => unused.push(name_of(&path)),
         }
     }
-    // Bands are called alike before their numbers.
+    // Bands are called alike before their numbers: one of another name is none of them.
     let start = |path: &Path| {
         let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         stem.trim_end_matches(|c: char| c.is_ascii_digit() || ".nmto_- ".contains(c)).to_owned()
     };
-    let n_called = |own: &str| pictures.iter().filter(|(_, path)| start(path) == own).count();
-    let usual = pictures.iter().map(|(_, path)| start(path)).max_by_key(|own| n_called(own)).unwrap_or_default();
-    if 2 * n_called(&usual) > pictures.len() {
-        unused.extend(pictures.extract_if(.., |(_, path)| start(path) != usual).map(|(_, path)| name_of(&path)));
+    let starts: Vec<String> = pictures.iter().map(|(_, path)| start(path)).collect();
+    let n_called = |own: &String| starts.iter().filter(|start| *start == own).count();
+    if starts.iter().map(n_called).max().is_some_and(|most| most > 2 && 2 * most > starts.len()) {
+        let odd = pictures.extract_if(.., |(_, path)| n_called(&start(path)) == 1);
+        unused.extend(odd.map(|(_, path)| name_of(&path)));
     }
     pictures.sort_by(|a, b| a.0.total_cmp(&b.0).then_with(|| a.1.cmp(&b.1)));
     unused.sort();
@@ -357,6 +358,20 @@ mod tests {
         let notes = band_folder(folder.path(), &ReadOptions::default()).unwrap().notes.join(" ");
         let named = ["'depth.png'", "'exposure.json'", "readme.md", "README.txt", "wavelengths.csv"];
         assert_eq!(named.map(|name| notes.contains(name)), [true, true, false, false, false], "{notes}");
+    }
+
+    #[test]
+    fn a_picture_of_another_name_is_no_band() {
+        for (names, n_bands) in [
+            (&["b_450.png", "b_500.png", "b_560.png", "photo_2024.png"][..], 3),
+            (&["blue_450.png", "green_550.png", "red_650.png"], 3),
+            (&["vis_450.png", "vis_550.png", "vis_650.png", "nir_850.png", "nir_900.png"], 5),
+        ] {
+            let folder = folder_of(names);
+            let cube = band_folder(folder.path(), &ReadOptions::default()).unwrap();
+            assert_eq!(cube.planes.len(), n_bands, "{names:?}");
+            assert_eq!(cube.notes.join(" ").contains("'photo_2024.png'"), n_bands < names.len(), "{names:?}");
+        }
     }
 
     #[test]

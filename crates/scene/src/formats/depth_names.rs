@@ -17,7 +17,7 @@ pub(super) struct SaidOfDepth {
 
 const DEPTHS: [&str; 4] = ["depth", "depths", "depthmap", "z"];
 const DISTANCES: [&str; 3] = ["distance", "distances", "dist"];
-const RAYS: [&str; 7] = ["ray", "rays", "radial", "euclidean", "slant", "sight", "range"];
+const RAYS: [&str; 9] = ["ray", "rays", "raydepth", "radial", "euclidean", "slant", "slantrange", "sight", "range"];
 const MIST: &str = "its name says that it is a mist, whose numbers are no lengths: expected the pass of depth (Z), or --depth-unit or --depth-kind";
 const INVERSE: &str = "its name or words say that it holds disparities or inverse distances: expected --depth-kind, as disparity:BASELINE_M or inverse";
 const RELATIVE: &str = "its name or words say that its numbers are relative, or logarithms, and no lengths: expected lengths, or --depth-unit or --depth-kind";
@@ -48,7 +48,7 @@ impl SaidOfDepth {
         };
         const LENGTHS: [&str; 7] = ["depth", "depths", "distance", "distances", "dist", "length", "lengths"];
         let is_axial = has(&["axial", "planar"]) || has_pair(&own, &["image"], &["plane"]);
-        let radial = has(&["radial", "euclidean"])
+        let radial = has(&["radial", "euclidean", "raydepth", "slantrange"])
             || is_last(&DISTANCES)
             || is_last(&["range"])
             || has_pair(&own, &DISTANCES, &["to", "from"])
@@ -85,8 +85,10 @@ pub(super) fn words_of(name: &str) -> Vec<String> {
     }
     let words = apart.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty()).map(str::to_lowercase);
     // A unit may stand without a gap, as in depthmm.
-    let parts = |word: String| match word.strip_prefix("depth").filter(|rest| length_m(rest).is_some()) {
-        Some(unit) => vec!["depth".to_owned(), unit.to_owned()],
+    let with_unit =
+        |word: &str, name: &str| word.strip_prefix(name).filter(|rest| length_m(rest).is_some()).map(str::to_owned);
+    let parts = |word: String| match ["depth", "z"].iter().find_map(|name| Some((name, with_unit(&word, name)?))) {
+        Some((name, unit)) => vec![(*name).to_owned(), unit],
         None => vec![word],
     };
     words.flat_map(parts).collect()
@@ -170,6 +172,7 @@ mod tests {
                 "depth_mm_raw",
                 "mm_depth",
                 "depthmm",
+                "Zmm",
                 "depthInMillimeters",
                 "depth_mm_0001",
                 "0001_depth_mm",
@@ -216,6 +219,8 @@ mod tests {
             "dist_to_camera",
             "img_0_DepthPerspective",
             "distance_mm",
+            "raydepth",
+            "slantrange_mm",
         ] {
             assert_eq!(both(name), [Some(true); 2], "{name}");
         }

@@ -469,11 +469,15 @@ fn nothing_can_be_said_of_a_scene_of_isetcam() {
         (FileReading { axes: Some("yxb".to_owned()), ..FileReading::default() }, "--axes"),
         (FileReading { unit: Some("W/m^2/sr/nm".to_owned()), ..FileReading::default() }, "--unit"),
         (FileReading { scale: Some(2.0), ..FileReading::default() }, "--scale"),
-        (FileReading { variable: Some("scene".to_owned()), ..FileReading::default() }, "scene"),
+        (FileReading { variable: Some("data".to_owned()), ..FileReading::default() }, "data"),
     ] {
         let message = read_scene(&path, &ReadOptions { reading, ..ReadOptions::default() }).unwrap_err().to_string();
         assert!(message.contains(word), "{message}");
     }
+    // It may be called by its name, whatever that is.
+    let reading = FileReading { variable: Some("scene".to_owned()), ..FileReading::default() };
+    let named = read_scene(&path, &ReadOptions { reading, ..ReadOptions::default() }).unwrap();
+    assert_eq!(named.radiance, read_scene(&path, &ReadOptions::default()).unwrap().radiance);
 }
 
 /// The frame of a picture in nerfstudio's file names its depth, in millimetres unless the file says otherwise.

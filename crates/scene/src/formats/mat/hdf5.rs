@@ -350,6 +350,8 @@ fn broken(error: hdf5_pure::Error) -> String {
         Some("its numbers in the file itself (h5repack --layout=CONTI)")
     } else if said.contains("unsupported filter") {
         Some("none of its filters, or gzip (h5repack -f GZIP=4)")
+    } else if said.contains("continuation depth") {
+        Some("its attributes in fewer pieces (h5repack)")
     } else if said.contains("unsupported") {
         Some("one that older programs read as well (h5repack --high=V18)")
     } else {

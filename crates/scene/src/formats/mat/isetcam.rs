@@ -121,7 +121,12 @@ pub(in super::super) fn read_mat(path: &Path, reading: &FileReading) -> Result<M
     let names: Vec<&str> = file.listed.iter().map(|own| own.name.as_str()).collect();
     let has = |name: &str| names.contains(&name);
     if told.is_none() && (has("scene") || has("mcCOEF") || has("photons")) {
-        return of_iset(path, &file).map(MatScene::Iset);
+        return of_iset(path, &file, "scene").map(MatScene::Iset);
+    }
+    if let Some(told) = told
+        && file.array(told).map_err(wrong)?.is_some_and(|own| is_scene(&own))
+    {
+        return of_iset(path, &file, told).map(MatScene::Iset);
     }
     if told.is_none()
         && !file.listed.iter().any(is_cube)
@@ -137,7 +142,7 @@ pub(in super::super) fn read_mat(path: &Path, reading: &FileReading) -> Result<M
     {
         let most = data.list().unwrap_or_default().into_iter().fold(0.0, f64::max);
         if most > LEAST_PHOTONS {
-            let mut scene = of_iset(path, &file)?;
+            let mut scene = of_iset(path, &file, "scene")?;
             let note = format!("its 'data' are taken for photons, since they are up to {most:.1e} (--quantity)");
             scene.notes.push(note);
             return Ok(MatScene::Iset(scene));
@@ -163,6 +168,11 @@ pub(in super::super) fn read_mat(path: &Path, reading: &FileReading) -> Result<M
                 return Err(wrong(complex(&names.collect::<Vec<_>>().join(", "))));
             }
             [] => {
+                let is_table = |own: &&Listed| own.is_numeric && own.sides.len() == 2 && !own.sides.contains(&1);
+                if file.listed.iter().any(|own| is_list(own)) && file.listed.iter().filter(is_table).count() == 1 {
+                    let way = "it holds spectra, a table with wavelengths, and no scene: expected a chart of them as .csv, wavelengths in nm and a reflectance a column";
+                    return Err(wrong(way.to_owned()));
+                }
                 let others = file.listed.iter().filter(|own| matches!(own.sides.len(), 0 | 3) && !own.is_numeric);
                 let names = others.map(|own| format!(", and its '{}' has no numbers that are read", own.name));
                 let expected =
@@ -187,11 +197,19 @@ pub(in super::super) fn read_mat(path: &Path, reading: &FileReading) -> Result<M
     Ok(MatScene::Cube(cube))
 }
 
-/// Returns the arrays of numbers in the structures of a file, as `data.cube`, and the lengths of their sides.
+/// Returns the arrays of numbers in the structures of a file, as `data.cube`, and the lengths of their sides; a scene of `ISETCam` as one.
 fn in_structures(path: &Path) -> Result<Vec<(String, Vec<usize>)>, SceneError> {
     let file = MatFile::read(path, &|own| !own.is_numeric)?;
     let arrays = file.listed.iter().filter(|own| !own.is_numeric).map(|own| (own, file.array(&own.name)));
-    Ok(arrays.filter_map(|(own, array)| Some(array.ok()??.numeric_fields(&own.name))).flatten().collect())
+    let of = |(own, array): (&Listed, Result<Option<MatArray<'_>>, String>)| {
+        let array = array.ok()??;
+        let sides = || array.field("data").and_then(|data| data.field("photons")).map(|own| own.sides.clone());
+        Some(match is_scene(&array) {
+            true => vec![(own.name.clone(), sides().unwrap_or_default())],
+            false => array.numeric_fields(&own.name),
+        })
+    };
+    Ok(arrays.filter_map(of).flatten().collect())
 }
 
 /// Returns the name of an array without the groups that it is in.
@@ -324,7 +342,8 @@ fn waves_of(file: &MatFile, cube: &str, sides: &[usize], is_told: bool) -> Resul
         _ => None,
     });
     let is_along = |own: &String| {
-        let is_scale = file.words_of(own).1.iter().any(|axis| axes.contains(axis));
+        let is_own = |axis: &String| axis.split(" or ").any(|name| name == last_part(own));
+        let is_scale = axes.iter().any(is_own) || file.words_of(own).1.iter().any(|axis| axes.contains(axis));
         is_scale || coordinates.is_some_and(|all| all.split_whitespace().any(|word| word == last_part(own)))
     };
     lists.sort_by_key(|own| (!is_along(own), Nearness::of(cube, own), rank(own)));
@@ -365,10 +384,16 @@ fn waves_of(file: &MatFile, cube: &str, sides: &[usize], is_told: bool) -> Resul
     Ok(nearest.map(|(name, nm)| Waves { name, nm, left }))
 }
 
-/// Reads a scene of `ISETCam`.
-fn of_iset(path: &Path, file: &MatFile) -> Result<IsetScene, SceneError> {
+/// Whether a structure is a scene of `ISETCam`.
+fn is_scene(array: &MatArray<'_>) -> bool {
+    let has = |outer: &str, inner: &str| array.field(outer).is_some_and(|own| own.field(inner).is_some());
+    has("data", "photons") && (has("spectrum", "wave") || array.field("wave").is_some())
+}
+
+/// Reads a scene of `ISETCam`, a structure of this name or variables.
+fn of_iset(path: &Path, file: &MatFile, name: &str) -> Result<IsetScene, SceneError> {
     let wrong = |reason: String| unreadable(path, reason);
-    let Raw { planes, wave_nm, light, depth_m, distance_m, horizontal_fov_deg } = Raw::of(file).map_err(wrong)?;
+    let Raw { planes, wave_nm, light, depth_m, distance_m, horizontal_fov_deg } = Raw::of(file, name).map_err(wrong)?;
     let values = |reason| SceneError::Values { file: path.to_owned(), reason };
     let order = wavelength_unit::ascending(path, &wave_nm, 0..wave_nm.len())?;
     let grid = WavelengthGrid::new(order.iter().map(|&band| wave_nm[band]).collect()).map_err(values)?;
@@ -376,7 +401,7 @@ fn of_iset(path: &Path, file: &MatFile) -> Result<IsetScene, SceneError> {
     let planes = order.iter().filter_map(|&band| planes[band].take()).collect();
     let image = SpectralImage::new(Quantity::Radiance, grid, planes).map_err(values)?;
     let light = light.map(|spectrum| light_of(&spectrum)).transpose().map_err(wrong)?;
-    let mut notes = unused_of(path, file, light.is_some()).map_err(wrong)?;
+    let mut notes = unused_of(path, file, name, light.is_some()).map_err(wrong)?;
     if let (Some(map), Some(distance_m)) = (&depth_m, distance_m) {
         let measured = map.iter().map(|z| f64::from(*z)).filter(|z| z.is_finite() && *z > 0.0);
         let [near_m, far_m] = measured.fold([f64::INFINITY, 0.0], |[near, far], z| [near.min(z), far.max(z)]);
@@ -404,16 +429,16 @@ fn note_of_elements(path: &Path, file: &MatFile, name: &str) -> Option<String> {
 }
 
 /// Returns notes of the variables and the fields of a scene that are not used.
-fn unused_of(path: &Path, file: &MatFile, is_lit: bool) -> Result<Vec<String>, String> {
+fn unused_of(path: &Path, file: &MatFile, own: &str, is_lit: bool) -> Result<Vec<String>, String> {
     let names = file.listed.iter().map(|own| own.name.clone());
     let ours = |name: &str| WANTED.contains(&name) || ["dist", "data", "comment", "name"].contains(&name);
-    let scene = file.array("scene")?;
-    let is_only = |name: &str| scene.is_none() || name == "scene";
-    let variables: Vec<String> = names.filter(|name| !(ours(name) && is_only(name))).collect();
+    let scene = file.array(own)?;
+    let is_used = |name: &str| if scene.is_some() { name == own } else { ours(name) };
+    let variables: Vec<String> = names.filter(|name| !is_used(name)).collect();
     let mut notes: Vec<String> = note_of(path, "variable", &variables).into_iter().collect();
-    notes.extend(scene.as_ref().and_then(|_| note_of_elements(path, file, "scene")));
+    notes.extend(scene.as_ref().and_then(|_| note_of_elements(path, file, own)));
     if let Some(scene) = &scene {
-        notes.extend(note_of(path, "field", &iset_kinds::left_of(scene, "scene", &HARMLESS)));
+        notes.extend(note_of(path, "field", &iset_kinds::left_of(scene, own, &HARMLESS)));
     }
     let light = match &scene {
         Some(scene) => scene.field("illuminant").cloned(),
@@ -454,8 +479,8 @@ struct Raw {
 }
 
 impl Raw {
-    fn of(file: &MatFile) -> Result<Self, String> {
-        if let Some(scene) = file.array("scene")? {
+    fn of(file: &MatFile, name: &str) -> Result<Self, String> {
+        if let Some(scene) = file.array(name)? {
             return Self::of_scene(&scene);
         }
         let list_of = |names: [&str; 2]| -> Result<Option<Vec<f64>>, String> {
