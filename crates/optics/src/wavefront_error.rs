@@ -303,7 +303,7 @@ pub(crate) struct WavefrontMaps {
     /// Where the object plane appears to the surface, from it; −∞ of a far one.
     object_z_mm: f64,
     /// Whether light is met that goes back towards the object, its z mirrored.
-    is_met_from_behind: bool,
+    pub(crate) is_met_from_behind: bool,
 }
 
 /// Where a ray meets a surface and which way it goes, its z above 0.
