@@ -176,6 +176,27 @@ impl LensFile {
         lens.film_distance_mm_for(self.object_distance_mm.unwrap_or(f64::INFINITY)).ok().filter(|mm| mm.is_finite())
     }
 
+    /// Returns the states for a format in which all have as many fields of one kind: those without take the angles of the first that has any.
+    pub(super) fn states_with_fields(&self) -> Vec<Self> {
+        let mut states = self.states();
+        if let Some(number) = self.lends_fields() {
+            let Self { fields, field_weights, .. } = states[number - 1].clone();
+            for state in states.iter_mut().filter(|state| state.fields.is_empty()) {
+                (state.fields, state.field_weights) = (fields.clone(), field_weights.clone());
+            }
+        }
+        states
+    }
+
+    /// The number of the configuration whose fields those take that state none, where there are both.
+    fn lends_fields(&self) -> Option<usize> {
+        let states = self.states();
+        let are_angles = |state: &Self| state.fields.iter().all(|field| matches!(field, Field::Angle { .. }));
+        let first = states.iter().position(|state| !state.fields.is_empty())?;
+        let asks = states.iter().any(|state| state.fields.is_empty());
+        (asks && are_angles(&states[first])).then_some(first + 1)
+    }
+
     /// Returns the kind of the fields (angles 0, object heights 1, paraxial image heights 2, real ones 3), and their x and y.
     pub(super) fn fields_of_one_kind(&self, format: &'static str) -> Result<(usize, [Vec<f64>; 2]), OpticsError> {
         let of = |field: &Field| match *field {
@@ -245,6 +266,9 @@ impl LensFile {
                 "a .seq file does not say which configuration is in use: it is read with number 1, not {}",
                 self.configuration
             ));
+        }
+        if let (Some(number), "zmx" | "seq") = (self.lends_fields(), extension) {
+            notes.push(format!("configurations that state no fields have the angles of number {number}"));
         }
         if matches!(extension, "zmx" | "seq") && self.film_distance_mm.is_none() {
             notes.push(match self.focus_mm() {

@@ -198,3 +198,25 @@ fn what_a_bench_file_has_wrong_is_said_with_its_line() {
     let message = of_lens(&text.replace("focal_length", "focal")).unwrap_err().to_string();
     assert!(message.contains("a.lens:2: 'focal: 50' is not known"), "{message}");
 }
+
+/// A focus at a near object states no angle of view: formats in which all configurations have fields give it those of the far one.
+#[test]
+fn configurations_without_fields_are_written_with_those_of_another() {
+    let text = "[descriptive data]\ntitle\tA\n[variable distances]\nAngle of View\t40\tUndefined\nd0\tInfinity\t500\nBf\t40\t45\n\
+                [lens data]\n1\t50\t5\t1.5\t20\t60\n2AS\tAS\t1\t\t15\n3\t-50\tBf\t\t20\n";
+    let read = |name: &str, text: &str| {
+        LensFile::from_bytes(Path::new(name), text.as_bytes(), &ReadOptions::default()).unwrap()
+    };
+    let file = read("a.txt", text);
+    let fields_of = |file: &LensFile| file.states().into_iter().map(|state| state.fields).collect::<Vec<_>>();
+    let [far, near] = &fields_of(&file)[..] else { panic!("two configurations") };
+    assert!(!far.is_empty() && near.is_empty());
+    for (name, written) in [("a.zmx", file.to_zmx().unwrap()), ("a.seq", file.to_seq().unwrap())] {
+        let again = read(name, &written);
+        assert_eq!(fields_of(&again), [far.clone(), far.clone()], "{name}");
+        assert_eq!(again.states()[1].object_distance_mm, Some(500.0), "{name}");
+        let notes = file.left_out(&name[2..]);
+        assert!(notes.iter().any(|note| note.contains("have the angles of number 1")), "{name}: {notes:?}");
+    }
+    assert!(!file.left_out("ron").iter().any(|note| note.contains("angles")));
+}

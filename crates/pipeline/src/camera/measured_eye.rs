@@ -39,6 +39,9 @@ const WAVELENGTH_NM: f64 = 550.0;
 const RETINA_MM: f64 = 17.187;
 /// How far below 0 a variance may be by rounding, as a share of the largest.
 const ROUNDING: f64 = 1e-9;
+/// The most coefficients of a wavefront error.
+const MOST_TERMS: usize = 231;
+
 /// A record of a table of coefficients.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -163,9 +166,6 @@ fn bands_of_table(text: &str) -> Result<Vec<WavefrontBand>, String> {
     all.filter(|um| um.is_nan()).for_each(|um| *um = 0.0);
     if bands.is_empty() { Err("it has no coefficients".to_owned()) } else { Ok(bands) }
 }
-
-/// The most coefficients of a wavefront error.
-const MOST_TERMS: usize = 231;
 
 /// Returns the coefficients of an eye that is drawn from statistics.
 fn drawn_from(statistics: &Statistics, drawn: DrawnEye) -> Result<Vec<f64>, String> {
