@@ -213,15 +213,24 @@ impl PupilSamples {
     /// # Errors
     /// When the window makes no sense or needs more nodes than there are.
     pub fn psf(&self, window: &WaveWindow, points_per_pixel: Option<usize>) -> Result<WavePsf, DiffractionError> {
-        let extent_mm = window.check()?;
-        let center_mm = window.center.on_film_mm(|| self.centroid_mm());
-        if center_mm != self.reference_mm {
-            return self
-                .clone()
-                .about(center_mm)
-                .psf(&WaveWindow { center: WindowCenter::At(center_mm), ..*window }, points_per_pixel);
-        }
-        let bandwidth = self.check(extent_mm)?;
+        let centroid_mm = self.centroid_mm();
+        let center_mm = window.center.on_film_mm(|| centroid_mm);
+        let window = WaveWindow { center: WindowCenter::At(center_mm), ..*window };
+        // Phases range as far as places lie from the centroid, which the rule adds to those from the reference.
+        let reach_mm = window.check()? + center_mm.distance(centroid_mm);
+        let bandwidth = self.check(reach_mm - self.reference_mm.distance(centroid_mm))?;
+        self.psf_about(center_mm, &window, points_per_pixel, bandwidth)
+    }
+
+    /// Returns the same about a place, be the nodes too few for some places of the window or not; B is that of those that count.
+    fn psf_about(
+        &self,
+        center_mm: DVec2,
+        window: &WaveWindow,
+        points_per_pixel: Option<usize>,
+        bandwidth: f64,
+    ) -> Result<WavePsf, DiffractionError> {
+        let from_reference_mm = center_mm - self.reference_mm;
         let (pitch_mm, unit_mm) = (window.pitch_um * 1e-3, self.airy_unit_mm());
         let is_rule = points_per_pixel.is_none();
         let points_per_pixel = match points_per_pixel {
@@ -235,10 +244,10 @@ impl PupilSamples {
         };
         let grid = Grid::new(window.rows, window.columns, pitch_mm, unit_mm);
         let mean = if is_rule && grid.is_cheaper(self.len(), points_per_pixel) {
-            gridded::mean_square(|waves| self.fill_plane_waves(waves, grid.origin_mm()), grid)
+            gridded::mean_square(|waves| self.fill_plane_waves(waves, from_reference_mm + grid.origin_mm()), grid)
         } else {
             let axis = |n_pixels| SampleAxis::new(n_pixels, pitch_mm, points_per_pixel);
-            transform::mean_square(&self.plane_waves(DVec2::ZERO), &axis(window.columns), &axis(window.rows))
+            transform::mean_square(&self.plane_waves(from_reference_mm), &axis(window.columns), &axis(window.rows))
         };
         // In a film's rows y ascends, as it does down a picture; its x ascends to the picture's left.
         let samples = mean.slice(s![.., ..;-1]).mapv(|per_mm2| per_mm2 * pitch_mm * pitch_mm);

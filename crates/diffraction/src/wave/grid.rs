@@ -44,6 +44,13 @@ impl PupilGrid {
         Self { n_radii, n_azimuths }
     }
 
+    /// Returns the smaller of both, in each direction.
+    #[must_use]
+    pub fn min(self, other: Self) -> Self {
+        let (n_radii, n_azimuths) = (self.n_radii.min(other.n_radii), self.n_azimuths.min(other.n_azimuths));
+        Self { n_radii, n_azimuths }
+    }
+
     /// Whether this grid is no coarser than another.
     pub fn covers(self, other: Self) -> bool {
         self.n_radii >= other.n_radii && self.n_azimuths >= other.n_azimuths

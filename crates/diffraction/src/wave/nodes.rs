@@ -190,13 +190,17 @@ impl PupilSamples {
         self.wavelength_nm * 1e-6 / (2.0 * self.numerical_aperture())
     }
 
+    /// Returns how far from the centroid the farthest ray meets the film, mm.
+    pub(super) fn spot_mm(&self) -> f64 {
+        largest(&self.q_x_mm, &self.q_y_mm, self.mean(&self.q_x_mm, &self.q_y_mm))
+    }
+
     /// Returns the ranges of the phase over the pupil's radius, for places up to `extent_mm` from the reference.
     pub fn phase_range(&self, extent_mm: f64) -> PhaseRange {
         let per_mm = TAU / (self.wavelength_nm * 1e-6) * self.numerical_aperture();
         let centroid_mm = self.mean(&self.q_x_mm, &self.q_y_mm);
-        let spot_mm = largest(&self.q_x_mm, &self.q_y_mm, centroid_mm);
         PhaseRange {
-            rays: per_mm * spot_mm,
+            rays: per_mm * self.spot_mm(),
             along_radius: per_mm * self.widest_along_radius(centroid_mm) / PhaseRange::DEFOCUS_ALONG_RADIUS,
             window: per_mm * (extent_mm + centroid_mm.length()),
         }

@@ -20,8 +20,9 @@ pub struct Peak {
 
 /// Side of the pixels among which the highest is looked for, in λN: a peak is some two of them wide.
 const SEARCH_PIXEL: f64 = 0.4;
-/// Pixels along the side of a window of the search, at most.
-const SEARCH_SIDE: usize = 1024;
+/// Pixels along the side of a window of the search, at most: with those of the largest range of phases a sum takes less memory than the nodes
+/// do, and four windows hold any blur.
+const SEARCH_SIDE: usize = 1536;
 /// How far beyond the rays the peak is looked for, in λN.
 const BESIDE_RAYS: f64 = 1.5;
 /// How many of the highest summits among the pixels the way up is gone from, and how far below the highest pixel they may be: as
@@ -30,6 +31,8 @@ const SUMMITS: usize = 3;
 const LOWEST_SUMMIT: f64 = 0.7;
 /// The largest range of phases that is accepted: some two million nodes, 450 MB while they are traced.
 const LARGEST_BANDWIDTH: f64 = 3400.0;
+/// By how much finer than the one before a grid of nodes is at most: its outermost nodes then lie within 2e-4 of the radius from the edge.
+const MOST_FINER: f64 = 8.0;
 /// Steps of the way up, at most, and the last one that is gone, in λN.
 const MOST_STEPS: usize = 12;
 const LAST_STEP: f64 = 1e-5;
@@ -38,6 +41,11 @@ impl PupilSamples {
     /// Returns the irradiance at a film point over that of the same amplitudes all in phase.
     pub fn strehl_at(&self, on_film_mm: DVec2) -> f64 {
         self.irradiance_per_mm2(on_film_mm) / self.perfect_peak_per_mm2()
+    }
+
+    /// Returns how far from the centroid the peak may be, mm: as far as the farthest ray and a little more.
+    fn search_reach_mm(&self) -> f64 {
+        self.spot_mm() + BESIDE_RAYS * self.airy_unit_mm()
     }
 
     /// Returns windows of one size that cover the rectangle about all rays and a little more: the peak is in one of them.
@@ -69,10 +77,13 @@ impl PupilSamples {
     /// # Errors
     /// When there are too few nodes for a window of that size.
     pub fn peak(&self) -> Result<Peak, DiffractionError> {
-        let unit_mm = self.airy_unit_mm();
+        let (unit_mm, reach_mm, centroid_mm) = (self.airy_unit_mm(), self.search_reach_mm(), self.centroid_mm());
+        let bandwidth = self.check(reach_mm - self.reference_mm.distance(centroid_mm))?;
         let mut summits: Vec<(DVec2, f64)> = vec![];
         for window in self.search_windows() {
-            summits.extend(summits_of(&self.psf(&window, None)?));
+            // Beyond the reach, at corners, the nodes are too few.
+            let psf = self.psf_about(window.center.on_film_mm(|| centroid_mm), &window, None, bandwidth)?;
+            summits.extend(summits_of(&psf, |at_mm| at_mm.distance(centroid_mm) <= reach_mm));
             summits.sort_unstable_by(|a, b| b.1.total_cmp(&a.1));
             summits.truncate(SUMMITS);
         }
@@ -95,26 +106,27 @@ impl PupilSamples {
     pub fn peak_of(lens: &MonoLens, point: &ObjectPoint, film_distance_mm: f64) -> Result<Peak, DiffractionError> {
         let mut nodes = Self::trace(lens, point, film_distance_mm, PupilGrid::STANDARD, None)?;
         loop {
-            let centroid_mm = nodes.centroid_mm();
-            let reach_mm = |window: &WaveWindow| {
-                let aside_mm = window.center.on_film_mm(|| centroid_mm).distance(centroid_mm);
-                window.check().map(|extent_mm| extent_mm + aside_mm)
-            };
-            let extent_mm = nodes.search_windows().iter().map(reach_mm).try_fold(0.0, |a, b| b.map(|b| b.max(a)))?;
-            match nodes.finer_grid(extent_mm, LARGEST_BANDWIDTH)? {
-                Some(grid) => nodes = Self::trace(lens, point, film_distance_mm, grid, None)?,
+            match nodes.finer_grid(nodes.search_reach_mm(), LARGEST_BANDWIDTH)? {
+                // Where a grid is far finer, one between shows the edge first, so that a large one need not be laid twice.
+                // Of a far finer grid one between shows the edge of the pupil first, so that it is laid once.
+                Some(grid) => {
+                    let grid = grid.min(nodes.grid.scaled(MOST_FINER));
+                    nodes = Self::trace(lens, point, film_distance_mm, grid, None)?;
+                }
                 None => return nodes.peak(),
             }
         }
     }
 }
 
-/// Returns the pixels that are higher than their neighbors, with the height of a parabola through these.
-fn summits_of(psf: &WavePsf) -> Vec<(DVec2, f64)> {
+/// Returns the pixels within reach that are higher than their neighbors, with the height of a parabola through these.
+fn summits_of(psf: &WavePsf, is_within_reach: impl Fn(DVec2) -> bool) -> Vec<(DVec2, f64)> {
     let samples = &psf.samples;
-    let highest = samples.iter().copied().fold(0.0, f64::max);
+    let is_within_reach = |(row, column)| is_within_reach(psf.pixel_mm(row, column));
+    let within_reach = samples.indexed_iter().filter(|(pixel, _)| is_within_reach(*pixel));
+    let highest = within_reach.map(|(_, here)| *here).fold(0.0, f64::max);
     let summit = |((row, column), here): ((usize, usize), &f64)| {
-        if *here < LOWEST_SUMMIT * highest {
+        if *here < LOWEST_SUMMIT * highest || !is_within_reach((row, column)) {
             return None;
         }
         // What lies beyond the border is taken as what mirrors it.
