@@ -225,7 +225,7 @@ impl WavefrontError {
         }
         let mut last_nm: Vec<([f64; 2], f64)> = Vec::new();
         for band in &self.bands {
-            if let Some(found) = band.field_deg.iter().find(|deg| !(deg.abs() < 90.0)) {
+            if let Some(found) = band.field_deg.iter().find(|deg| deg.is_nan() || deg.abs() >= 90.0) {
                 return wrong("field_deg of a wavefront error", *found, "angles between -90 and 90 degrees");
             }
             let before = last_nm.iter().position(|(field_deg, _)| *field_deg == band.field_deg);

@@ -196,18 +196,21 @@ fn root_of(covariance: &[Vec<f64>]) -> Result<Array2<f64>, String> {
     let largest = (0..n).map(|i| covariance[i][i]).fold(0.0, f64::max);
     let rounding = ROUNDING * largest;
     let none = || "its covariance is none: expected a symmetric matrix without negative variances".to_owned();
+    if covariance.iter().flatten().any(|number| !number.is_finite()) {
+        return Err(none());
+    }
     let mut root = Array2::zeros((n, n));
     for j in 0..n {
         let left =
             |root: &Array2<f64>, i: usize| covariance[i][j] - (0..j).map(|k| root[(i, k)] * root[(j, k)]).sum::<f64>();
         let variance = left(&root, j);
-        if !(variance >= -rounding) || (0..j).any(|i| !((covariance[i][j] - covariance[j][i]).abs() <= rounding)) {
+        if variance < -rounding || (0..j).any(|i| (covariance[i][j] - covariance[j][i]).abs() > rounding) {
             return Err(none());
         }
         let deviation = if variance > rounding { variance.sqrt() } else { 0.0 };
         for i in j..n {
             let covered = left(&root, i);
-            if deviation == 0.0 && !(covered.abs() <= rounding.sqrt() * largest.sqrt()) {
+            if deviation == 0.0 && covered.abs() > (rounding * largest).sqrt() {
                 return Err(none());
             }
             root[(i, j)] = if deviation > 0.0 { covered / deviation } else { 0.0 };
