@@ -169,7 +169,7 @@ pub(in super::super) fn read_mat(path: &Path, reading: &FileReading) -> Result<M
             }
             [] => {
                 let is_table = |own: &&Listed| own.is_numeric && own.sides.len() == 2 && !own.sides.contains(&1);
-                if file.listed.iter().any(|own| is_list(own)) && file.listed.iter().filter(is_table).count() == 1 {
+                if file.listed.iter().any(is_list) && file.listed.iter().filter(is_table).count() == 1 {
                     let way = "it holds spectra, a table with wavelengths, and no scene: expected a chart of them as .csv, wavelengths in nm and a reflectance a column";
                     return Err(wrong(way.to_owned()));
                 }
