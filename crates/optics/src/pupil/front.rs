@@ -30,7 +30,9 @@ impl Front {
     /// Returns the front of a lens.
     pub(super) fn of(lens: &MonoLens, point: &ObjectPoint, plane: PupilPlane) -> Self {
         let placement = lens.placements().map_or(Placement::centered(0.0), |placements| placements[0]);
-        Self { surface: lens.front().clone(), placement, point: *point, plane }
+        // The rim of a front that blades close is that of the open stop.
+        let surface = Surface { semi_aperture_mm: lens.semi_aperture_mm(0), ..lens.front().clone() };
+        Self { surface, placement, point: *point, plane }
     }
 
     /// Returns the point of the first surface over a place, mm; `None` beyond its rim or its equator.

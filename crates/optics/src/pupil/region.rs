@@ -126,18 +126,13 @@ impl PupilBoundary {
         nodes
     }
 
-    /// By what share the area of every other azimuth differs from that of all, or a quarter of the most that those of every fourth do: of an
-    /// edge with corners one of them alone may by chance be small.
+    /// By what share the area of every other azimuth differs from that of all, or a quarter of what that of every fourth does: of an edge
+    /// with corners one of them alone may by chance be small.
     fn area_change(&self) -> f64 {
         let n = self.rho_mm.len();
-        let squares = |first: usize, every: usize| {
-            self.rho_mm.iter().skip(first).step_by(every).map(|rho| rho * rho).sum::<f64>() * every as f64
-        };
-        let all = squares(0, 1);
-        let change = |every: usize| {
-            let of_first = |first: usize| (squares(first, every) / all - 1.0).abs();
-            if n.is_multiple_of(every) { (0..every).map(of_first).fold(0.0, f64::max) } else { 0.0 }
-        };
+        let squares = |every: usize| self.rho_mm.iter().step_by(every).map(|rho| rho * rho).sum::<f64>() * every as f64;
+        let change =
+            |every: usize| if n.is_multiple_of(every) { (squares(every) / squares(1) - 1.0).abs() } else { 0.0 };
         change(2).max(0.25 * change(4))
     }
 }
