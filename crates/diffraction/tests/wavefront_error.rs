@@ -17,7 +17,7 @@ const NM: f64 = 550.0;
 const RADIUS_MM: f64 = 1.5;
 const FAR: ObjectPoint = ObjectPoint::Infinite(DVec3::Z);
 
-/// An ideal lens right behind a stop with this error, µm in Noll's terms.
+/// An ideal lens right before a stop with this error, µm in Noll's terms.
 fn lens(focal_mm: f64, coefficients_um: Vec<f64>) -> Lens {
     let surface = |shape, semi_aperture_mm| Interface {
         surface: Surface { curvature_per_mm: 0.0, shape, semi_aperture_mm },
@@ -33,9 +33,9 @@ fn lens(focal_mm: f64, coefficients_um: Vec<f64>) -> Lens {
         chromatic_eye_nm: None,
     };
     let profile = PhaseProfile::Wavefront(error);
-    Lens::new("error", "test", vec![surface(Shape::Sphere, RADIUS_MM), surface(ideal, 10.0)], 0)
+    Lens::new("error", "test", vec![surface(ideal, 10.0), surface(Shape::Sphere, RADIUS_MM)], 1)
         .unwrap()
-        .with_diffractive(vec![DiffractiveSurface { surface: 0, order: 1, profile, blaze: None }])
+        .with_diffractive(vec![DiffractiveSurface { surface: 1, order: 1, profile, blaze: None }])
         .unwrap()
 }
 
@@ -47,11 +47,11 @@ fn one_term(j: usize, um: f64) -> Vec<f64> {
 
 #[test]
 fn traced_wavefronts_have_the_terms_that_were_stated() {
-    for j in 4..=15 {
-        let mono = lens(240.0, one_term(j, 0.02)).at(NM).unwrap();
-        let traced = Wavefront::trace(&mono, &FAR, 240.0, PupilGrid::STANDARD, WavefrontReference::Chief).unwrap();
+    // At f/80 and f/2.8.
+    for (j, focal_mm) in (4..=15).flat_map(|j| [(j, 240.0), (j, 8.4)]) {
+        let mono = lens(focal_mm, one_term(j, 0.02)).at(NM).unwrap();
+        let traced = Wavefront::trace(&mono, &FAR, focal_mm, PupilGrid::STANDARD, WavefrontReference::Chief).unwrap();
         let found = traced.zernike_waves(15);
-        // An error that is a path at the stop is one on the sphere to some times the square of the aperture, 4e-5 at f/80.
         let expected = 0.02 / (1e-3 * NM);
         assert!((found[j - 1] / expected - 1.0).abs() < 2e-3, "Z{j}: {} {expected}", found[j - 1]);
         let others = found.iter().enumerate().skip(3).filter(|(i, _)| i + 1 != j);
@@ -79,7 +79,14 @@ fn direct(focal_mm: f64, coefficients_um: &[f64], at_mm: DVec2) -> f64 {
 
 #[test]
 fn point_spreads_are_those_of_a_direct_sum() {
-    let (focal_mm, n, pitch_um) = (60.0, 21, 4.0);
+    // At f/20 and f/2.8.
+    for (focal_mm, pitch_um) in [(60.0, 4.0), (8.4, 0.56)] {
+        point_spreads_of(focal_mm, pitch_um);
+    }
+}
+
+fn point_spreads_of(focal_mm: f64, pitch_um: f64) {
+    let n = 21;
     let window = WaveWindow { pitch_um, rows: n, columns: n, center: WindowCenter::At(DVec2::ZERO) };
     let quality = WaveQuality { nodes: None, points_per_pixel: Some(1) };
     let peak_of = |coefficients_um: Vec<f64>| {
@@ -118,7 +125,7 @@ fn with_coma_by_field(turned_about_axis: bool) -> Lens {
         chromatic_eye_nm: None,
     };
     let profile = PhaseProfile::Wavefront(error);
-    lens.with_diffractive(vec![DiffractiveSurface { surface: 0, order: 1, profile, blaze: None }]).unwrap()
+    lens.with_diffractive(vec![DiffractiveSurface { surface: 1, order: 1, profile, blaze: None }]).unwrap()
 }
 
 /// A point at a field, to the right and upwards, far away or so far before the lens.

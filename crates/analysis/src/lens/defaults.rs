@@ -73,6 +73,12 @@ impl LensDefaults {
         let weighed = file.wavelengths_nm.iter().zip(&file.wavelength_weights);
         let wavelength_weights = weighed.filter(|(nm, _)| is_known(nm)).map(|(_, weight)| *weight).collect();
         let several = (file.configurations.len() > 1).then(|| Box::new(file.clone()));
+        let is_solved = file.film_distance_mm != Some(0.0);
+        let unsolved = (!is_solved).then(|| {
+            "the file's image plane lies on the last surface, as where its distance was never solved for: the best focus stands for it, \
+             and --film-mm puts it elsewhere"
+                .to_owned()
+        });
         Self {
             several,
             wavelength_weights,
@@ -81,9 +87,9 @@ impl LensDefaults {
             distance_mm: file.object_distance_mm.unwrap_or(f64::INFINITY),
             surface_comments: file.surface_comments,
             fields: file.fields,
-            film_distance_mm: file.film_distance_mm,
+            film_distance_mm: file.film_distance_mm.filter(|_| is_solved),
             lens: file.lens,
-            notes: file.notes,
+            notes: file.notes.into_iter().chain(unsolved).collect(),
         }
     }
 

@@ -37,6 +37,12 @@ impl<'a> Glasses<'a> {
 
     /// Returns the glass of this name; `nd_vd` is what the file states of it besides.
     pub(super) fn find(&self, name: &str, nd_vd: Option<(f64, f64)>) -> Result<Found, String> {
+        let Found { glass, note } = self.named(name, nd_vd)?;
+        let other = nd_vd.and_then(|stated| note_on_numbers(name, &glass, stated));
+        Ok(Found { glass, note: [note, other].into_iter().flatten().reduce(|note, other| format!("{note}; {other}")) })
+    }
+
+    fn named(&self, name: &str, nd_vd: Option<(f64, f64)>) -> Result<Found, String> {
         let found = |glass| Ok(Found { glass, note: None });
         if let Some(private) = self.private.iter().find(|glass| glass.name.eq_ignore_ascii_case(name)) {
             return found(private.glass.clone());
@@ -114,6 +120,23 @@ impl<'a> Glasses<'a> {
     }
 }
 
+/// Returns a note where a file states numbers for a glass that are not those of its name.
+fn note_on_numbers(name: &str, glass: &Glass, (nd, vd): (f64, f64)) -> Option<String> {
+    let (own_nd, own_vd) = glass.nd_vd().filter(|_| (nd, vd) != PLACEHOLDER && nd > 1.0)?;
+    let differs = (nd - own_nd).abs() > MELT_ND || (vd > 0.0 && (vd / own_vd - 1.0).abs() > MELT_VD);
+    differs.then(|| {
+        format!(
+            "the file states n_d {nd} and V_d {vd} for '{name}', of which {} is taken with n_d {own_nd:.6} and V_d {own_vd:.2}",
+            glass.describe()
+        )
+    })
+}
+
+/// The most that n_d, and V_d by its share, of one glass differ between melts: the usual tolerances of catalogues, and as much again for
+/// numbers of other years.
+const MELT_ND: f64 = 1e-3;
+const MELT_VD: f64 = 0.016;
+
 /// The maker whose glass a name means that several have, where neither the file nor its reader names any.
 const USUAL_MAKER: &str = "SCHOTT";
 
@@ -133,6 +156,19 @@ pub(super) fn constant(index: f64) -> Glass {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn numbers_that_are_not_those_of_a_name_are_noted() {
+        let options = ReadOptions::default();
+        let note = |name: &str, nd_vd: (f64, f64)| Glasses::new(&options).find(name, Some(nd_vd)).unwrap().note;
+        for nd_vd in [(1.516_800, 64.17), (1.5168, 0.0), PLACEHOLDER, (0.0, 0.0)] {
+            assert_eq!(note("N-BK7", nd_vd), None, "{nd_vd:?}");
+        }
+        for nd_vd in [(1.9, 30.0), (1.5168, 60.0)] {
+            let note = note("N-BK7", nd_vd).unwrap();
+            assert!(note.contains(&format!("n_d {}", nd_vd.0)) && note.contains("n_d 1.516800 and V_d 64.17"), "{note}");
+        }
+    }
 
     #[test]
     fn name_of_several_glasses_is_that_of_the_first_maker_named() {

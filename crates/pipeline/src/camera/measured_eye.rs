@@ -250,12 +250,13 @@ fn eye(
     };
     let radius_mm = 0.5 * pupil_mm;
     let ideal = surface(Shape::ThinLens { power_per_mm: 1.0 / RETINA_MM }, RETINA_MM.max(pupil_mm));
-    let lens = Lens::new(name, path.display().to_string(), vec![surface(Shape::Sphere, radius_mm), ideal], 0)?;
+    // Behind the lens, which turns no slope of the error then.
+    let lens = Lens::new(name, path.display().to_string(), vec![ideal, surface(Shape::Sphere, radius_mm)], 1)?;
     let chromatic_eye_nm =
         Some(bands[0].wavelength_nm).filter(|_| bands.iter().all(|b| b.wavelength_nm == bands[0].wavelength_nm));
     let error =
         WavefrontError { radius_mm, terms: ZernikeTerms::Osa, bands, turned_about_axis: false, chromatic_eye_nm };
     let profile = PhaseProfile::Wavefront(error);
-    let lens = lens.with_diffractive(vec![DiffractiveSurface { surface: 0, order: 1, profile, blaze: None }])?;
+    let lens = lens.with_diffractive(vec![DiffractiveSurface { surface: 1, order: 1, profile, blaze: None }])?;
     Ok(LensFile { film_distance_mm: Some(RETINA_MM), ..LensFile::from(lens) })
 }

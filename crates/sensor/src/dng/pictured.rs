@@ -34,7 +34,10 @@ impl Size {
 
 /// Decodes a JPEG of 8 bits (DNG 1.4, compression 34892): planes as they are, or as its markers say they were turned into luma and chroma.
 pub(super) fn jpeg(block: &[u8], size: Size) -> Result<Vec<u8>, String> {
-    let unreadable = |reason: &dyn std::fmt::Debug| format!("has a JPEG that cannot be decoded: {reason:?}");
+    let unreadable = |reason: &dyn std::fmt::Debug| {
+        let reason = format!("{reason:?}").lines().collect::<Vec<_>>().join(" ");
+        format!("has a JPEG that cannot be decoded: {}", reason.trim_end())
+    };
     let kind = if size.n_planes == 1 { ColorSpace::Luma } else { ColorSpace::RGB };
     let limits = DecoderOptions::default().set_max_width(size.columns).set_max_height(size.rows);
     let mut decoder = JpegDecoder::new_with_options(ZCursor::new(block), limits.jpeg_set_out_colorspace(kind));

@@ -675,14 +675,16 @@ fn what_is_asked_for_and_not_done_is_noted() {
     let file = PLAIN.file(|d| {
         d.set(OPCODE_LIST_2, list(&[opcode(99, &[1, 2, 3]), opcode(6, &wholes(&[0, 0, 4, 4]))]));
         d.set(BASELINE_EXPOSURE, Value::SignedRational(vec![(1, 4)]));
-        d.set(PROFILE_TONE_CURVE, Value::Double(vec![0.0; 4]));
+        d.set(PROFILE_TONE_CURVE, Value::Double(vec![0.0, 0.0, 1.0, 1.0]));
     });
-    let notes = DngFile::from_bytes(&file).unwrap().notes.join("; ");
+    let file = DngFile::from_bytes(&file).unwrap();
+    let notes = [file.notes.clone(), file.left_out()].concat().join("; ");
     for word in ["opcode 99, TrimBounds, which is not done", "0.25 stops", "a tone curve"] {
         assert!(notes.contains(word), "{word}: {notes}");
     }
     let nothing = PLAIN.file(|d| d.set(BASELINE_EXPOSURE, Value::SignedRational(vec![(0, 0)])));
-    assert!(DngFile::from_bytes(&nothing).unwrap().notes.is_empty());
+    let nothing = DngFile::from_bytes(&nothing).unwrap();
+    assert!(nothing.notes.is_empty() && nothing.left_out().is_empty());
 }
 
 /// The parameters of a gain map of so many points each way, without its factors.
@@ -809,10 +811,12 @@ fn tiles_that_are_pictures_are_read() {
     for (name, bytes) in PICTURED {
         let file = DngFile::from_bytes(bytes).unwrap_or_else(|reason| panic!("{name} {reason}"));
         assert_eq!(file.stored, (44, 30), "{name}");
-        // Without loss to the bit; with it within a hundredth of the range, a half float by its own steps.
+        // Without loss to the bit; with it within a hundredth of the range, two where a quarter of the pixels have chroma, a half float by its own
+        // steps.
         let tolerance = match name {
             "mosaic" | "mosaic-10" => 1e-6,
             "planes-half" => 2.5e-4,
+            "planes-jpeg" => 0.02,
             _ => 0.01,
         };
         for (plane, light) in file.raw.linear().iter().enumerate() {
