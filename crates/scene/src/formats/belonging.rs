@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use super::stated::note_of;
+
 /// Whether reading a scene may read another file in its folder: the numbers of a header, a depth, camera data, references of a
 /// line scanner.
 pub fn may_be_read_with(scene: &Path, other: &Path) -> bool {
@@ -17,6 +19,17 @@ pub fn may_be_read_with(scene: &Path, other: &Path) -> bool {
     let is_reference = ["white_reference", "dark_reference"].iter().any(|start| other.starts_with(start));
     let is_list = ["wavelengths.txt", "wavelengths.csv"].contains(&other.as_str());
     other != name(scene) && (goes_on(bare) || shared.is_some_and(is_part) || is_reference || is_list)
+}
+
+/// Returns what is said of units, scales and masks that GDAL has put beside a file.
+pub(super) fn note_of_gdal(path: &Path) -> Option<String> {
+    let beside = |ending: &str| {
+        let mut name = path.file_name()?.to_owned();
+        name.push(ending);
+        path.with_file_name(&name).is_file().then(|| name.to_string_lossy().into_owned())
+    };
+    let names: Vec<String> = [".aux.xml", ".msk"].into_iter().filter_map(beside).collect();
+    note_of(path, "companion of GDAL", &names)
 }
 
 #[cfg(test)]

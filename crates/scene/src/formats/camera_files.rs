@@ -531,7 +531,11 @@ fn colmap_line<'a>(path: &Path, lines: &[&'a str], picture: &Path) -> Result<&'a
         let id = line.split_whitespace().nth(8).unwrap_or_default();
         return with_id(id).ok_or_else(|| format!("images.txt says that its camera is {id}, which it has not"));
     }
+    let is_camera = |line: &&str| words(line).len() > 4 && words(line)[0].parse::<u32>().is_ok();
     let [first, others @ ..] = lines else { return Err(EXPECTED.to_owned()) };
+    if !lines.iter().all(is_camera) {
+        return Err(EXPECTED.to_owned());
+    }
     if others.iter().all(|line| words(line).get(1..) == words(first).get(1..)) {
         return Ok(*first);
     }

@@ -6,12 +6,12 @@ use std::{
 };
 
 use super::{
+    belonging::note_of_gdal,
     camera_files::beside,
     contents::{MATLAB_OR_HDF5, is_of},
     depth_names::SaidOfDepth,
     depth_numbers::{DepthNumbers, depth_numbers},
     raw_depth::{DepthWords, RawDepth},
-    read_contents::note_of_gdal,
     reading::{DepthKind, DepthUnit},
     stated::{name_of, short},
     unusable::{check_whole, unreadable},

@@ -8,6 +8,7 @@ use ndarray::Array2;
 
 use super::{
     band_folder::band_folder,
+    belonging::note_of_gdal,
     camera::CameraData,
     chart_table::read_chart,
     contents::{Contents, Cube, Heeds, Hidden, Image, MATLAB_OR_HDF5, is_of},
@@ -48,17 +49,6 @@ pub(super) fn contents_of(path: &Path, options: &ReadOptions) -> Result<Contents
     let mut contents = contents_of_file(path, options)?;
     contents.notes.extend(note_of_gdal(path));
     Ok(contents)
-}
-
-/// Returns what is said of units, scales and masks that GDAL has put beside a file.
-pub(super) fn note_of_gdal(path: &Path) -> Option<String> {
-    let beside = |ending: &str| {
-        let mut name = path.file_name()?.to_owned();
-        name.push(ending);
-        path.with_file_name(&name).is_file().then(|| name.to_string_lossy().into_owned())
-    };
-    let names: Vec<String> = [".aux.xml", ".msk"].into_iter().filter_map(beside).collect();
-    note_of(path, "companion of GDAL", &names)
 }
 
 fn contents_of_file(path: &Path, options: &ReadOptions) -> Result<Contents, SceneError> {
