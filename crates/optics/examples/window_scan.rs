@@ -151,7 +151,8 @@ fn scan(name: &str, lens: &Lens, wavelength_nm: f64, (n_across, n_fields): (usiz
         let Case { what, found_mm2, counted_mm2, error, has_outline } = case;
         let difference = case.difference();
         eprintln!(
-            "{name}{askew} {what}: found {found_mm2:.6e} counted {counted_mm2:.6e} mm2, {difference:+.2e} (count {error:.0e}); outline {has_outline}"
+            "{name}{askew} {what}: found {found_mm2:.6e} counted {counted_mm2:.6e} mm2, \
+             {difference:+.2e} (count {error:.0e}); outline {has_outline}"
         );
     }
     let sure = |case: &&Case| case.error < 1e-3;
