@@ -43,11 +43,6 @@ fn read_light(path: &Path) -> Result<Illuminant, PipelineError> {
     let unreadable = |reason: String| PipelineError::Read { path: path.to_owned(), reason };
     let text = text::read(path).map_err(|e| unreadable(e.to_string()))?;
     let text = text::with_commas(&text);
-    // Two numbers with a gap between.
-    let with_comma = |line: &str| match line.split_whitespace().collect::<Vec<_>>()[..] {
-        [nm, power] if !line.contains([',', '#']) && nm.parse::<f64>().is_ok() => format!("{nm},{power}"),
-        _ => line.to_owned(),
-    };
     let text = text.lines().map(with_comma).collect::<Vec<_>>().join("\n");
     let mut reader = csv::ReaderBuilder::new()
         .has_headers(false)
@@ -78,7 +73,9 @@ fn read_light(path: &Path) -> Result<Illuminant, PipelineError> {
     }
     let wavelengths_nm =
         wavelengths_of_column(names.first().map_or("", String::as_str), &wavelengths_nm).map_err(unreadable)?;
-    let counts_photons = names.get(1).is_some_and(|name| has(name, &["photon", "quanta", "mol", "ppfd"]));
+    // Of a line of names that is not told apart, all of it.
+    let of_power = names.get(1).or(names.first());
+    let counts_photons = of_power.is_some_and(|name| has(name, &["photon", "quanta", "mol", "ppfd"]));
     let is_comment = |line: &&str| line.starts_with('#') && has(line, &["photon", "quanta"]);
     if let Some(comment) = text.lines().find(is_comment).filter(|_| !counts_photons) {
         return Err(unreadable(format!(
@@ -98,7 +95,7 @@ fn read_light(path: &Path) -> Result<Illuminant, PipelineError> {
             || lower.contains("hz-1")
             || lower.contains("hz^-1")
     };
-    if let Some(name) = names.get(1).filter(|name| is_other(name)) {
+    if let Some(name) = of_power.filter(|name| is_other(name)) {
         return Err(unreadable(format!(
             "its column '{name}' is no power a nanometre, expected such (W/nm) or photons"
         )));
@@ -112,6 +109,20 @@ fn read_light(path: &Path) -> Result<Illuminant, PipelineError> {
     let light = Spectrum::new(sorted(&wavelengths_nm), sorted(&values)).map(Illuminant::Spectrum);
     let checked = light.and_then(|light| light.check().map(|()| light));
     checked.map_err(|e| unreadable(e.to_string()))
+}
+
+/// Returns a line of two numbers, or of the names of two columns, with a comma in place of the gap between them.
+fn with_comma(line: &str) -> String {
+    let words: Vec<&str> = line.split_whitespace().collect();
+    // A unit in brackets belongs to the name before it.
+    let n_first = 1 + words.get(1).map_or(0, |word| usize::from(word.starts_with(['(', '['])));
+    match (&words[..], line.contains([',', '#', '"'])) {
+        ([first, _, ..], false) if words.len() == 2 || first.parse::<f64>().is_err() => {
+            let (first, second) = words.split_at(n_first.min(words.len() - 1));
+            format!("{},{}", first.join(" "), second.join(" "))
+        }
+        _ => line.to_owned(),
+    }
 }
 
 #[cfg(test)]
@@ -132,6 +143,8 @@ mod tests {
             "cm^-1\tpower\n12500\t1\n20000\t2\n25000\t1\n",
             "nm, photons/s\n400, 400\n500, 1000\n800, 800\n",
             "400 1\n500   2\n800 1\n",
+            "nm photons\n400 400\n500 1000\n800 800\n",
+            "Wavelength (Å)  Power [W/nm]\n4000 1\n5000 2\n8000 1\n",
             "nm, PPFD\n400, 400\n500, 1000\n800, 800\n",
             "\u{feff}Å, W\n4000, 1\n5000, 2\n8000, 1\n",
         ] {

@@ -166,7 +166,10 @@ mod tests {
         }
         for nd_vd in [(1.9, 30.0), (1.5168, 60.0)] {
             let note = note("N-BK7", nd_vd).unwrap();
-            assert!(note.contains(&format!("n_d {}", nd_vd.0)) && note.contains("n_d 1.516800 and V_d 64.17"), "{note}");
+            assert!(
+                note.contains(&format!("n_d {}", nd_vd.0)) && note.contains("n_d 1.516800 and V_d 64.17"),
+                "{note}"
+            );
         }
     }
 

@@ -1,6 +1,6 @@
 //! The files that belong to one of a scene.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::stated::note_of;
 
@@ -23,12 +23,17 @@ pub fn may_be_read_with(scene: &Path, other: &Path) -> bool {
 
 /// Returns what is said of units, scales and masks that GDAL has put beside a file.
 pub(super) fn note_of_gdal(path: &Path) -> Option<String> {
-    let beside = |ending: &str| {
-        let mut name = path.file_name()?.to_owned();
+    // Those of a header are beside its data.
+    let is_header = path.extension().is_some_and(|own| own.eq_ignore_ascii_case("hdr"));
+    let data = ["", "dat", "img", "bin", "raw", "bsq", "bil", "bip"].into_iter().filter(|_| is_header);
+    let files = std::iter::once(path.to_owned()).chain(data.map(|own| path.with_extension(own)));
+    let beside = |(file, ending): (PathBuf, &str)| {
+        let mut name = file.file_name()?.to_owned();
         name.push(ending);
         path.with_file_name(&name).is_file().then(|| name.to_string_lossy().into_owned())
     };
-    let names: Vec<String> = [".aux.xml", ".msk"].into_iter().filter_map(beside).collect();
+    let both = files.flat_map(|file| [".aux.xml", ".msk"].map(|ending| (file.clone(), ending)));
+    let names: Vec<String> = both.filter_map(beside).collect();
     note_of(path, "companion of GDAL", &names)
 }
 

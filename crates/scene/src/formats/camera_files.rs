@@ -522,13 +522,19 @@ fn colmap_line<'a>(path: &Path, lines: &[&'a str], picture: &Path) -> Result<&'a
     }
     let with_id = |id: &str| lines.iter().copied().find(|line| line.split_whitespace().next() == Some(id));
     let images = dioptric_files::text::read(&path.with_file_name("images.txt")).unwrap_or_default();
-    // Number, rotation, place, camera and name of a picture.
-    let is_own = |line: &&str| {
-        let own = line.split_whitespace().collect::<Vec<&str>>();
-        own.len() == 10 && Path::new(own[9]).file_name() == picture.file_name()
-    };
-    if let Some(line) = images.lines().find(is_own) {
-        let id = line.split_whitespace().nth(8).unwrap_or_default();
+    // Number, rotation, place, camera and name of a picture, which may have folders.
+    let named = images.lines().map(words).filter(|own| own.len() == 10).map(|own| (own[8], Path::new(own[9])));
+    let called: Vec<(&str, &Path)> = named.filter(|(_, own)| own.file_name() == picture.file_name()).collect();
+    let whole = std::path::absolute(picture).unwrap_or_else(|_| picture.to_owned());
+    let in_folder: Vec<(&str, &Path)> = called.iter().copied().filter(|(_, own)| whole.ends_with(own)).collect();
+    let own = if in_folder.is_empty() { called } else { in_folder };
+    if let Some((id, _)) = own.first() {
+        if own.iter().any(|(other, _)| other != id) {
+            return Err(format!(
+                "images.txt has pictures of several cameras called {}: expected one",
+                name_of(picture)
+            ));
+        }
         return with_id(id).ok_or_else(|| format!("images.txt says that its camera is {id}, which it has not"));
     }
     let is_camera = |line: &&str| words(line).len() > 4 && words(line)[0].parse::<u32>().is_ok();

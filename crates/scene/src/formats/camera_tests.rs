@@ -191,6 +191,12 @@ fn the_camera_of_the_picture_is_taken() {
     assert_eq!(read(&two.replace("1 PINHOLE 8 6", "1 PINHOLE 16 12"), None).unwrap(), 20.0);
     assert_eq!(read(&two.replace("20 20", "10 10"), None).unwrap(), 10.0);
     assert!(read(two, Some("1 1 0 0 0 0 0 0 7 a.png\n")).unwrap_err().to_string().contains("its camera is 7"));
+    // Of a rig by the folder that the picture is in.
+    let own = folder.path().file_name().unwrap().to_string_lossy().into_owned();
+    let rig = format!("1 1 0 0 0 0 0 0 1 left/a.png\n\n2 1 0 0 0 0 0 0 2 {own}/a.png\n\n");
+    assert_eq!(read(two, Some(&rig)).unwrap(), 20.0);
+    let unknown = read(two, Some(&rig.replace(&own, "right"))).unwrap_err().to_string();
+    assert!(unknown.contains("several cameras called a.png"), "{unknown}");
 }
 
 #[test]

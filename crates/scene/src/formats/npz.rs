@@ -77,7 +77,7 @@ impl<'a> Archive<'a> {
         })
     }
 
-    /// Returns the arrays of numbers whose sides are wanted, but for lists of wavelengths; what else there is, as texts, is none.
+    /// Returns the arrays of numbers whose sides are wanted; what else there is, as texts, is none.
     fn of_sides(&mut self, is_wanted: impl Fn(&[usize]) -> bool) -> Result<Vec<String>, SceneError> {
         let mut found = vec![];
         for name in self.names.clone() {
@@ -88,11 +88,16 @@ impl<'a> Archive<'a> {
                 .take(MOST_HEADER_BYTES)
                 .read_to_end(&mut start)
                 .map_err(|error| wrong(fault("archive", error, None)))?;
-            if name.ends_with(".npy") && rank_of_waves(bare(&name)).is_none() && is_array_of(&start, &is_wanted) {
+            if name.ends_with(".npy") && is_array_of(&start, &is_wanted) {
                 found.push(name);
             }
         }
         Ok(found)
+    }
+
+    /// Returns those that are no lists of wavelengths.
+    fn but_wavelengths(&mut self, is_wanted: impl Fn(&[usize]) -> bool) -> Result<Vec<String>, SceneError> {
+        Ok(self.of_sides(is_wanted)?.into_iter().filter(|name| rank_of_waves(bare(name)).is_none()).collect())
     }
 }
 
@@ -116,7 +121,7 @@ pub(super) fn read_npz(path: &Path, options: &ReadOptions) -> Result<Cube, Scene
     let reading = &options.reading;
     let chosen = match &reading.variable {
         Some(told) => archive.named(told)?,
-        None => match &archive.of_sides(|sides| sides.len() == 3)?[..] {
+        None => match &archive.but_wavelengths(|sides| sides.len() == 3)?[..] {
             [one] => one.clone(),
             [] if archive.names.is_empty() => {
                 return Err(wrong("it is empty, expected an array of three axes".to_owned()));
@@ -131,7 +136,7 @@ pub(super) fn read_npz(path: &Path, options: &ReadOptions) -> Result<Cube, Scene
     };
     let array = archive.read(&chosen)?;
     let is_list = |name: &&String| **name != chosen && rank_of_waves(bare(name)).is_some();
-    let mut lists: Vec<String> = archive.names.iter().filter(is_list).cloned().collect();
+    let mut lists: Vec<String> = archive.of_sides(|_| true)?.iter().filter(is_list).cloned().collect();
     let nearness = |name: &str| Nearness::of(bare(&chosen), bare(name));
     lists.sort_by_key(|name| (nearness(name), rank_of_waves(bare(name))));
     let mut found = vec![];
@@ -187,9 +192,9 @@ pub(super) fn read_npz_plane(path: &Path, told: Option<&str>) -> Result<Noted<(S
     let chosen = match told {
         Some(told) => archive.named(told)?,
         None => {
-            let planes = archive.of_sides(|sides| sides.iter().filter(|side| **side != 1).count() == 2)?;
+            let planes = archive.but_wavelengths(|sides| sides.iter().filter(|side| **side != 1).count() == 2)?;
             // One of a single row or column, where there is no other.
-            let planes = if planes.is_empty() { archive.of_sides(|sides| sides.len() == 2)? } else { planes };
+            let planes = if planes.is_empty() { archive.but_wavelengths(|sides| sides.len() == 2)? } else { planes };
             let called = DEPTHS.iter().find_map(|own| planes.iter().find(|name| is_called(bare(name), own)));
             match (called, &planes[..]) {
                 (Some(called), _) => called.clone(),

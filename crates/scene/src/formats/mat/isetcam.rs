@@ -341,12 +341,18 @@ fn waves_of(file: &MatFile, cube: &str, sides: &[usize], is_told: bool) -> Resul
         Value::Text(text) if own.name == "coordinates" => Some(text.as_str()),
         _ => None,
     });
-    let is_along = |own: &String| {
+    let nearness = |own: &String| {
         let is_own = |axis: &String| axis.split(" or ").any(|name| name == last_part(own));
-        let is_scale = axes.iter().any(is_own) || file.words_of(own).1.iter().any(|axis| axes.contains(axis));
-        is_scale || coordinates.is_some_and(|all| all.split_whitespace().any(|word| word == last_part(own)))
+        let is_coordinate = || coordinates.is_some_and(|all| all.split_whitespace().any(|word| word == last_part(own)));
+        let is_along = || file.words_of(own).1.iter().any(|axis| axes.contains(axis));
+        Nearness::of(cube, own).with_axis(match () {
+            () if axes.iter().any(is_own) => 0,
+            () if is_coordinate() => 1,
+            () if is_along() => 2,
+            () => 3,
+        })
     };
-    lists.sort_by_key(|own| (!is_along(own), Nearness::of(cube, own), rank(own)));
+    lists.sort_by_key(|own| (nearness(own), rank(own)));
     let (mut found, mut lefts) = (vec![], vec![]);
     for own in lists {
         let Some(array) = file.array(own)?.filter(|array| array.sides.iter().filter(|side| **side != 1).count() <= 1)
@@ -363,11 +369,7 @@ fn waves_of(file: &MatFile, cube: &str, sides: &[usize], is_told: bool) -> Resul
                 let mut left = packing.left(true, false);
                 left.retain(|name| packing.unit.is_some() || !is_wave_unit(name));
                 lefts.push(left);
-                found.push((own.clone(), Nearness::of(cube, own), nm));
-                // One that is along an axis is that of the cube.
-                if is_along(own) {
-                    break;
-                }
+                found.push((own.clone(), nearness(own), nm));
             }
             // A list that counts bands is none.
             Ok(None) if found.is_empty() => return Ok(None),

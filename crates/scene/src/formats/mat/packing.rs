@@ -22,10 +22,11 @@ pub(in super::super) fn rank_of_waves(name: &str) -> Option<usize> {
     WAVES.iter().position(|own| *own == lower).or_else(|| is_like.then_some(WAVES.len()))
 }
 
-/// How near a list of wavelengths is to a cube, the lesser the nearer: whether it is in the cube's group or structure, or how far above; then whether what
+/// How near a list of wavelengths is to a cube, the lesser the nearer: how it belongs to one of the cube's axes; whether it is in the cube's group or structure, or how far above; then whether what
 /// its name has beside words of wavelengths is in the cube's name, as of `swir_wavelengths` and `swir`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(in super::super) struct Nearness {
+    axis: usize,
     group: usize,
     words: usize,
 }
@@ -47,7 +48,12 @@ impl Nearness {
             true => 1,
             false => 2,
         };
-        Self { group, words }
+        Self { axis: 0, group, words }
+    }
+
+    /// Returns it for a list that belongs to an axis so closely.
+    pub(super) fn with_axis(self, axis: usize) -> Self {
+        Self { axis, ..self }
     }
 }
 

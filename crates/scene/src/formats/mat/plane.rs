@@ -81,6 +81,8 @@ pub(in super::super) fn read_plane(path: &Path, told: Option<&str>) -> Result<No
             }
         }
     }
+    // Those of the file itself first.
+    arrays.sort_by_key(|(name, _)| name.contains('.'));
     let planes: Vec<&(String, Vec<usize>)> = arrays.iter().filter(|(_, sides)| are_plane(sides)).collect();
     let last = |name: &str| name.rsplit(['/', '.']).next().unwrap_or_default().to_lowercase();
     let named = match told {
