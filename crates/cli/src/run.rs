@@ -62,6 +62,11 @@ pub(crate) fn run(arguments: &RunArgs, common: &Common) -> anyhow::Result<()> {
     let total_s = clock.total_s();
     drop(clock);
     tell(&report.lens_notes, common);
+    // Of a lens's own file, where nobody asked for a focus.
+    let is_asked = arguments.camera.is_some() || arguments.from.is_some() || arguments.place.focus().is_some();
+    let is_file = matches!(capture.camera.lens, LensSpec::File(_));
+    let note_on_film = (is_file && !is_asked).then(|| capture.note_on_film()).flatten();
+    tell(note_on_film.as_slice(), common);
     tell(&report.sensor.notes, common);
     tell(&report.scene.notes, common);
     if report.film.dark_fraction > display::LEAST_DARK_FRACTION {

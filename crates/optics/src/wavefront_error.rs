@@ -123,6 +123,10 @@ impl WavefrontError {
     pub(crate) fn notes_on_ranges(&self, wavelengths_nm: &[f64]) -> Vec<String> {
         let mut notes = Vec::new();
         let [first_nm, last_nm] = self.range_of(|band| band.wavelength_nm);
+        let is_other = |nm: &f64| (nm - first_nm).abs() > 1e-6 * first_nm;
+        if first_nm == last_nm && self.chromatic_eye_nm.is_none() && wavelengths_nm.iter().any(is_other) {
+            notes.push(format!("the wavefront error is known at {first_nm} nm, and held at all wavelengths"));
+        }
         if last_nm > first_nm && wavelengths_nm.iter().any(|nm| !(first_nm..=last_nm).contains(nm)) {
             notes.push(format!("the wavefront error is known from {first_nm} to {last_nm} nm, and held beyond"));
         }

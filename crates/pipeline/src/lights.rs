@@ -22,9 +22,11 @@ pub fn parse_illuminant(text: &str) -> Result<Illuminant, PipelineError> {
     Ok(Illuminant::parse(text)?)
 }
 
-/// Whether a text is the name of a table, by its ending or because it is there.
+/// Whether a text is the name of a table, by its ending or because it is there and no light is called so.
 fn is_table(path: &Path) -> bool {
-    path.extension().is_some_and(|own| own.eq_ignore_ascii_case("csv") || path.is_file())
+    let is_light = || path.to_str().is_some_and(|text| Illuminant::parse(text).is_ok());
+    let is_there = || path.is_file() && (path.extension().is_some() || !is_light());
+    path.extension().is_some_and(|own| own.eq_ignore_ascii_case("csv")) || is_there()
 }
 
 /// Returns the white of a command line: a word of [`WhiteBalance::parse`], or the CSV file of a light's spectrum.

@@ -21,6 +21,9 @@ use super::{
 const SURFACE_KEYS: &str =
     "radius, thickness, ior, semi_aperture, conic_constant, aspheric_coefficients, transform and stop";
 
+/// What is read of a file, and what changes nothing.
+const FILE_KEYS: [&str; 6] = ["name", "description", "type", "metadata", "surfaces", "microlens"];
+
 /// Reads a lens from the JSON value of an omni file; `name` serves where the file states none.
 pub(super) fn lens_from_omni(value: &Value, name: &str, glasses: &Glasses) -> Result<LensFile, TextError> {
     let file = Object::new(value, "")?;
@@ -37,6 +40,10 @@ pub(super) fn lens_from_omni(value: &Value, name: &str, glasses: &Glasses) -> Re
     let source = file.text("description").unwrap_or("an omni .json file");
     let lens = Lens::new(file.text("name").unwrap_or(name), source, interfaces, stop)?.with_moves(moves)?;
     let mut read = LensFile::of_lens(lens);
+    let unknown: Vec<&str> = file.keys().map(String::as_str).filter(|key| !FILE_KEYS.contains(key)).collect();
+    if !unknown.is_empty() {
+        read.notes.push(format!("{} of the file is not known and left out", unknown.join(", ")));
+    }
     if let Some(block) = file.get("microlens")
         && !is_empty(block)
     {
@@ -368,6 +375,8 @@ mod tests {
         assert_eq!((microlens.lens.interfaces().len(), microlens.lens.stop()), (1, 0));
         assert_eq!(file.notes, ["the array of 2 × 1 microlenses is kept, but not traced"]);
         assert_eq!(with("[]").ok().unwrap().microlens, None);
+        let stated = read_file(&SINGLET.replace("{\"name\"", "{\"units\": \"m\", \"name\"")).ok().unwrap();
+        assert_eq!(stated.notes, ["units of the file is not known and left out"]);
         let message = |from: &str, to: &str| with(&block.replace(from, to)).err().unwrap().reason;
         assert!(message("[2, 1]", "[2.5, 1]").starts_with("microlens.dimensions is [2.5,1], expected whole numbers"));
         assert!(message("[2, 1]", "[2, 2]").contains("has 2 shifts, expected one each of the 2 × 2 microlenses"));

@@ -91,6 +91,11 @@ impl Capture {
             .collect()
     }
 
+    /// Says that the film is not where the file of the lens has it, if that is so.
+    pub fn note_on_film(&self) -> Option<String> {
+        self.lens.note_on_film(self.place.film_distance_mm)
+    }
+
     /// Says what the point spread functions of a file leave open on this film and before this scene.
     fn notes_on_psfs(&self) -> Vec<String> {
         let Some(psfs) = &self.lens.psfs else { return vec![] };

@@ -22,6 +22,8 @@ pub struct ResolvedLens {
     pub psfs: Option<PsfFile>,
     /// The distance of the object that it is made for, mm from the first vertex.
     object_distance_mm: f64,
+    /// Where its file has the film, mm behind the last vertex.
+    film_distance_mm: Option<f64>,
     /// What of the light on its axis it lets through, found once.
     transmittance: OnceLock<Option<Layer>>,
 }
@@ -64,6 +66,18 @@ impl ResolvedLens {
         self.transmittance.get_or_init(tabulate).as_ref()
     }
 
+    /// Says that a film is not where the file of the lens has it, if that is so.
+    pub(super) fn note_on_film(&self, film_distance_mm: f64) -> Option<String> {
+        let own_mm = self.film_distance_mm.filter(|own_mm| *own_mm != 0.0)?;
+        let is_other = (own_mm - film_distance_mm).abs() > 1e-6 * own_mm.abs();
+        is_other.then(|| {
+            format!(
+                "the film is at {film_distance_mm:.4} mm, where the scene is in focus, not at {own_mm} mm as the lens's file has it: \
+                 --film-mm {own_mm} puts it there"
+            )
+        })
+    }
+
     /// What is to be known of it at these wavelengths, a sentence each: its [`notes`](Self::notes), and which glasses are continued beyond
     /// the range in which they are known.
     pub fn notes_at(&self, wavelengths_nm: &[f64]) -> Vec<String> {
@@ -86,7 +100,8 @@ pub(super) fn resolve(inputs: &LensInputs) -> Result<ResolvedLens, PipelineError
     let object_distance_mm = file.object_distance_mm.unwrap_or(f64::INFINITY);
     let note_on_limit = reference.note_on_limit(object_distance_mm);
     let notes = file.notes.into_iter().chain(note_on_stop).chain(note_on_iris).chain(note_on_limit).collect();
-    Ok(ResolvedLens { lens, reference, notes, psfs, object_distance_mm, transmittance: OnceLock::new() })
+    let film_distance_mm = file.film_distance_mm;
+    Ok(ResolvedLens { lens, reference, notes, psfs, object_distance_mm, film_distance_mm, transmittance: OnceLock::new() })
 }
 
 /// Checks that every medium of the lens, and its point spread functions of a file, are known at bands that are known before the scene is.

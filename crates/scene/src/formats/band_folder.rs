@@ -204,7 +204,7 @@ fn listing(folder: &Path) -> Result<Listing, SceneError> {
             None => unused.push(name_of(&path)),
         }
     }
-    // Bands are called alike before their numbers: one of another name is none of them.
+    // Bands are called alike before their numbers: one of another name with the number of a year is none of them.
     let start = |path: &Path| {
         let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         stem.trim_end_matches(|c: char| c.is_ascii_digit() || ".nmto_- ".contains(c)).to_owned()
@@ -212,7 +212,7 @@ fn listing(folder: &Path) -> Result<Listing, SceneError> {
     let starts: Vec<String> = pictures.iter().map(|(_, path)| start(path)).collect();
     let n_called = |own: &String| starts.iter().filter(|start| *start == own).count();
     if starts.iter().map(n_called).max().is_some_and(|most| most > 2 && 2 * most > starts.len()) {
-        let odd = pictures.extract_if(.., |(_, path)| n_called(&start(path)) == 1);
+        let odd = pictures.extract_if(.., |(nm, path)| n_called(&start(path)) == 1 && (1990.0..2100.0).contains(nm));
         unused.extend(odd.map(|(_, path)| name_of(&path)));
     }
     pictures.sort_by(|a, b| a.0.total_cmp(&b.0).then_with(|| a.1.cmp(&b.1)));
@@ -365,6 +365,7 @@ mod tests {
         for (names, n_bands) in [
             (&["b_450.png", "b_500.png", "b_560.png", "photo_2024.png"][..], 3),
             (&["blue_450.png", "green_550.png", "red_650.png"], 3),
+            (&["vis_450.png", "vis_500.png", "vis_560.png", "nir_850.png"], 4),
             (&["vis_450.png", "vis_550.png", "vis_650.png", "nir_850.png", "nir_900.png"], 5),
         ] {
             let folder = folder_of(names);

@@ -65,7 +65,7 @@ pub(super) fn read_chart(path: &Path) -> Result<Cube, SceneError> {
             "it has no line of numbers: expected wavelengths in nm and a reflectance a column".to_owned(),
         ));
     }
-    const OTHERS: [&str; 11] = [
+    const OTHERS: [&str; 17] = [
         "absorb",
         "radian",
         "emission",
@@ -74,14 +74,20 @@ pub(super) fn read_chart(path: &Path) -> Result<Cube, SceneError> {
         "w m-2",
         "w/cm",
         "counts",
-        "log(1/r)",
-        "log 1/r",
+        "log(1/",
+        "log 1/",
+        "log_1_",
+        "log(r",
+        "log r",
         "optical density",
+        "optical_density",
+        "opticaldensity",
+        "k/s",
     ];
     let is_other = |name: &&String| {
         let lower = name.to_lowercase();
         let has_word = |word: &str| lower.split(|c: char| !c.is_alphabetic()).any(|own| own == word);
-        OTHERS.iter().any(|other| lower.contains(other)) || has_word("od") || has_word("dn")
+        OTHERS.iter().any(|other| lower.contains(other)) || ["od", "dn", "abs", "db"].into_iter().any(has_word)
     };
     if let Some(other) = names.iter().find(is_other) {
         return Err(wrong(format!("its column '{}' says that it holds no reflectances, expected such", short(other))));
