@@ -65,7 +65,7 @@ pub(super) fn read_chart(path: &Path) -> Result<Cube, SceneError> {
             "it has no line of numbers: expected wavelengths in nm and a reflectance a column".to_owned(),
         ));
     }
-    const OTHERS: [&str; 17] = [
+    const OTHERS: [&str; 12] = [
         "absorb",
         "radian",
         "emission",
@@ -74,11 +74,6 @@ pub(super) fn read_chart(path: &Path) -> Result<Cube, SceneError> {
         "w m-2",
         "w/cm",
         "counts",
-        "log(1/",
-        "log 1/",
-        "log_1_",
-        "log(r",
-        "log r",
         "optical density",
         "optical_density",
         "opticaldensity",
@@ -87,7 +82,7 @@ pub(super) fn read_chart(path: &Path) -> Result<Cube, SceneError> {
     let is_other = |name: &&String| {
         let lower = name.to_lowercase();
         let has_word = |word: &str| lower.split(|c: char| !c.is_alphabetic()).any(|own| own == word);
-        OTHERS.iter().any(|other| lower.contains(other)) || ["od", "dn", "abs", "db"].into_iter().any(has_word)
+        OTHERS.iter().any(|other| lower.contains(other)) || ["od", "dn", "abs", "db", "log"].into_iter().any(has_word)
     };
     if let Some(other) = names.iter().find(is_other) {
         return Err(wrong(format!("its column '{}' says that it holds no reflectances, expected such", short(other))));
@@ -181,6 +176,8 @@ mod tests {
             ("# nothing\n", "no line of numbers"),
             ("nm,absorbance\n400,.2\n", "'absorbance' says that it holds no reflectances"),
             ("nm,W/m2/nm\n400,.2\n", "'W/m2/nm' says that it holds no reflectances"),
+            ("nm,catalog red,Optical_Density\n400,.2,.3\n", "'Optical_Density' says that it holds no reflectances"),
+            ("nm,log(1/T)\n400,.2\n", "'log(1/T)' says that it holds no reflectances"),
             ("waves (zorp),a\n400,.2\n", "'zorp'"),
             ("nm,a\n400,0.1\n500\n", "line 3: 1 numbers"),
             ("nm,a\n400,0.1\n500,x\n", "line 3: '500,x'"),
