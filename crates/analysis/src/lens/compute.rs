@@ -20,7 +20,7 @@ use rayon::prelude::*;
 
 use super::{
     afocal::AfocalView,
-    film::{AnalysisFilm, DARK_AXIS, FilmUse, IDEAL_MM},
+    film::{AnalysisFilm, DARK_AXIS, FilmUse, IDEAL_MM, RINGS},
     request::{AnalysisRequest, Field},
     rows::{
         AxialColorRow, FanRow, FieldRow, FocusData, GridRow, LensAnalysis, OpdMap, PupilRow, SpotRow, WavefrontRow,
@@ -150,7 +150,8 @@ impl Bench {
 
     /// Returns the film with the least spots of these points, mm, and their size, mm rms.
     fn best(&self, points: &[ObjectPoint], lenses: &[MonoLens], from_mm: f64) -> Option<(f64, f64)> {
-        Autofocus { lenses, points, rule: self.rule }.best_film_mm(from_mm)
+        // By the rays that every command focuses with, however many its spots have.
+        Autofocus { lenses, points, rule: PupilRule::of_rings(RINGS) }.best_film_mm(from_mm)
     }
 
     /// Returns where each wavelength of a point on the axis focuses; films are sought about `from_mm`.

@@ -51,7 +51,7 @@ pub struct FilmPlace {
 pub(crate) const DARK_AXIS: &str = "the paraxial image, since the axis is dark";
 
 /// Rings of the rays by which a film is found.
-const RINGS: usize = 12;
+pub(super) const RINGS: usize = 12;
 
 impl AnalysisFilm {
     /// Returns where the film is.

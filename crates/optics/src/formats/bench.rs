@@ -262,6 +262,12 @@ impl Bench<'_> {
         let (mut curvature, mut shape) = (if radius == 0.0 { 0.0 } else { 1.0 / radius }, Shape::Sphere);
         if let Some(asphere) = aspheres.first() {
             if let Some(own_radius) = asphere.number(1, "the radius of an asphere")? {
+                if (own_radius - radius).abs() > 1e-4 * radius.abs() {
+                    let place = row.cell(0);
+                    notes.push(format!(
+                        "surface {place} has the radius {radius} in [lens data] and {own_radius} in [aspherical data], which is taken"
+                    ));
+                }
                 curvature = if own_radius == 0.0 { 0.0 } else { 1.0 / own_radius };
             }
             let conic = asphere.number(2, "a conic constant")?.unwrap_or(0.0);
