@@ -53,9 +53,11 @@ fn traced_wavefronts_have_the_terms_that_were_stated() {
         let traced = Wavefront::trace(&mono, &FAR, focal_mm, PupilGrid::STANDARD, WavefrontReference::Chief).unwrap();
         let found = traced.zernike_waves(15);
         let expected = 0.02 / (1e-3 * NM);
-        assert!((found[j - 1] / expected - 1.0).abs() < 2e-3, "Z{j}: {} {expected}", found[j - 1]);
+        // Terms found are over sines of directions, those stated over the flat pupil: discs that differ by half the square of the aperture.
+        let tolerance = 2e-3 + 0.5 * (RADIUS_MM / focal_mm).powi(2);
+        assert!((found[j - 1] / expected - 1.0).abs() < tolerance, "Z{j}: {} {expected}", found[j - 1]);
         let others = found.iter().enumerate().skip(3).filter(|(i, _)| i + 1 != j);
-        assert!(others.into_iter().all(|(_, other)| other.abs() < 2e-3 * expected), "Z{j}: {found:?}");
+        assert!(others.into_iter().all(|(_, other)| other.abs() < tolerance * expected), "Z{j}: {found:?}");
     }
 }
 
@@ -86,6 +88,8 @@ fn point_spreads_are_those_of_a_direct_sum() {
 }
 
 fn point_spreads_of(focal_mm: f64, pitch_um: f64) {
+    // Waves count by their slopes in the sum of the program, all alike in the direct one.
+    let tolerance = 1e-3 + 0.15 * (RADIUS_MM / focal_mm).powi(2);
     let n = 21;
     let window = WaveWindow { pitch_um, rows: n, columns: n, center: WindowCenter::At(DVec2::ZERO) };
     let quality = WaveQuality { nodes: None, points_per_pixel: Some(1) };
@@ -105,7 +109,7 @@ fn point_spreads_of(focal_mm: f64, pitch_um: f64) {
             let at_mm = DVec2::new(from_middle(column), from_middle(row));
             worst = worst.max((energy / unaberrated - direct(focal_mm, &coefficients_um, at_mm)).abs());
         }
-        assert!(worst < 1e-3, "{coefficients_um:?}: {worst:e}");
+        assert!(worst < tolerance, "{focal_mm} {coefficients_um:?}: {worst:e}");
     }
 }
 
