@@ -101,7 +101,15 @@ pub(super) fn resolve(inputs: &LensInputs) -> Result<ResolvedLens, PipelineError
     let note_on_limit = reference.note_on_limit(object_distance_mm);
     let notes = file.notes.into_iter().chain(note_on_stop).chain(note_on_iris).chain(note_on_limit).collect();
     let film_distance_mm = file.film_distance_mm;
-    Ok(ResolvedLens { lens, reference, notes, psfs, object_distance_mm, film_distance_mm, transmittance: OnceLock::new() })
+    Ok(ResolvedLens {
+        lens,
+        reference,
+        notes,
+        psfs,
+        object_distance_mm,
+        film_distance_mm,
+        transmittance: OnceLock::new(),
+    })
 }
 
 /// Checks that every medium of the lens, and its point spread functions of a file, are known at bands that are known before the scene is.

@@ -132,6 +132,14 @@ fn balanced_from_xyz(srgb_from_balanced: [[f64; 3]; 3], light: &Illuminant) -> [
     [0, 1, 2].map(|i| [0, 1, 2].map(|j| columns[j][i]))
 }
 
+/// The white of the profile connection space, D50.
+pub(super) const D50_XY: [f64; 2] = [0.3457, 0.3585];
+
+/// Returns the color of a chromaticity, of luminance 1.
+pub(super) fn xyz_of([x, y]: [f64; 2]) -> Xyz {
+    Xyz([x / y, 1.0, (1.0 - x - y) / y])
+}
+
 /// Returns the inverse of a matrix.
 pub(super) fn inverse(m: [[f64; 3]; 3]) -> [[f64; 3]; 3] {
     let minor = |r: usize, c: usize| {

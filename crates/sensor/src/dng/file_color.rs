@@ -3,11 +3,11 @@
 use dioptric_spectrum::{ColorTemperature, Illuminant, Xyz, adapt_bradford};
 use serde::Serialize;
 
-use super::file_look::ColorMap;
+use super::{
+    color::{D50_XY, xyz_of},
+    file_look::ColorMap,
+};
 use crate::ColorMatrix;
-
-/// The white of the profile connection space, D50.
-pub(super) const D50_XY: [f64; 2] = [0.3457, 0.3585];
 
 /// The color matrices of a file, rows by its planes.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -249,10 +249,6 @@ fn to_srgb(to_d50: &[Vec<f64>]) -> Option<ColorMatrix> {
     let rows = [0, 1, 2].map(|i| columns.iter().map(|column| column[i]).collect::<Vec<f64>>());
     let is_finite = rows.iter().flatten().all(|v| v.is_finite());
     is_finite.then(|| ColorMatrix { rows, has_roots: false, delta_e: Vec::new() })
-}
-
-pub(super) fn xyz_of([x, y]: [f64; 2]) -> Xyz {
-    Xyz([x / y, 1.0, (1.0 - x - y) / y])
 }
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {

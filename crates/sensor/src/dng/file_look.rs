@@ -8,8 +8,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::{
-    color::inverse,
-    file_color::{D50_XY, xyz_of},
+    color::{D50_XY, inverse, xyz_of},
     tags::{
         BASELINE_EXPOSURE, BASELINE_EXPOSURE_OFFSET, PROFILE_HUE_SAT_MAP_DIMS, PROFILE_HUE_SAT_MAP_ENCODING,
         PROFILE_LOOK_TABLE_DATA, PROFILE_LOOK_TABLE_DIMS, PROFILE_LOOK_TABLE_ENCODING, PROFILE_TONE_CURVE,
