@@ -132,7 +132,7 @@ fn note_on_numbers(name: &str, glass: &Glass, (nd, vd): (f64, f64)) -> Option<St
     })
 }
 
-/// The most that n_d, and V_d by its share, of one glass differ between melts: the usual tolerances of catalogues, and as much again for
+/// The most that the index at the d line, and the Abbe number by its share, of one glass differ between melts: the usual tolerances of catalogues, and as much again for
 /// numbers of other years.
 const MELT_ND: f64 = 1e-3;
 const MELT_VD: f64 = 0.016;
