@@ -45,6 +45,16 @@ def test_frame_and_picture_are_arrays(raw: Path, shot: dp.Shot, tmp_path: Path) 
     assert (tmp_path / "p.png").read_bytes() == developed.png()
 
 
+def test_profile_is_followed_as_far_as_told(raw: Path) -> None:
+    # Frames of this program have no look.
+    plain, look = (dp.develop(raw, rendering=word) for word in ("matrices", "look"))
+    assert np.array_equal(plain.rgb, look.rgb)
+    with pytest.raises(ValueError, match="rendering is 'film', expected matrices, colors, look"):
+        dp.develop(raw, rendering="film")
+    with pytest.raises(ValueError, match="rendering is given, expected it for files"):
+        dp.develop(np.zeros((8, 8), np.uint16), cfa="RGGB", rendering="look")
+
+
 def test_what_cannot_be_developed_is_refused(raw: Path, tmp_path: Path) -> None:
     with pytest.raises(OSError, match="missing.dng"):
         dp.develop(tmp_path / "missing.dng")

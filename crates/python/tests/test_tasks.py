@@ -122,15 +122,6 @@ def test_own_mosaic_is_developed() -> None:
     assert any("color matrix" in note for note in frame.notes)
 
 
-def test_raw_file_as_its_profile_has_it(tmp_path: Path) -> None:
-    shot = dp.Camera.demo().with_(pixels=(48, 32), quality="sketch").shoot()
-    shot.save(tmp_path / "raw.dng")
-    plain, look = (dp.develop(tmp_path / "raw.dng", rendering=word) for word in ("matrices", "look"))
-    assert np.array_equal(plain.rgb, look.rgb)                          # frames of this program have no look
-    with pytest.raises(ValueError, match="rendering is 'film', expected matrices, colors, look"):
-        dp.develop(tmp_path / "raw.dng", rendering="film")
-
-
 def test_emva_of_own_frames() -> None:
     rng = np.random.default_rng(2)
     def take(electrons: float) -> np.ndarray:
