@@ -3,6 +3,7 @@
 
 mod hidden;
 pub mod memory;
+pub mod ron;
 mod staged;
 mod target;
 pub mod text;

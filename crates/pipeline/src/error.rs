@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use dioptric_backward::BackwardError;
-use dioptric_files::WriteError;
+use dioptric_files::{WriteError, ron::RonError};
 use dioptric_forward::ForwardError;
 use dioptric_optics::OpticsError;
 use dioptric_psf::PsfError;
@@ -161,6 +161,11 @@ fn of_value(found: &str, expected: &str) -> String {
 }
 
 impl PipelineError {
+    /// Returns the error of a file whose text is not what was expected.
+    pub(crate) fn syntax(path: &Path, RonError { line, column, reason, .. }: RonError) -> Self {
+        Self::Syntax { path: path.to_owned(), line, column, reason }
+    }
+
     /// Whether a lens forms no image behind it to put the film at: then the film must be placed by its distance from the lens.
     pub fn is_without_image(&self) -> bool {
         matches!(self, Self::Optics(OpticsError::NoFocus { side: "behind it", .. }))

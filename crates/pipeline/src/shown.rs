@@ -4,7 +4,6 @@ use std::path::Path;
 
 use dioptric_scene::{DisplayModel, ExrSamples, Scene, read_iset_display, write_scene_exr};
 use dioptric_spectrum::{Observer, WavelengthGrid, Xyz};
-use ron::extensions::Extensions;
 use serde::Serialize;
 
 use crate::PipelineError;
@@ -27,13 +26,8 @@ pub fn open_display(text: &str) -> Result<(DisplayModel, Vec<String>), PipelineE
     }
     let read = dioptric_files::text::read(path)
         .map_err(|e| PipelineError::Read { path: path.to_owned(), reason: e.to_string() })?;
-    let options = ron::Options::default().with_default_extension(Extensions::IMPLICIT_SOME);
-    let display: DisplayModel = options.from_str(&read).map_err(|e| PipelineError::Syntax {
-        path: path.to_owned(),
-        line: e.span.start.line,
-        column: e.span.start.col,
-        reason: e.code.to_string(),
-    })?;
+    let display: DisplayModel =
+        dioptric_files::ron::from_text(&read).map_err(|error| PipelineError::syntax(path, error))?;
     display.check()?;
     Ok((display, vec![]))
 }

@@ -20,12 +20,11 @@ pub(crate) fn read_text(path: &Path) -> Result<String, SensorError> {
 /// # Errors
 /// Names the line that cannot be read.
 pub(crate) fn parse<T: DeserializeOwned>(text: &str, origin: &str) -> Result<T, SensorError> {
-    let options = ron::Options::default().with_default_extension(ron::extensions::Extensions::IMPLICIT_SOME);
-    options.from_str(text).map_err(|e| SensorError::Syntax {
+    dioptric_files::ron::from_text(text).map_err(|error| SensorError::Syntax {
         origin: origin.to_owned(),
-        line: e.span.start.line,
-        column: e.span.start.col,
-        reason: e.code.to_string(),
+        line: error.line,
+        column: error.column,
+        reason: error.reason,
     })
 }
 

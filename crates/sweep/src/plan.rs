@@ -6,7 +6,7 @@ use std::{
 };
 
 use dioptric_pipeline::{Camera, ExrSamples, FrameFile, Outputs};
-use ron::{extensions::Extensions, value::RawValue};
+use ron::value::RawValue;
 use serde::Deserialize;
 
 use crate::{
@@ -129,12 +129,11 @@ impl Plan {
     /// # Errors
     /// Names the line or the key that is wrong, and what was expected.
     pub fn parse(text: &str, path: &Path) -> Result<Self, SweepError> {
-        let options = ron::Options::default().with_default_extension(Extensions::IMPLICIT_SOME);
-        let plan: Self = options.from_str(text).map_err(|e| SweepError::Syntax {
+        let plan: Self = dioptric_files::ron::from_text(text).map_err(|error| SweepError::Syntax {
             path: path.to_owned(),
-            line: e.span.start.line,
-            column: e.span.start.col,
-            reason: e.code.to_string(),
+            line: error.line,
+            column: error.column,
+            reason: error.reason,
         })?;
         plan.check(path)?;
         Ok(plan)

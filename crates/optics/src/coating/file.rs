@@ -2,8 +2,6 @@
 
 use std::path::Path;
 
-use ron::extensions::Extensions;
-
 use super::{Coating, ReflectanceTable};
 use crate::OpticsError;
 
@@ -31,8 +29,7 @@ impl Coating {
         let coating = if is("csv") {
             table_from_csv(&text).map(Self::Table)
         } else if is("ron") {
-            let options = ron::Options::default().with_default_extension(Extensions::IMPLICIT_SOME);
-            options.from_str(&text).map_err(|error| format!("line {}: {}", error.span.start.line, error.code))
+            dioptric_files::ron::from_text(&text).map_err(|error| error.to_string())
         } else {
             Err(format!("has no ending of a coating, expected .csv or .ron (or one of {})", Self::WORDS.join(", ")))
         };

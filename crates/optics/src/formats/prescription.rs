@@ -137,9 +137,10 @@ pub(crate) fn lens_from_ron(text: &str) -> Result<Lens, TextError> {
 
 /// Reads a lens and its use from the text of our own file.
 pub(super) fn file_from_ron(text: &str) -> Result<LensFile, TextError> {
-    let prescription: Prescription = ron_options()
-        .from_str(text)
-        .map_err(|error| TextError { line: Some(error.span.start.line), reason: error.code.to_string() })?;
+    let prescription: Prescription = dioptric_files::ron::from_text(text).map_err(|error| TextError {
+        line: Some(error.line),
+        reason: format!("column {}: {}", error.column, error.reason),
+    })?;
     file_of_all(prescription)
 }
 
@@ -307,7 +308,8 @@ impl LensFile {
     /// array of microlenses.
     pub fn to_ron(&self) -> String {
         let pretty = ron::ser::PrettyConfig::new().depth_limit(2);
-        ron_options()
+        ron::Options::default()
+            .with_default_extension(Extensions::IMPLICIT_SOME)
             .to_string_pretty(&self.whole_prescription(), pretty)
             .expect("numbers and text always have a RON form")
     }
@@ -366,10 +368,6 @@ impl<'de> Deserialize<'de> for LensFile {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         file_of_all(Prescription::deserialize(deserializer)?).map_err(|error| D::Error::custom(error.reason))
     }
-}
-
-fn ron_options() -> ron::Options {
-    ron::Options::default().with_default_extension(Extensions::IMPLICIT_SOME)
 }
 
 #[cfg(test)]

@@ -1,45 +1,19 @@
 //! What is wrong with the text of a camera file.
 
-use ron::error::Position;
+use dioptric_files::ron::RonError;
 use serde_json::Value;
 
 /// The schema of camera files.
 pub const CAMERA_SCHEMA: &str = include_str!("../../data/camera.schema.json");
 
-/// Returns what is wrong with the text of a camera file: after which key, and what stands there.
-pub(super) fn reason(text: &str, error: &ron::error::SpannedError) -> String {
-    let Position { line, col } = error.span.start;
-    let from: usize = text.split_inclusive('\n').take(line.saturating_sub(1)).map(str::len).sum();
-    let of_line = &text[from..];
-    let (before, found) =
-        text.split_at(from + of_line.char_indices().nth(col.saturating_sub(1)).map_or(0, |(at, _)| at));
-    let found = found.lines().next().unwrap_or_default();
-    let is_of_word = |c: char| c.is_ascii_alphanumeric() || c == '_';
-    // After a key, or after the word of a choice, whose values have not begun well.
-    let head = before.trim_end().trim_end_matches('(').trim_end();
-    let head = head.strip_suffix(':').or_else(|| head.trim_end_matches(is_of_word).trim_end().strip_suffix(':'));
-    let key = head.map(|head| head.rsplit(|c| !is_of_word(c)).next().unwrap_or_default());
-    let Some(key) = key.filter(|key| !key.is_empty()) else { return error.code.to_string() };
-    let end = match found.strip_prefix('"') {
-        Some(within) => within.find('"').map(|end| end + 2),
-        None => found.find([',', ')', ']', '}']),
-    };
-    let found: String = found[..end.unwrap_or(found.len())].chars().take(24).collect();
-    let word = before.trim_end().trim_end_matches('(').rsplit(|c| !is_of_word(c)).next().unwrap_or_default();
-    let remedy = match error.code {
-        ron::Error::ExpectedIdentifier if found.starts_with('"') => {
-            ": words of choices stand without quotes".to_owned()
-        }
-        ron::Error::ExpectedIdentifier
-        | ron::Error::SuggestRawIdentifier(_)
-        | ron::Error::ExpectedStructLike
-        | ron::Error::ExpectedNamedStructLike(_) => {
-            values_of(word).map_or_else(String::new, |values| format!(": {word} takes {values}"))
-        }
-        _ => String::new(),
-    };
-    let found = if found.is_empty() { String::new() } else { format!(", found {}", found.trim_end()) };
-    format!("{key}: {}{found}{remedy}", error.code)
+/// Returns the error of a camera file with the values that the word of a choice takes, where they have not begun well.
+pub(super) fn with_values(mut error: RonError) -> RonError {
+    if let Some(word) = &error.choice
+        && let Some(values) = values_of(word)
+    {
+        error.reason = format!("{}: {word} takes {values}", error.reason);
+    }
+    error
 }
 
 /// Returns the values that the word of a choice takes, as the schema of camera files has them; `None` where words that are alike take others.

@@ -155,12 +155,7 @@ impl KeptCamera {
             }
             _ => unreadable(e.to_string()),
         })?;
-        let kept: Kept = ron::from_str(&text).map_err(|e| PipelineError::Syntax {
-            path: path.clone(),
-            line: e.span.start.line,
-            column: e.span.start.col,
-            reason: e.code.to_string(),
-        })?;
+        let kept: Kept = dioptric_files::ron::from_text(&text).map_err(|error| PipelineError::syntax(&path, error))?;
         let camera = Self::new(kept.camera.clone()).with_quality(Quality::Full);
         let inputs = camera.irradiance_inputs()?;
         let mut notes: Vec<String> = inputs
