@@ -44,13 +44,24 @@ impl ReferenceSphere {
             if !rays_on_film.fate[i].is_in_flight() {
                 return f64::NAN;
             }
-            let q = rays_on_film.point_mm(i) - self.center_mm;
-            let along = q.dot(rays_on_film.direction(i));
-            let excess = (along * along - q.length_squared()) / self.radius_mm;
-            let back_mm = along + excess / (1.0 + (1.0 + excess / self.radius_mm).sqrt());
+            let (_, back_mm) = self.back_to(rays_on_film, i);
             rays_on_film.opl_mm[i] - lens.image_index() * back_mm
         };
         (0..rays_on_film.len()).map(path).collect()
+    }
+
+    /// Returns where a ray is, from the center, and how much farther back than the radius it has crossed the sphere, mm.
+    fn back_to(&self, rays: &RayBatch, i: usize) -> (DVec3, f64) {
+        let q = rays.point_mm(i) - self.center_mm;
+        let along = q.dot(rays.direction(i));
+        let excess = (along * along - q.length_squared()) / self.radius_mm;
+        (q, along + excess / (1.0 + (1.0 + excess / self.radius_mm).sqrt()))
+    }
+
+    /// Returns the unit vector to the center from where a ray crosses the sphere: by it paths grow as the center moves.
+    fn inward(&self, rays: &RayBatch, i: usize) -> DVec3 {
+        let (q, back_mm) = self.back_to(rays, i);
+        rays.direction(i) + (rays.direction(i) * back_mm - q) / self.radius_mm
     }
 }
 
@@ -121,7 +132,7 @@ impl Wavefront {
         if reference == WavefrontReference::Best {
             let on_film = FilmRays::new(&rays, lens, film_distance_mm);
             let directions: Vec<DVec2> =
-                (0..chief).map(|i| on_film.along_film(on_film.directions[i], center_mm)).collect();
+                (0..chief).map(|i| on_film.along_film(sphere.inward(&rays, i), center_mm)).collect();
             wavefront.take_out_tilt(&directions, lens.image_index());
         }
         Ok(wavefront)

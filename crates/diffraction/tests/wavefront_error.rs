@@ -61,6 +61,17 @@ fn traced_wavefronts_have_the_terms_that_were_stated() {
     }
 }
 
+/// Coma moves the chief ray's place by much of a narrow pupil: what is taken out of a wavefront as tilt leaves the other terms alone.
+#[test]
+fn a_wavefront_without_its_tilt_has_the_other_terms() {
+    let coefficients_um = vec![0.0, 0.0, 0.0, 0.1, 0.0, 0.03, 0.05, 0.1, 0.0, 0.0, 0.08];
+    let mono = lens(400.0, coefficients_um.clone()).at(NM).unwrap();
+    let traced = Wavefront::trace(&mono, &FAR, 400.0, PupilGrid::STANDARD, WavefrontReference::Best).unwrap();
+    for (found, stated_um) in traced.zernike_waves(15).iter().zip(coefficients_um.iter().chain(&[0.0; 4])).skip(3) {
+        assert!((found * 1e-3 * NM - stated_um).abs() < 1e-4, "{found} {stated_um}");
+    }
+}
+
 /// The sum of waves from the places of a pupil to a point of the film, about the focus.
 fn direct(focal_mm: f64, coefficients_um: &[f64], at_mm: DVec2) -> f64 {
     let wave_number_per_mm = TAU / (1e-6 * NM);

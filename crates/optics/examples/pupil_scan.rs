@@ -172,7 +172,8 @@ fn compare_axis(name: &str, lens: &MonoLens) {
     let counted = first.efl_mm.abs() / (2.0 * beam_radius_mm(lens, N_COUNTED_ON_AXIS));
     let axis = ObjectPoint::Infinite(DVec3::Z);
     let paraxial_mm = lens.film_distance_mm_for(f64::INFINITY);
-    let focus = Autofocus { lenses: std::slice::from_ref(lens), points: &[axis], rule: PupilRule::of_rings(N_RINGS) };
+    let points = [axis];
+    let focus = Autofocus::alike(std::slice::from_ref(lens), &points, PupilRule::of_rings(N_RINGS));
     let spot = paraxial_mm.ok().and_then(|from_mm| focus.best_film_mm(from_mm));
     let spot = spot.map_or("– | –".to_owned(), |(best_mm, least_mm)| {
         // Out of focus, where the rim, of which rays are hard to count, has no more than its share of the squares.

@@ -26,6 +26,7 @@ mod text_error;
 mod write;
 mod write_seq;
 mod write_zmx;
+mod zar;
 mod zmx;
 
 pub use lens_file::{Configuration, Field, LensFile, Microlens, MissingGlass, ReadOptions, SeqNumbers};

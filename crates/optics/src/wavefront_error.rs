@@ -68,8 +68,9 @@ pub enum ZernikeTerms {
 
 /// The most coefficients: those up to degree 20.
 const MOST_TERMS: usize = 231;
-/// Wavelengths at which the chromatic eye is known, nm.
-const EYE_NM: [f64; 2] = [380.0, 780.0];
+/// Wavelengths at which the chromatic eye is known, nm: in the near infrared, where aberrometers measure, its formula holds as well
+/// (Fernández and others 2005).
+const EYE_NM: [f64; 2] = [380.0, 900.0];
 
 impl ZernikeTerms {
     /// Returns the degree, the order (below 0 with the sine) and the norm of the `i`-th polynomial, from 0.
@@ -259,7 +260,7 @@ impl WavefrontError {
             self.check_turned(surface)?;
         }
         match self.chromatic_eye_nm {
-            Some(nm) if !(EYE_NM[0]..=EYE_NM[1]).contains(&nm) => wrong("chromatic_eye_nm", nm, "380 to 780 nm"),
+            Some(nm) if !(EYE_NM[0]..=EYE_NM[1]).contains(&nm) => wrong("chromatic_eye_nm", nm, "380 to 900 nm"),
             _ => Ok(()),
         }
     }

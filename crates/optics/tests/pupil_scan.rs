@@ -56,7 +56,8 @@ fn axial_spots_are_those_of_counted_rays() {
         let axis = ObjectPoint::Infinite(DVec3::Z);
         let rule = PupilRule::of_rings(12);
         let Ok(from_mm) = lens.film_distance_mm_for(f64::INFINITY) else { return };
-        let focus = Autofocus { lenses: std::slice::from_ref(lens), points: &[axis], rule };
+        let points = [axis];
+        let focus = Autofocus::alike(std::slice::from_ref(lens), &points, rule);
         let (best_mm, least_mm) = focus.best_film_mm(from_mm).expect("light on the axis");
         let rms_mm = |film_mm: f64| {
             let light = PupilLight::to_film(lens, &axis, film_mm, rule).expect("light on the axis");

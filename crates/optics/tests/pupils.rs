@@ -203,7 +203,8 @@ fn f_numbers_and_axial_spots_of_all_shared_files_are_those_of_counted_rays() {
         }
         let from_mm = lens.film_distance_mm_for(f64::INFINITY).ok()?;
         let (axis, rule) = (ObjectPoint::Infinite(DVec3::Z), PupilRule::of_rings(12));
-        let focus = Autofocus { lenses: std::slice::from_ref(&lens), points: &[axis], rule };
+        let points = [axis];
+        let focus = Autofocus::alike(std::slice::from_ref(&lens), &points, rule);
         let (best_mm, least_mm) = focus.best_film_mm(from_mm).expect("light on the axis");
         // In focus and out of it; a perfect mirror's spot is rounding alone.
         for film_mm in [best_mm, best_mm + 8.0 * least_mm * real] {

@@ -17,7 +17,8 @@ pub struct FocusRays {
     slope_mm: f64,
     /// Half its curvature.
     bend: f64,
-    n_spots: usize,
+    /// The sum of the weights of the spots.
+    n_spots: f64,
 }
 
 /// Where a ray meets the film, how that place moves as the film moves on, and how much light it stands for.
@@ -47,12 +48,13 @@ impl FocusRays {
                 .iter()
                 .flat_map(|rays| arrived(rays).into_iter().map(move |i| ray(rays, i)))
                 .collect::<Vec<_>>(),
+            1.0,
         );
     }
 
-    /// Adds the spot of a point's light on the film of a lens, `film_distance_mm` behind its last vertex, however it is curved
-    /// and stands.
-    fn add_on_film(&mut self, lens: &MonoLens, film_distance_mm: f64, wavelengths: &[PupilLight]) {
+    /// Adds the spot of a point's light, of wavelengths that count by their weights, on the film of a lens, `film_distance_mm` behind its
+    /// last vertex, however it is curved and stands.
+    fn add_on_film(&mut self, lens: &MonoLens, film_distance_mm: f64, wavelengths: &[(PupilLight, f64)], weight: f64) {
         let placement = lens.film_placement(film_distance_mm);
         let ray = |rays: &RayBatch, i: usize, weight: f64| {
             let place = lens.on_film_mm(rays.point_mm(i), film_distance_mm);
@@ -61,14 +63,14 @@ impl FocusRays {
             // As a sloping film moves on, a ray meets it sooner or later.
             FocusRay { place, slope: slope / (1.0 - slope.dot(lens.image_surface().slope_at(place))), weight }
         };
-        let of_light = |light: &PupilLight| -> Vec<FocusRay> {
-            light.weights().iter().enumerate().map(|(i, weight)| ray(light.rays(), i, *weight)).collect()
+        let of_light = |(light, of_color): &(PupilLight, f64)| -> Vec<FocusRay> {
+            light.weights().iter().enumerate().map(|(i, weight)| ray(light.rays(), i, of_color * weight)).collect()
         };
-        self.add_rays(&wavelengths.iter().flat_map(of_light).collect::<Vec<_>>());
+        self.add_rays(&wavelengths.iter().flat_map(of_light).collect::<Vec<_>>(), weight);
     }
 
-    /// Adds a spot of rays.
-    fn add_rays(&mut self, rays: &[FocusRay]) {
+    /// Adds a spot of rays, which counts so much.
+    fn add_rays(&mut self, rays: &[FocusRay], weight: f64) {
         let total: f64 = rays.iter().map(|ray| ray.weight).sum();
         if total <= 0.0 {
             return;
@@ -76,12 +78,12 @@ impl FocusRays {
         let mean = |of: &dyn Fn(&FocusRay) -> DVec2| rays.iter().map(|ray| of(ray) * ray.weight).sum::<DVec2>() / total;
         let (place, slope) = (mean(&|ray| ray.place), mean(&|ray| ray.slope));
         for ray in rays {
-            let (p, s, share) = (ray.place - place, ray.slope - slope, ray.weight / total);
+            let (p, s, share) = (ray.place - place, ray.slope - slope, weight * ray.weight / total);
             self.size_mm2 += p.length_squared() * share;
             self.slope_mm += p.dot(s) * share;
             self.bend += s.length_squared() * share;
         }
-        self.n_spots += 1;
+        self.n_spots += weight;
     }
 
     /// Returns how far to move the film, mm, for the least mean square of the spots; `None` where it does not matter.
@@ -92,7 +94,7 @@ impl FocusRays {
     /// Returns the root mean square of the spots on a film moved by this much, mm.
     pub fn rms_mm(&self, shift_mm: f64) -> f64 {
         let total = self.size_mm2 + shift_mm * (2.0 * self.slope_mm + shift_mm * self.bend);
-        (total / self.n_spots as f64).max(0.0).sqrt()
+        (total / self.n_spots).max(0.0).sqrt()
     }
 }
 
@@ -103,11 +105,20 @@ pub struct Autofocus<'a> {
     pub lenses: &'a [MonoLens],
     /// The points that count, each a spot.
     pub points: &'a [ObjectPoint],
+    /// How much each wavelength counts; empty where all count alike.
+    pub wavelength_weights: &'a [f64],
+    /// How much each point counts; empty where all count alike.
+    pub point_weights: &'a [f64],
     /// How finely their light is sampled.
     pub rule: PupilRule,
 }
 
-impl Autofocus<'_> {
+impl<'a> Autofocus<'a> {
+    /// Returns a focus on points and wavelengths that all count alike.
+    pub fn alike(lenses: &'a [MonoLens], points: &'a [ObjectPoint], rule: PupilRule) -> Self {
+        Self { lenses, points, wavelength_weights: &[], point_weights: &[], rule }
+    }
+
     /// Returns the film's distance behind the last vertex at which the spots are smallest, and their size there, both
     /// mm; `None` if no light gets through, or none that comes to a focus.
     ///
@@ -129,10 +140,15 @@ impl Autofocus<'_> {
     /// Returns the best film as the rays on this one foretell it.
     fn better_film_mm(&self, film_distance_mm: f64) -> Option<(f64, f64)> {
         let mut rays = FocusRays::default();
-        for point in self.points {
-            let light = |lens: &MonoLens| PupilLight::to_film(lens, point, film_distance_mm, self.rule);
+        let weight = |weights: &[f64], i: usize| weights.get(i).copied().unwrap_or(1.0);
+        for (i, point) in self.points.iter().enumerate() {
+            let light = |(color, lens): (usize, &MonoLens)| {
+                let light = PupilLight::to_film(lens, point, film_distance_mm, self.rule)?;
+                Some((light, weight(self.wavelength_weights, color)))
+            };
+            let lights: Vec<_> = self.lenses.iter().enumerate().filter_map(light).collect();
             if let Some(lens) = self.lenses.first() {
-                rays.add_on_film(lens, film_distance_mm, &self.lenses.iter().filter_map(light).collect::<Vec<_>>());
+                rays.add_on_film(lens, film_distance_mm, &lights, weight(self.point_weights, i));
             }
         }
         let shift_mm = rays.shift_mm()?;
@@ -163,7 +179,7 @@ mod tests {
     fn an_ideal_lens_is_focused_where_its_equation_says() {
         let lens = Lens::thin(50.0, 10.0).unwrap().at(550.0).unwrap();
         let points = [0.0, 0.2].map(|tan| ObjectPoint::from_field(&lens, DVec2::X * tan, 0.5));
-        let focus = Autofocus { lenses: from_ref(&lens), points: &points, rule: RULE };
+        let focus = Autofocus::alike(from_ref(&lens), &points, RULE);
         let (film_distance_mm, rms_mm) = focus.best_film_mm(40.0).unwrap();
         assert!((film_distance_mm - 1.0 / (1.0 / 50.0 - 1.0 / 2000.0)).abs() < 1e-11);
         // What is left is the square root of rounding in squares of 1 mm.
@@ -177,7 +193,7 @@ mod tests {
         let curved = ImageSurface { curvature_per_mm: -1.0 / 60.0, conic: 0.0 };
         let lens = flat.with_image_surface(curved).unwrap().at(550.0).unwrap();
         let points = [0.0, 0.15, 0.3].map(|tan| ObjectPoint::from_field(&lens, DVec2::Y * tan, 0.0));
-        let focus = Autofocus { lenses: from_ref(&lens), points: &points, rule: RULE };
+        let focus = Autofocus::alike(from_ref(&lens), &points, RULE);
         let (film_distance_mm, rms_mm) = focus.best_film_mm(36.0).unwrap();
         let found_mm = |film_distance_mm: f64| {
             let squares = points.iter().map(|point| rms_on_mm(&lens, point, film_distance_mm).powi(2));
@@ -193,7 +209,8 @@ mod tests {
     fn no_other_film_is_better_and_the_start_does_not_matter() {
         let lens = Lens::built_in("dgauss-50mm").unwrap().at(550.0).unwrap();
         let point = ObjectPoint::from_field(&lens, DVec2::new(0.0, 0.2), 0.0);
-        let focus = Autofocus { lenses: from_ref(&lens), points: &[point], rule: RULE };
+        let points = [point];
+        let focus = Autofocus::alike(from_ref(&lens), &points, RULE);
         let (film_distance_mm, rms_mm) = focus.best_film_mm(36.0).unwrap();
         assert!((focus.best_film_mm(30.0).unwrap().0 - film_distance_mm).abs() < 1e-11);
         let spot = |film_distance_mm: f64| rms_on_mm(&lens, &point, film_distance_mm);
@@ -207,7 +224,8 @@ mod tests {
         // sampling: minimise ∫ (a r³ − b r)² r dr, b = ∫ r⁴ r dr / ∫ r² r dr · a = (1/6) / (1/4) a.
         let lens = Lens::built_in("singlet-50mm").unwrap().with_f_number(20.0, 550.0).unwrap().at(550.0).unwrap();
         let axis = ObjectPoint::from_field(&lens, DVec2::ZERO, 0.0);
-        let focus = Autofocus { lenses: from_ref(&lens), points: &[axis], rule: RULE };
+        let points = [axis];
+        let focus = Autofocus::alike(from_ref(&lens), &points, RULE);
         let paraxial_mm = lens.film_distance_mm_for(f64::INFINITY).unwrap();
         let coordinates = PupilCoordinates::entrance(&lens);
         let edge = PupilSampling { coordinates, places: vec![DVec2::Y], rims: Vignetting::Off };
@@ -222,7 +240,8 @@ mod tests {
     fn darkness_has_no_focus() {
         let lens = Lens::built_in("dgauss-50mm").unwrap().at(550.0).unwrap();
         let point = ObjectPoint::from_field(&lens, DVec2::new(0.0, 1.2), 0.0);
-        let focus = Autofocus { lenses: from_ref(&lens), points: &[point], rule: RULE };
+        let points = [point];
+        let focus = Autofocus::alike(from_ref(&lens), &points, RULE);
         assert_eq!(focus.best_film_mm(36.0), None);
     }
 }

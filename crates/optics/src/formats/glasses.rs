@@ -71,6 +71,12 @@ impl<'a> Glasses<'a> {
             );
             return Ok(Found { glass: Glass::Named(full_name), note: Some(note) });
         }
+        if let Some(glass) = glass_of_digits(name) {
+            let (own_nd, own_vd) = glass.nd_vd().unwrap_or_default();
+            // The digits are those of the numbers, which may be stated whole.
+            let whole = nd_vd.filter(|(nd, vd)| (nd - own_nd).abs() < 1e-3 && (vd - own_vd).abs() < 0.1);
+            return found(whole.map_or(glass, |(nd, vd)| model(nd, vd)));
+        }
         self.instead(name, nd_vd).ok_or_else(|| {
             let stated = match nd_vd {
                 Some(PLACEHOLDER) => {
@@ -134,7 +140,7 @@ fn note_on_numbers(name: &str, glass: &Glass, (nd, vd): (f64, f64)) -> Option<St
 
 /// The most that the index at the d line, and the Abbe number by its share, of one glass differ between melts: the usual tolerances of catalogues, and as much again for
 /// numbers of other years.
-const MELT_ND: f64 = 1e-3;
+const MELT_ND: f64 = 3e-4;
 const MELT_VD: f64 = 0.016;
 
 /// The maker whose glass a name means that several have, where neither the file nor its reader names any.
@@ -142,6 +148,23 @@ const USUAL_MAKER: &str = "SCHOTT";
 
 /// What Zemax writes as index and Abbe number of a glass of a catalogue, unless they are stored with the file: no data.
 const PLACEHOLDER: (f64, f64) = (1.5, 40.0);
+
+/// Returns the glass of the six digits by which makers code n_d − 1 and V_d: `517642`, `517.642` or, with more of them,
+/// `516800.641700`. Of `003283` the index is 2.003, since no glass has less than 1.2.
+pub(super) fn glass_of_digits(word: &str) -> Option<Glass> {
+    let (nd, vd) = match word.split_once('.') {
+        Some(parts) => parts,
+        None if word.len() == 6 => word.split_at_checked(3)?,
+        None => return None,
+    };
+    let are_digits = |digits: &str| digits.len() >= 3 && digits.bytes().all(|sign| sign.is_ascii_digit());
+    if !(are_digits(nd) && are_digits(vd)) {
+        return None;
+    }
+    let whole = if nd < "2" { 2 } else { 1 };
+    let (nd, vd) = (format!("{whole}.{nd}"), format!("{}.{}", &vd[..2], &vd[2..]));
+    Some(model(nd.parse().ok()?, vd.parse().ok()?))
+}
 
 /// Returns the glass of an index and an Abbe number as files state them: an Abbe number of 0 means no dispersion.
 pub(super) fn model(nd: f64, vd: f64) -> Glass {

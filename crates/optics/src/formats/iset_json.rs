@@ -27,7 +27,7 @@ const FILE_KEYS: [&str; 6] = ["name", "description", "type", "metadata", "surfac
 /// Reads a lens from the JSON value of an omni file; `name` serves where the file states none.
 pub(super) fn lens_from_omni(value: &Value, name: &str, glasses: &Glasses) -> Result<LensFile, TextError> {
     let file = Object::new(value, "")?;
-    if file.get("polynomials").is_some() && file.get("surfaces").is_none() {
+    if ["polynomials", "poly"].iter().any(|key| file.get(key).is_some()) && file.get("surfaces").is_none() {
         let reason = "it is a ray-transfer function, polynomials in place of surfaces: expected a lens of surfaces; what another program makes \
                       of it can be used with psfs (run --psfs)";
         return Err(TextError { line: None, reason: reason.to_owned() });

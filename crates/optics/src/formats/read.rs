@@ -17,14 +17,14 @@ use super::{
     prescription::file_from_ron,
     seq,
     text_error::TextError,
-    zmx,
+    zar, zmx,
 };
 
 /// The shortest wavelength that a lens is of, nm; what is less was meant in micrometres.
 const SHORTEST_NM: f64 = 10.0;
 
 impl Lens {
-    /// Reads a lens file, by its extension: `.ron` (our own), `.dat`, `.json`, `.zmx`, `.seq`, `.len` or `.lens`.
+    /// Reads a lens file, by its extension: `.ron` (our own), `.dat`, `.json`, `.zmx`, `.zar`, `.seq`, `.len` or `.lens`.
     ///
     /// [`LensFile::read`](crate::LensFile::read) returns what else the file states, as where the film lies.
     ///
@@ -38,7 +38,7 @@ impl Lens {
 
 impl LensFile {
     /// Reads a lens file, by its extension: `.ron` (our own), `.dat` or `.txt`, `.json` (ISET's omni format or
-    /// `DeepLens`), `.zmx` (Zemax), `.seq` (CODE V), `.len` (OSLO), `.txt` (the Optical Bench's) or `.lens`.
+    /// `DeepLens`), `.zmx` and `.zar` (Zemax), `.seq` (CODE V), `.len` (OSLO), `.txt` (the Optical Bench's) or `.lens`.
     ///
     /// A glass catalogue beside a `.zmx` file that has its name and the extension `.agf` is read with it.
     ///
@@ -62,7 +62,9 @@ impl LensFile {
     pub fn from_bytes(path: &Path, bytes: &[u8], options: &ReadOptions) -> Result<Self, OpticsError> {
         let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
         let name = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
+        // Lines end by a carriage return alone on old Macintoshes.
         let text = text::of_bytes(bytes);
+        let text = if text.contains('\n') { text } else { text.replace('\r', "\n") };
         let glasses = Glasses::new(options);
         let read: Result<Self, TextError> = match extension.as_str() {
             "ron" => file_from_ron(&text),
@@ -76,21 +78,49 @@ impl LensFile {
             "len" => len::lens_from_len(&text, &name, &glasses),
             "zmx" => zmx::lens_from_zmx(&text, &name, glasses),
             "seq" => seq::lens_from_seq(&text, &name, glasses),
-            "zar" | "zos" => {
-                let reason = format!(
-                    "the layout of .{extension} files is not published: save the lens as .zmx (of an archive, \
-                     Extract Archive) and read that, its glasses with --glasses"
-                );
+            "zar" => return Self::from_archive(path, bytes, options),
+            "zos" => {
+                let reason =
+                    "the layout of .zos files is not published: save the lens as .zmx and read that".to_owned();
                 return Err(OpticsError::Io { path: path.to_owned(), reason });
             }
             _ => {
-                let expected = "expected .ron, .dat, .txt, .json, .zmx, .seq, .len or .lens";
+                let expected = "expected .ron, .dat, .txt, .json, .zmx, .zar, .seq, .len or .lens";
                 let reason = format!("the extension '.{extension}' is no lens format; {expected}");
                 return Err(OpticsError::Io { path: path.to_owned(), reason });
             }
         };
         let read = read.and_then(Self::with_wavelengths_of_light).and_then(|file| file.in_use(options.configuration));
         read.map_err(|TextError { line, reason }| OpticsError::File { path: path.to_owned(), line, reason })
+    }
+
+    /// Reads the lens of a Zemax archive, with the glasses that are in it.
+    fn from_archive(path: &Path, bytes: &[u8], options: &ReadOptions) -> Result<Self, OpticsError> {
+        let wrong = |reason: String| OpticsError::Io { path: path.to_owned(), reason };
+        let files = zar::unpack(bytes).map_err(wrong)?;
+        let names = |files: &[&zar::Packed]| files.iter().map(|file| file.name.as_str()).collect::<Vec<_>>().join(", ");
+        let lenses: Vec<_> = files.iter().filter(|file| file.has_extension("zmx")).collect();
+        let [lens] = lenses.as_slice() else {
+            let found = names(&files.iter().collect::<Vec<_>>());
+            return Err(wrong(format!(
+                "the archive has {} lenses as .zmx, expected one; it holds {found}",
+                lenses.len()
+            )));
+        };
+        let mut options = options.clone();
+        for file in files.iter().filter(|file| file.has_extension("agf")) {
+            options.catalogues.push(GlassCatalogue::from_bytes(Path::new(&file.name), &file.bytes)?);
+        }
+        let mut read = Self::from_bytes(&path.with_file_name(&lens.name), &lens.bytes, &options)?;
+        let left: Vec<_> =
+            files.iter().filter(|file| !(file.has_extension("zmx") || file.has_extension("agf"))).collect();
+        if !left.is_empty() {
+            read.notes.push(format!(
+                "{} of the archive are left aside, which say nothing of the lens but its coatings",
+                names(&left)
+            ));
+        }
+        Ok(read)
     }
 
     /// Returns the file if its wavelengths, of all configurations, are of light.

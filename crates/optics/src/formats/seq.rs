@@ -20,7 +20,7 @@ use self::{
     zoom::Zoom,
 };
 use super::{
-    glasses::{Glasses, constant, model},
+    glasses::{Glasses, constant, glass_of_digits, model},
     lens_file::{Field, LensFile, SeqNumbers},
     system::{Beam, FieldVignetting, System, SystemSurface},
     text_error::TextError,
@@ -193,6 +193,28 @@ impl<'a> Seq<'a> {
         match keyword {
             "END" => self.private_wavelengths_nm = None,
             "PWL" => *wavelengths_nm = command.numbers()?,
+            // n² = a + b λ² + c/λ² + d/λ⁴ + e/λ⁶ + f/λ⁸, as that of an adhesive of Edmund's shows, whose law is known.
+            _ if command.words.get(1).is_some_and(|word| word.eq_ignore_ascii_case("LAU")) => {
+                let terms =
+                    (2..command.words.len()).map(|place| command.number(place)).collect::<Result<Vec<f64>, _>>()?;
+                let [constant, powers @ ..] = terms.as_slice() else {
+                    return Err(command.wrong("a glass of Laurent's formula (LAU) without coefficients".to_owned()));
+                };
+                let pairs = powers.iter().zip([2.0, -2.0, -4.0, -6.0, -8.0, -10.0]).flat_map(|(c, power)| [*c, power]);
+                let coefficients = [*constant].into_iter().chain(pairs).collect();
+                let glass = Glass::Formula { formula: 3, coefficients, range_nm: None };
+                glass.check().map_err(|error| command.wrong(error))?;
+                self.glasses.private.push(CatalogueGlass {
+                    maker: String::new(),
+                    name: command.words[0].clone(),
+                    glass,
+                });
+            }
+            // Only a surface that has it is refused.
+            _ if command.words.get(1).is_some_and(|word| word.parse::<f64>().is_err()) => self.notes.push(format!(
+                "private glass {} is by the formula {}, which is not known (expected indices, or LAU), and left out",
+                command.words[0], command.words[1]
+            )),
             _ => {
                 let indices = command.numbers()?;
                 if indices.len() != wavelengths_nm.len() || indices.is_empty() {
@@ -363,7 +385,8 @@ impl<'a> Seq<'a> {
                 found.map_err(|reason| command.wrong(reason))?.glass
             }
         };
-        glass.check().map_err(|error| command.wrong(error))?;
+        let expected = "expected a glass, or an index with its Abbe number as 1.5168:64.17 or 517642";
+        glass.check().map_err(|error| command.wrong(format!("{error}; {expected}")))?;
         Ok(Some(glass))
     }
 
@@ -525,16 +548,5 @@ fn code_of(word: &str) -> Option<Glass> {
     if let Some((nd, vd)) = word.split_once(':') {
         return Some(model(nd.parse().ok()?, vd.parse().ok()?));
     }
-    let (nd, vd) = match word.split_once('.') {
-        Some(parts) => parts,
-        None if word.len() == 6 => word.split_at_checked(3)?,
-        None => ("", ""),
-    };
-    let is_code = |digits: &str| digits.len() >= 3 && digits.bytes().all(|sign| sign.is_ascii_digit());
-    if is_code(nd) && is_code(vd) {
-        // The digits of n_d − 1 behind its point, and those of V_d, of which two stand before its point.
-        let (nd, vd) = (format!("1.{nd}"), format!("{}.{}", &vd[..2], &vd[2..]));
-        return Some(model(nd.parse().ok()?, vd.parse().ok()?));
-    }
-    word.parse().ok().map(constant)
+    glass_of_digits(word).or_else(|| word.parse().ok().map(constant))
 }

@@ -82,10 +82,21 @@ impl Line<'_> {
 
 /// Keywords without a part in how a lens images: of windows, drawings, tolerances, polarization, ray aiming and physical optics.
 const HARMLESS: &[&str] = &[
-    "AUTH", "BLNK", "COFN", "COTF", "EERA", "FIMP", "FLAP", "GFAC", "GLRS", "GSTD", "HIDE", "HYPR", "IWDP", "LANG",
-    "LUID", "MEMA", "MIRR", "MODE", "MOFF", "NSCD", "OMMA", "PFIL", "PICB", "POLS", "POPS", "PUSH", "RAIM", "RAED",
-    "RAGL", "ROPD", "RSCE", "RSCH", "RWRE", "RFLS", "SCBD", "SDMA", "SLAB", "SSID", "STUD", "TOL", "TOLR", "TOLS",
-    "UDAD", "VANN", "VDSZ", "VERS", "WAVN",
+    "AUTH", "BLNK", "COFN", "COTF", "EERA", "FIMP", "FLAP", "GLRS", "GSTD", "HIDE", "HYPR", "IWDP", "LANG", "LUID",
+    "MEMA", "MIRR", "MODE", "MOFF", "NSCD", "OMMA", "PFIL", "PICB", "POLS", "POPS", "PUSH", "RAIM", "RAED", "RAGL",
+    "ROPD", "RSCE", "RSCH", "RWRE", "RFLS", "SDMA", "SLAB", "SSID", "STUD", "TOL", "TOLR", "TOLS", "VANN", "VDSZ",
+    "VERS",
+];
+/// What the second and the seventh number of `FTYP` say where they are not 0.
+const FLAGS: [(usize, &str); 2] = [
+    (
+        1,
+        "the file means its object space to be telecentric (FTYP): chief rays go through the middle of the stop instead",
+    ),
+    (
+        6,
+        "the file means its image space to be afocal (FTYP): where its light leaves in parallel, --afocal looks at angles",
+    ),
 ];
 /// The unknown keywords that are named.
 const MOST_NAMED: usize = 6;
@@ -164,6 +175,11 @@ impl Zmx {
             "GCAT" => self.makers = makers(&line.words),
             "FTYP" => {
                 self.field_type = line.count(0)?;
+                for (place, note) in FLAGS {
+                    if line.words.len() > place && line.count(place)? != 0 {
+                        self.notes.push(note.to_owned());
+                    }
+                }
                 self.n_fields = (line.words.len() > 2).then(|| line.count(2)).transpose()?;
                 self.n_wavelengths = (line.words.len() > 3).then(|| line.count(3)).transpose()?;
             }
@@ -174,8 +190,11 @@ impl Zmx {
             "VCXN" | "ZVCX" => self.vignetting[2] = line.numbers()?,
             "VCYN" | "ZVCY" => self.vignetting[3] = line.numbers()?,
             "WAVM" => self.wavelengths_um.push((line.count(0)?, line.number(1)?, line.number_or(2, 1.0)?)),
-            "WAVL" => self.wavelengths_um = (1..).zip(line.numbers()?).map(|(number, um)| (number, um, 1.0)).collect(),
-            "WWGT" => {
+            // Older files name the lists of 24 wavelengths so, as `XFLN` those of fields.
+            "WAVL" | "WAVN" => {
+                self.wavelengths_um = (1..).zip(line.numbers()?).map(|(number, um)| (number, um, 1.0)).collect()
+            }
+            "WWGT" | "WWGN" => {
                 for (stated, weight) in self.wavelengths_um.iter_mut().zip(line.numbers()?) {
                     stated.2 = weight;
                 }
@@ -192,6 +211,11 @@ impl Zmx {
                 if !name.is_empty() && !self.coatings.contains(&name) {
                     self.coatings.push(name);
                 }
+            }
+            // A kind of apodization and its factor; without numbers, or of 0, the pupil is even.
+            "GFAC" if line.numbers()?.iter().all(|number| *number == 0.0) => {}
+            "GFAC" => {
+                self.notes.push("its apodization of the pupil (GFAC) is left out: the pupil is evenly lit".to_owned());
             }
             keyword if HARMLESS.contains(&keyword) => {}
             keyword => {

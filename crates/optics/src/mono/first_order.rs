@@ -1,9 +1,9 @@
 //! First-order optics of a lens at one wavelength: pupils, f-numbers, images.
 
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 
 use crate::{
-    AxialBeam, Conjugate, FirstOrder, MonoLens, OpticsError,
+    AxialBeam, Conjugate, FirstOrder, MonoLens, OpticsError, RayBatch, Vignetting,
     paraxial::{self, MarginalRay, Matrix},
     trace::{Kind, Step},
 };
@@ -11,6 +11,9 @@ use crate::{
 /// How far an entrance pupil may be for counting from its center, over the first rim's radius: then counts are good to
 /// 1e-12 of the rim.
 const FARTHEST_PUPIL: f64 = 1e4;
+
+/// By which share of its length the way along a bent axis may differ from the distances between vertices, as it does by small tilts.
+const SAME_WAY: f64 = 0.01;
 
 impl MonoLens {
     /// Focal lengths, principal planes and pupils.
@@ -25,11 +28,16 @@ impl MonoLens {
     pub fn first_order(&self) -> FirstOrder {
         match self.limiting_beam() {
             Some(beam) => self.first_order.with_entrance_pupil_diameter_mm(2.0 * beam.height_mm),
-            // Of a pupil infinitely far no width says how much light of a far point gets through: its rays do.
-            None if self.first_order.f_number == 0.0 => {
-                FirstOrder { f_number: self.real_f_number().unwrap_or(f64::NAN), ..self.first_order }
-            }
-            None => self.first_order,
+            None => self.first_order_of_light(),
+        }
+    }
+
+    /// That of the stop; of a pupil infinitely far, of which no width says how much light of a far point gets through, with the f-number
+    /// of its rays.
+    fn first_order_of_light(&self) -> FirstOrder {
+        match self.first_order.f_number == 0.0 {
+            true => FirstOrder { f_number: self.real_f_number().unwrap_or(f64::NAN), ..self.first_order },
+            false => self.first_order,
         }
     }
 
@@ -40,13 +48,13 @@ impl MonoLens {
         if object_distance_mm.is_infinite() {
             return self.first_order();
         }
-        let Some(beam) = self.limiting_beam_for(object_distance_mm) else { return self.first_order };
+        let Some(beam) = self.limiting_beam_for(object_distance_mm) else { return self.first_order_of_light() };
         let way_mm = object_distance_mm + self.first_order.entrance_pupil_z_mm;
         let diameter_mm = 2.0 * (beam.slope_before * way_mm).abs();
         if diameter_mm.is_finite() {
             self.first_order.with_entrance_pupil_diameter_mm(diameter_mm)
         } else {
-            self.first_order
+            self.first_order_of_light()
         }
     }
 
@@ -109,6 +117,36 @@ impl MonoLens {
             "light from the axis {point} is limited by {limit}, {stop}, of which it fills {filled_mm:.4} of \
              {stop_mm:.4} mm{f_numbers}"
         ))
+    }
+
+    /// Returns a sentence on a lens whose bent axis is longer or shorter than its surfaces stand apart, so that its first-order data, which
+    /// are those of the distances between vertices, are not those along the axis; `None` as a rule.
+    pub fn note_on_bent_axis(&self) -> Option<String> {
+        if self.is_centered() {
+            return None;
+        }
+        let mut axis = RayBatch::with_capacity(1);
+        axis.push(-DVec3::Z, DVec3::Z, 0.0);
+        let (mut points_mm, mut along_mm) = (Vec::new(), 0.0);
+        for surface in 0..self.n_surfaces() {
+            self.trace_surfaces(surface..surface + 1, &mut axis, Vignetting::Off);
+            if !axis.fate[0].is_in_flight() {
+                return None;
+            }
+            points_mm.push(axis.point_mm(0));
+        }
+        let mut off_mm = 0.0;
+        for (points_mm, steps) in points_mm.windows(2).zip(self.steps.windows(2)) {
+            let way_mm = points_mm[0].distance(points_mm[1]);
+            off_mm += (way_mm - (steps[1].vertex_z - steps[0].vertex_z).abs()).abs();
+            along_mm += way_mm;
+        }
+        (off_mm > SAME_WAY * along_mm).then(|| {
+            format!(
+                "first-order data (focal lengths, f-numbers, paraxial foci) are those of the distances between vertices, which differ by \
+                 {off_mm:.3} mm from the {along_mm:.3} mm along the bent axis"
+            )
+        })
     }
 
     /// The f-number for a far object by the real rays that get through: effective focal length over the diameter of the

@@ -155,6 +155,11 @@ fn glass_may_be_a_name_a_code_or_an_index() {
     assert_eq!(medium("517.642"), Glass::NdVd { nd: 1.517, vd: 64.2 });
     assert_eq!(medium("516800.641700"), Glass::NdVd { nd: 1.5168, vd: 64.17 });
     assert_eq!(medium("1.5"), Glass::Constant { index: 1.5 });
+    assert_eq!(medium("003283"), Glass::NdVd { nd: 2.003, vd: 28.3 });
+    for wrong in ["517:642", "517642.12", "5170642"] {
+        let message = read(&DOUBLET.replace("NBK7_SCHOTT", wrong)).unwrap_err().to_string();
+        assert!(message.contains("is 517") && message.contains("as 1.5168:64.17"), "{message}");
+    }
     assert_eq!(medium("AIR"), Glass::Air);
 }
 
@@ -229,4 +234,21 @@ fn object_may_be_infinitely_far_as_a_word_and_unannounced_radii_are_noted() {
     assert!(file.notes[0].starts_with("neither radii (RDM) nor curvatures (CUM) are announced"), "{:?}", file.notes);
     let message = read(&unsaid.replace("-40.0 2.0", "-0.04 2.0")).unwrap_err().to_string();
     assert!(message.contains("the numbers of S are taken for radii"), "{message}");
+}
+
+/// Norland's adhesive as Edmund's files have it: Cauchy's law 1.5375 + 8290.45/λ² − 2.11046e8/λ⁴ of its data sheet, squared.
+#[test]
+fn private_glasses_by_formula_are_read_or_noted() {
+    let of =
+        |law: &str| read(&DOUBLET.replace("'MYGLASS' 1.60 1.62\n", &format!("'MYGLASS' 1.60 1.62\n'NOA61' {law}\n")));
+    let law = "LAU 2.36390625 0.0 0.025493134 -0.000580235 -0.349933e-5 0.445404e-7";
+    let text = DOUBLET.replace("'MYGLASS' 1.60 1.62\n", &format!("'NOA61' {law}\n")).replace("MYGLASS", "NOA61");
+    let lens = read(&text).unwrap().lens;
+    for nm in [450.0_f64, 587.6, 900.0] {
+        let stated = 1.5375 + 8290.45 / nm.powi(2) - 2.11046e8 / nm.powi(4);
+        let index = lens.interfaces()[1].medium_after.index_at(nm).unwrap();
+        assert!((index - stated).abs() < 1e-7, "{nm}: {index} {stated}");
+    }
+    let unknown = of("GML 2.3 0 0.02").unwrap();
+    assert!(unknown.notes.iter().any(|note| note.contains("NOA61") && note.contains("GML")), "{:?}", unknown.notes);
 }

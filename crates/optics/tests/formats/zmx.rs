@@ -213,7 +213,7 @@ fn what_cannot_be_traced_is_refused_by_name() {
     assert!(message("TYPE EVENASPH", "TYPE TOROIDAL\n  XDAT 1 2").contains("Zernike terms (XDAT) of a toroid"));
     assert!(message("TYPE EVENASPH", "TYPE COORDBRK").contains("surface 1: a coordinate break cannot be the stop"));
     assert!(message("  CONI", "  OBSC 1 2\n  CONI").contains("OBSC: an obscuration with a hole"));
-    assert!(message("  CONI", "  SPID 1 4\n  CONI").contains("SPID: a spider is not supported"));
+    assert!(message("  CONI", "  SPID 1 0\n  CONI").contains("SPID: a spider of 0 arms 1 wide; expected"));
     assert!(message("MODE SEQ", "MODE NSC").contains("MODE: NSC is not supported; expected SEQ"));
     assert!(message("FTYP 0", "FTYP 7").contains("field type 7 is not supported"));
 }
@@ -353,4 +353,35 @@ fn telecentric_lens_is_read_with_its_numerical_aperture() {
     // the rays to the stop's edge adds (2 % were found).
     let rim_mm = read.lens.front_semi_aperture_mm();
     assert!((1.0..1.05).contains(&(rim_mm / (4.0 + expected_mm))), "{rim_mm}");
+}
+
+#[test]
+fn words_of_older_files_and_flags_are_read_or_noted() {
+    // Without WAVM, the lists of files of 2002.
+    let lists = "WAVN 0.4861 0.5876 0.6563\nWWGN 1 2 3\nPWAV 2";
+    let old =
+        SINGLET.replace("WAVM 1 5.875618E-1 1\nWAVM 2 0.55 1\nPWAV 1", lists).replace("FTYP 0 0 2 1", "FTYP 0 0 2 3");
+    let file = read(&old).unwrap();
+    assert_eq!((file.wavelengths_nm.len(), file.reference_wavelength_nm), (3, Some(587.6)));
+    assert_eq!(file.wavelength_weights, [1.0, 2.0, 3.0]);
+    let note = |from: &str, to: &str, word: &str| {
+        let file = read(&SINGLET.replace(from, to)).unwrap();
+        assert!(file.notes.iter().any(|note| note.contains(word)), "{to}: {:?}", file.notes);
+    };
+    note("FTYP 0 0 2 1 0 0 0", "FTYP 0 1 2 1 0 0 0", "telecentric");
+    note("FTYP 0 0 2 1 0 0 0", "FTYP 0 0 2 1 0 0 1", "afocal");
+    note("GCAT SCHOTT MISC", "GCAT SCHOTT MISC\nGFAC 1 0.5", "apodization");
+    assert_eq!(read(&SINGLET.replace("GCAT", "GFAC 0 0\nGCAT")).unwrap(), read(SINGLET).unwrap());
+    // Lines that end as on old Macintoshes.
+    assert_eq!(read(&SINGLET.replace('\n', "\r")).unwrap(), read(SINGLET).unwrap());
+}
+
+#[test]
+fn glasses_by_six_digits_are_those_of_their_numbers() {
+    let medium = |line: &str| {
+        let file = read(&SINGLET.replace("N-BK7 0 0 1.5168 64.17", line)).unwrap();
+        file.lens.interfaces()[0].medium_after.clone()
+    };
+    assert_eq!(medium("517642 0 0 1.5 40"), Glass::NdVd { nd: 1.517, vd: 64.2 });
+    assert_eq!(medium("517642 0 0 1.5168 64.17"), Glass::NdVd { nd: 1.5168, vd: 64.17 });
 }

@@ -406,3 +406,24 @@ fn circle_on_the_stop_limits_the_stated_beam() {
                 20.0000 mm";
     assert!(file.notes.iter().any(|found| found == note), "{:?}", file.notes);
 }
+
+#[test]
+fn spiders_of_zemax_take_the_light_of_their_arms() {
+    let lens = |spider: &str| {
+        let text = ZMX.replace("HERE", spider);
+        LensFile::from_bytes(Path::new("a.zmx"), text.as_bytes(), &ReadOptions::default()).unwrap().lens
+    };
+    let [three, four] = [lens("SPID 0.4 3 0"), lens("SPID 0.4 4 0")];
+    assert_eq!([&three, &four].map(|lens| lens.apertures().len()), [3, 2]);
+    // Arms lie along x, and a third or a quarter of a turn on.
+    let is_clear = |lens: &Lens, deg: f64| {
+        let at = 3.0 * DVec2::from_angle(deg.to_radians());
+        lens.apertures().iter().all(|aperture| aperture.is_clear_at(at.x, at.y))
+    };
+    for deg in [0.0, 120.0, 240.0] {
+        assert!(!is_clear(&three, deg) && is_clear(&three, deg + 60.0), "{deg}");
+    }
+    for deg in [0.0, 90.0, 180.0, 270.0] {
+        assert!(!is_clear(&four, deg) && is_clear(&four, deg + 45.0), "{deg}");
+    }
+}

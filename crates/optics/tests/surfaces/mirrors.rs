@@ -328,6 +328,18 @@ fn folded(before_film_mm: f64) -> (Lens, f64) {
 }
 
 #[test]
+fn bent_axes_of_another_length_than_the_distances_between_vertices_are_noted() {
+    let (folded, _) = folded(20.0);
+    assert_eq!(folded.at(550.0).unwrap().note_on_bent_axis(), None);
+    // The mirror stands farther away than its distance says.
+    let mut moves = folded.moves().to_vec();
+    moves[0].decenter_mm = [0.0, 0.0, 10.0];
+    let moved = folded.with_moves(moves).unwrap().at(550.0).unwrap();
+    let note = moved.note_on_bent_axis().unwrap();
+    assert!(note.contains("distances between vertices"), "{note}");
+}
+
+#[test]
 fn fold_mirror_gives_the_unfolded_image() {
     let (folded, before_mm) = folded(20.0);
     let straight = Lens::built_in("dgauss-50mm").unwrap().at(550.0).unwrap();
@@ -456,7 +468,7 @@ fn best_focus_of_a_mirror_is_downstream() {
         let expected_mm = lens.film_distance_mm_for(f64::INFINITY).unwrap();
         let axis = [ObjectPoint::Infinite(DVec3::Z)];
         let lenses = std::slice::from_ref(&lens);
-        let focus = Autofocus { lenses, points: &axis, rule: PupilRule::of_rings(8) };
+        let focus = Autofocus::alike(lenses, &axis, PupilRule::of_rings(8));
         let (film_mm, rms_mm) = focus.best_film_mm(expected_mm + 0.5).unwrap();
         assert!((film_mm - expected_mm).abs() < 1e-2 && rms_mm < 1e-4, "{film_mm} {rms_mm}");
     }

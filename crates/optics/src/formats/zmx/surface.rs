@@ -62,12 +62,14 @@ pub(super) struct ZmxGlass {
 }
 
 /// Keywords of apertures that are not read.
-const OTHER_APERTURES: [(&str, &str); 4] = [
-    ("SPID", "a spider"),
-    ("USAP", "a user-defined aperture"),
-    ("USOB", "a user-defined obscuration"),
-    ("UDAP", "a user-defined aperture"),
-];
+const OTHER_APERTURES: [(&str, &str); 3] =
+    [("USAP", "a user-defined aperture"), ("USOB", "a user-defined obscuration"), ("UDAP", "a user-defined aperture")];
+
+/// How far arms of a spider reach on a surface without a rim, mm.
+const FAR_MM: f64 = 1e4;
+
+/// The most arms of a spider.
+const MOST_ARMS: usize = 64;
 
 /// The largest number of a parameter.
 const MOST_PARAMETERS: usize = 200;
@@ -110,6 +112,14 @@ impl ZmxSurface {
                     return Err(line.wrong("an obscuration with a hole is not supported"));
                 }
                 self.aperture = Some((line.keyword.to_owned(), numbers));
+            }
+            "SPID" => {
+                let (width, n_arms) = (line.number(0)?, line.count(1)?);
+                if width.is_nan() || width <= 0.0 || !(1..=MOST_ARMS).contains(&n_arms) {
+                    let expected = format!("a width above 0 and 1 to {MOST_ARMS} arms");
+                    return Err(line.wrong(format!("a spider of {n_arms} arms {width} wide; expected {expected}")));
+                }
+                self.aperture = Some((line.keyword.to_owned(), [width, n_arms as f64]));
             }
             "XDAT" => {
                 let place = line.count(0)?;
@@ -301,6 +311,8 @@ impl ZmxSurface {
             "CLAP" if *first == 0.0 => surface.with_aperture(of(circle(*second), false)),
             "CLAP" => surface.with_aperture(of(circle(*second), false)).with_aperture(of(circle(*first), true)),
             "OBSC" => surface.with_aperture(of(circle(*second), true)),
+            "SPID" => arms(half_x_mm, *second as usize, 2.0 * self.semi_diameter.map_or(FAR_MM, |radius| radius * mm))
+                .fold(surface, |surface, arm| surface.with_aperture(of(arm, true))),
             "ELAP" | "ELOB" => surface.with_aperture(of(Outline::Ellipse { half_x_mm, half_y_mm }, keyword == "ELOB")),
             _ => surface.with_aperture(of(Outline::Rectangle { half_x_mm, half_y_mm }, keyword == "SQOB")),
         }
@@ -354,6 +366,19 @@ fn searched(glasses: &Glasses) -> String {
         [] => String::new(),
         makers => format!("; the file's catalogues (GCAT) are {}", makers.join(", ")),
     }
+}
+
+/// Returns the arms of a spider from the middle outwards, so wide: the first along x, the others at equal angles from there. Those that
+/// face each other are one.
+fn arms(width_mm: f64, n_arms: usize, reach_mm: f64) -> impl Iterator<Item = Outline> {
+    let half_mm = 0.5 * width_mm;
+    let (inner_mm, n_shapes) = if n_arms.is_multiple_of(2) { (-reach_mm, n_arms / 2) } else { (0.0, n_arms) };
+    (0..n_shapes).map(move |arm| Outline::Turned {
+        by_deg: 360.0 * arm as f64 / n_arms as f64,
+        outline: Box::new(Outline::Polygon {
+            corners_mm: vec![[inner_mm, -half_mm], [reach_mm, -half_mm], [reach_mm, half_mm], [inner_mm, half_mm]],
+        }),
+    })
 }
 
 /// Returns the curvature of a radius, of which 0 or infinity means a plane.
