@@ -89,7 +89,9 @@ pub(crate) fn request(
     }
     let mut request = AnalysisRequest {
         fields: AnalysisFields::ByLight,
-        main_wavelength_nm: used.reference_nm.filter(|_| asked_nm.is_none()),
+        main_wavelength_nm: used.reference_nm,
+        wavelength_weights: used.weights_of(&wavelengths_nm),
+        field_weights: Vec::new(),
         wavelengths_nm,
         distance_mm: arguments.distance_mm.unwrap_or(used.distance_mm),
         film: arguments.film.of(used),
@@ -106,6 +108,7 @@ pub(crate) fn request(
         (None, None, Some(AnalysisFields::HeightsMm(_))) if arguments.distance_mm.is_some() => AnalysisFields::ByLight,
         (None, None, Some(fields)) => {
             taken.push(summary(&fields));
+            request.field_weights = used.field_weights(fields.count());
             fields
         }
         (None, None, None) => AnalysisFields::ByLight,

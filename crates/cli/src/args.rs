@@ -463,7 +463,7 @@ pub(crate) struct PsfArgs {
     /// How far above the axis all of these fields lie, degrees
     #[arg(long, value_name = "A", default_value_t = 0.0, help_heading = heading::POINTS)]
     pub(crate) field_y_deg: f64,
-    /// Distances of the points from the first vertex, mm; inf for a star [default: that of the lens's file, else 2000]
+    /// Distances of the points from the first vertex, mm; inf for a star [default: that of the lens's file, else that of --focus-mm, else inf]
     #[arg(long, value_name = "LIST", help_heading = heading::POINTS)]
     pub(crate) distances_mm: Option<String>,
     #[command(flatten)]

@@ -9,7 +9,7 @@ use dioptric_analysis::{
 };
 use dioptric_files::{Staged, write};
 use dioptric_pipeline::{
-    LensReadOptions, PipelineError, REFERENCE_WAVELENGTH_NM, nearest_to_reference_nm, parse_numbers,
+    LensReadOptions, PipelineError, REFERENCE_WAVELENGTH_NM, nearest_to_reference_nm, parse_directions, parse_numbers,
 };
 use dioptric_report::{LensDrawing, check_drawing_name, drawing_file};
 
@@ -169,7 +169,15 @@ fn info(arguments: &LensInfoArgs, common: &Common) -> anyhow::Result<()> {
             })
         })
         .collect::<Result<_, _>>()?;
-    tell(&Vec::from_iter(data.iter().find_map(LensData::note_on_light)), common);
+    let mut notes = Vec::from_iter(data.iter().find_map(LensData::note_on_light));
+    if arguments.blur_um.is_some() && data.iter().all(|data| data.sharp.is_none()) {
+        notes.push(
+            "--blur-um is left aside: depth of field is that of a lens of one focal length, and of one telecentric in object space at a \
+             distance (--distance-mm)"
+                .to_owned(),
+        );
+    }
+    tell(&notes, common);
     if common.json {
         return print_json(&data);
     }
@@ -279,6 +287,25 @@ fn number(key: &str, value: &serde_json::Value) -> String {
     }
 }
 
+/// Returns the field angles of a list, numbers or directions (0/10, 10@90), all of which lie in the y–z plane.
+fn in_plane_of_drawing(list: &str) -> anyhow::Result<Vec<f64>> {
+    let mut fields_deg = Vec::new();
+    for item in list.split(',') {
+        if !item.contains(['/', '@']) {
+            fields_deg.extend(parse_numbers("--fields-deg", item)?);
+            continue;
+        }
+        for [x_deg, y_deg] in parse_directions("--fields-deg", item)? {
+            anyhow::ensure!(
+                x_deg.abs() <= 1e-9 * y_deg.abs(),
+                "--fields-deg: '{item}' lies beside the plane of the drawing, expected angles above the axis, as 10 or 10@90"
+            );
+            fields_deg.push(y_deg);
+        }
+    }
+    Ok(fields_deg)
+}
+
 fn draw(arguments: &LensDrawArgs, common: &Common) -> anyhow::Result<()> {
     check_drawing_name(&arguments.output)?;
     // The place is tried before the work.
@@ -302,7 +329,7 @@ fn draw(arguments: &LensDrawArgs, common: &Common) -> anyhow::Result<()> {
     }
     let of_file_deg = wavelengths_nm.first().and_then(|&nm| used.drawing_fields_deg(nm));
     let fields_deg = match (&arguments.fields_deg, of_file_deg) {
-        (Some(list), _) => parse_numbers("--fields-deg", list)?,
+        (Some(list), _) => in_plane_of_drawing(list)?,
         (None, Some(fields_deg)) => {
             taken.push(format!("fields of {} degrees", list_of(&fields_deg)));
             fields_deg
@@ -314,7 +341,8 @@ fn draw(arguments: &LensDrawArgs, common: &Common) -> anyhow::Result<()> {
     let used = arguments.lens.state.apply(used, wavelength_nm, common)?;
     tell(&used.lens.notes_on_ranges(&wavelengths_nm), common);
     let focus_nm = if asked_nm.is_none() { used.wavelengths_or(&USUAL_NM) } else { wavelengths_nm.clone() };
-    let of = FilmUse { wavelengths_nm: &focus_nm, reference_nm: wavelength_nm, distance_mm };
+    let weights = used.weights_of(&focus_nm);
+    let of = FilmUse { main_nm: used.reference_nm, wavelengths_nm: &focus_nm, weights: &weights, distance_mm };
     let film = arguments.film.of(&used);
     let (film_distance_mm, film_label) = match AfocalView::of(&used.lens, film, &of)? {
         Some(view) => {

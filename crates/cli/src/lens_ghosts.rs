@@ -45,7 +45,8 @@ pub(crate) fn run(arguments: &LensGhostsArgs, common: &Common) -> anyhow::Result
     let used = arguments.lens.state.apply(used, reference_nm, common)?;
     tell(&used.lens.notes_on_ranges(&wavelengths_nm), common);
     let focus_nm = used.wavelengths_or(&USUAL_NM);
-    let of = FilmUse { wavelengths_nm: &focus_nm, reference_nm, distance_mm };
+    let weights = used.weights_of(&focus_nm);
+    let of = FilmUse { main_nm: used.reference_nm, wavelengths_nm: &focus_nm, weights: &weights, distance_mm };
     let FilmPlace { distance_mm: film_distance_mm, origin } = arguments.film.of(&used).place(&used.lens, of)?;
     remark(common.quiet, &format!("film {film_distance_mm:.4} mm behind the last vertex: {origin}"));
     let film_mm = film_size(&arguments.film_size_mm)?;

@@ -30,6 +30,7 @@ pub(crate) fn run(arguments: &PsfArgs, common: &Common) -> anyhow::Result<()> {
         wavelengths_nm,
         film,
         focus_nm,
+        main_nm: used.reference_nm,
         diffraction: with_gamma(diffraction(arguments.diffraction), arguments.gamma)?,
         pixel_um: arguments.pixel_um,
         size: arguments.size,
@@ -62,6 +63,18 @@ pub(crate) fn run(arguments: &PsfArgs, common: &Common) -> anyhow::Result<()> {
     bar.show("tracing the lens", 0.0);
     let set = request.compute(&lens)?;
     drop(bar);
+    let mut dark_deg: Vec<[f64; 2]> =
+        set.rows.iter().filter(|row| row.is_dark()).map(|row| [row.field_deg, row.field_y_deg]).collect();
+    dark_deg.dedup();
+    if !dark_deg.is_empty() {
+        let fields = pairs_in_words(&dark_deg);
+        tell(
+            &[format!(
+                "no light of fields of {fields} degrees reaches the film: what is measured of them is no number"
+            )],
+            common,
+        );
+    }
     let rows = match arguments.polychromatic {
         true => with_polychromatic(&set, &request.mtf_per_mm),
         false => set.rows.clone(),
@@ -108,9 +121,6 @@ struct Points {
     spectral_weights: Vec<f64>,
 }
 
-/// Distance of points where neither the command nor the lens's file names one, mm.
-const USUAL_DISTANCE_MM: f64 = 2000.0;
-
 /// Returns what is asked for; where it is not said, what the lens's file says.
 fn points(arguments: &PsfArgs, used: &LensDefaults, common: &Common) -> anyhow::Result<Points> {
     let mut taken = Vec::new();
@@ -139,8 +149,11 @@ fn points(arguments: &PsfArgs, used: &LensDefaults, common: &Common) -> anyhow::
             taken.push(format!("an object at {} mm", list_of(&[used.distance_mm])));
             vec![used.distance_mm]
         }
-        None if matches!(film, AnalysisFilm::BestFocus | AnalysisFilm::Afocal) => vec![f64::INFINITY],
-        None => vec![USUAL_DISTANCE_MM],
+        // What is in focus, or else far.
+        None => match film {
+            AnalysisFilm::FocusMm(distance_mm) => vec![distance_mm],
+            _ => vec![used.distance_mm],
+        },
     };
     let focus_nm = if asked_nm.is_none() { used.wavelengths_or(&USUAL_NM) } else { Vec::new() };
     let spectral_weights = match (&arguments.spectral_weights, asked_nm) {

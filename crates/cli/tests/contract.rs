@@ -589,7 +589,10 @@ fn plane_mirror_asks_for_the_film() {
         assert!(!found.status.success() && message.contains("--film-mm"), "{arguments:?}: {message}");
     }
     output(folder.path(), &["lens", "draw", "fold.ron", "-o", "fold.svg", "--film-mm", "50"]);
-    let psf = json(folder.path(), &["psf", "fold.ron", "--film-mm", "50", "--pixel-um", "200", "--json"]);
+    let psf = json(
+        folder.path(),
+        &["psf", "fold.ron", "--film-mm", "50", "--distances-mm", "2000", "--pixel-um", "200", "--json"],
+    );
     // A disc of 10 mm about the axis, a little wider for the light of 2 m: √½ of its radius.
     let expected_um = 10_000.0 * (1.0 + 50.0 / 2000.0) * 0.5_f64.sqrt();
     assert!((psf[0]["rms_radius_um"].as_f64().unwrap() / expected_um - 1.0).abs() < 1e-3, "{psf}");

@@ -53,7 +53,7 @@ pub use camera::{
     FilmSpec, FilterSpec, FlatSize, FocusSpec, FramesSpec, LensReadOptions, LensReflections, LensSpec, LightFieldSpec,
     Movements, PhotodiodeReads, Photodiodes, REFERENCE_WAVELENGTH_NM, RenderEffort, RenderMethod, RetiredBank,
     SceneSource, SceneSpec, SensorOptions, SensorSpec, StopSpec, TurnPath, VideoSpec, WavelengthSpec, WorldLamp,
-    WorldSky, WorldSpec, WorldView, nearest_to_reference_nm, with_blades,
+    WorldSky, WorldSpec, WorldView, nearest_to_reference_nm, reference_nm_of, with_blades,
 };
 pub use capture_files::{irradiance_files, write_capture, write_frames_and_depth, write_irradiance, write_scene};
 pub use develop::DevelopedFile;

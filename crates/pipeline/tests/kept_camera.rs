@@ -198,7 +198,7 @@ fn given_parts_are_those_they_equal() {
     let lens = camera.stop.apply(camera.lens.open(&camera.lens_reading).unwrap().lens).unwrap();
     let scene = camera.scene.open(camera.wavelengths.grid().unwrap().as_ref()).unwrap();
     let given = KeptCamera::new(small())
-        .with_given_lens(Given::new(lens))
+        .with_given_lens(Given::new(dioptric_optics::LensFile::from(lens)))
         .with_given_scene(Given::new(scene))
         .with_given_sensor(Given::new(camera.sensor.open().unwrap()));
     let first = capture(&given);

@@ -449,8 +449,7 @@ space=None, defect_threshold=None)")]
     /// what is kept stays here.
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
         let (camera, given) = (self.kept.camera(), self.kept.given());
-        let lens =
-            given.lens.as_ref().map(|lens| Lens::restored((**lens).clone().into(), None, (StopSpec::AsGiven, None)));
+        let lens = given.lens.as_ref().map(|lens| Lens::restored((**lens).clone(), None, (StopSpec::AsGiven, None)));
         let scene = given.scene.as_ref().map(|_| Scene::of_camera(&self.kept));
         let sensor = given.sensor.as_ref().map(|sheet| Sensor::restored((**sheet).clone(), None));
         let arguments = [

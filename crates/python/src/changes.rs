@@ -1,10 +1,10 @@
 //! Changes of a camera by name, each as the command line has it.
 
-use dioptric_optics::{Lens as OpticsLens, LensFile};
+use dioptric_optics::Lens as OpticsLens;
 use dioptric_pipeline::{
     Camera, CoatingSpec, Crop, FilmSpec, FocusSpec, FramesSpec, Given, GivenParts, Iris, KeptCamera, LensReadOptions,
-    LensSpec, PICTURE, RetiredBank, SceneSpec, SensorOptions, SensorSpec, StopSpec, WavelengthSpec, with_auto_exposure,
-    with_blades, with_exposure_s,
+    LensSpec, PICTURE, RetiredBank, SceneSpec, SensorOptions, SensorSpec, StopSpec, WavelengthSpec, reference_nm_of,
+    with_auto_exposure, with_blades, with_exposure_s,
 };
 use dioptric_sensor::Processing;
 use pyo3::{
@@ -156,11 +156,12 @@ pub(crate) fn changed(
 /// Returns the lens of a camera, its stop set.
 pub(crate) fn open_lens(kept: &KeptCamera) -> PyResult<OpticsLens> {
     let camera = kept.camera();
-    let lens = match &kept.given().lens {
-        Some(lens) => (**lens).clone(),
-        None => camera.lens.open(&camera.lens_reading).map_err(exception)?.lens,
+    let file = match &kept.given().lens {
+        Some(file) => (**file).clone(),
+        None => camera.lens.open(&camera.lens_reading).map_err(exception)?,
     };
-    with_blades(lens, camera.iris).and_then(|lens| camera.stop.apply(lens)).map_err(exception)
+    let reference_nm = reference_nm_of(&file);
+    with_blades(file.lens, camera.iris).and_then(|lens| camera.stop.apply_at(lens, reference_nm)).map_err(exception)
 }
 
 /// Covers the surfaces of the lens, the camera file's or a given one.
@@ -169,8 +170,8 @@ fn set_coating(kept: &mut KeptCamera, value: &Bound<'_, PyAny>) -> PyResult<()> 
     let (mut camera, given) = (kept.camera().clone(), kept.given().clone());
     if let Some(lens) = &given.lens {
         let reading = LensReadOptions { coating, ..LensReadOptions::default() };
-        let file = reading.coated(LensFile::from((**lens).clone())).map_err(exception)?;
-        *kept = kept.with_given_lens(Given::new(file.lens));
+        let file = reading.coated((**lens).clone()).map_err(exception)?;
+        *kept = kept.with_given_lens(Given::new(file));
         return Ok(());
     }
     camera.lens_reading.coating = coating;

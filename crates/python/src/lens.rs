@@ -9,7 +9,7 @@ use dioptric_analysis::{LensData, LensDefaults, LensInfoRequest, built_in_lenses
 use dioptric_optics::{Layout, LensFile, MonoLens, ReadOptions, Vignetting};
 use dioptric_pipeline::{
     Camera, CoatingSpec, DrawnEye, Given, GlassRange, Iris, KeptCamera, LensReadOptions, LensSpec, MissingGlass,
-    REFERENCE_WAVELENGTH_NM, StopSpec,
+    REFERENCE_WAVELENGTH_NM, StopSpec, reference_nm_of,
 };
 use pyo3::{
     IntoPyObjectExt,
@@ -62,7 +62,7 @@ impl Lens {
     pub(crate) fn of_camera(kept: &KeptCamera) -> PyResult<Self> {
         let camera = kept.camera();
         let lens = match &kept.given().lens {
-            Some(lens) => Self::new(LensFile::from((**lens).clone()), None),
+            Some(file) => Self::new((**file).clone(), None),
             None => Self::of_choice(camera.lens.clone(), camera.lens_reading.clone())?,
         };
         let lens = if camera.iris.is_some() { lens.bladed(camera.iris)? } else { lens };
@@ -82,7 +82,7 @@ impl Lens {
     }
 
     fn stopped(&self, stop: StopSpec) -> PyResult<Self> {
-        let lens = stop.apply(self.file.lens.clone()).map_err(exception)?;
+        let lens = stop.apply_at(self.file.lens.clone(), reference_nm_of(&self.file)).map_err(exception)?;
         let stop = if stop == StopSpec::AsGiven { self.stop } else { stop };
         Ok(Self {
             file: LensFile { lens, ..self.file.clone() },
@@ -96,7 +96,7 @@ impl Lens {
     /// Returns a camera with this lens.
     pub(crate) fn put_into(&self, kept: &KeptCamera) -> KeptCamera {
         let Some((lens, reading)) = &self.choice else {
-            return kept.with_given_lens(Given::new(self.file.lens.clone()));
+            return kept.with_given_lens(Given::new(self.file.clone()));
         };
         let mut given = kept.given().clone();
         given.lens = None;
@@ -123,8 +123,8 @@ impl Lens {
     }
 
     /// Returns the lens as a part of a camera.
-    pub(crate) fn given(&self) -> Given<dioptric_optics::Lens> {
-        Given::new(self.file.lens.clone())
+    pub(crate) fn given(&self) -> Given<LensFile> {
+        Given::new(self.file.clone())
     }
 
     /// Returns the lens of a text, and of what a camera file says of it.

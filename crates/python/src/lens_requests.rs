@@ -31,6 +31,8 @@ pub(crate) fn analysis_request(used: &LensDefaults, options: Option<&Bound<'_, P
     let mut request = AnalysisRequest {
         fields: AnalysisFields::ByLight,
         main_wavelength_nm: used.reference_nm,
+        wavelength_weights: Vec::new(),
+        field_weights: Vec::new(),
         wavelengths_nm: used.wavelengths_or(&USUAL_NM),
         distance_mm: used.distance_mm,
         film: used.film(),
@@ -46,7 +48,6 @@ pub(crate) fn analysis_request(used: &LensDefaults, options: Option<&Bound<'_, P
             }
             "wavelengths_nm" => {
                 request.wavelengths_nm = numbers(key, value)?;
-                request.main_wavelength_nm = None;
             }
             "distance_mm" => {
                 request.distance_mm = number(key, value)?;
@@ -83,6 +84,7 @@ impl PsfOptions {
             wavelengths_nm: vec![REFERENCE_WAVELENGTH_NM],
             film: AnalysisFilm::BestFocus,
             focus_nm: Vec::new(),
+            main_nm: used.reference_nm,
             diffraction: Diffraction::Hurb { gamma: 1.0 },
             pixel_um: 1.0,
             size: Some(65),
@@ -164,8 +166,12 @@ impl PsfOptions {
             (Some(film), ..) | (None, film @ AnalysisFilm::OfFile(_), _) => film,
             (None, _, Some(&distance_mm)) => {
                 let film = AnalysisFilm::FocusMm(distance_mm);
-                let reference_nm = request.reference_nm(&used.lens).map_err(exception)?;
-                let of = FilmUse { wavelengths_nm: &request.wavelengths_nm, reference_nm, distance_mm };
+                let of = FilmUse {
+                    main_nm: request.main_nm,
+                    wavelengths_nm: &request.wavelengths_nm,
+                    weights: &request.spectral_weights,
+                    distance_mm,
+                };
                 let view = AfocalView::of(&used.lens, AnalysisFilm::BestFocus, &of).map_err(exception)?;
                 view.map_or(film, |_| AnalysisFilm::Afocal)
             }

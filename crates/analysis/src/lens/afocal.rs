@@ -33,7 +33,7 @@ impl AfocalView {
     /// # Errors
     /// When a glass is not known at the reference wavelength.
     pub fn of(lens: &Lens, film: AnalysisFilm, of: &FilmUse<'_>) -> Result<Option<Self>, PipelineError> {
-        let mono = lens.at(of.reference_nm)?;
+        let mono = of.reference(lens)?;
         let image_z_mm = mono.conjugate(of.distance_mm).image_z_mm;
         let is_parallel = image_z_mm.is_nan() || image_z_mm.abs() > PARALLEL * mono.semi_aperture_mm(0);
         let is_seen_so = match film {
@@ -156,6 +156,8 @@ mod tests {
             fields: AnalysisFields::above_axis_deg(&[0.0, 1.0, 3.0]),
             wavelengths_nm: vec![550.0],
             main_wavelength_nm: None,
+            wavelength_weights: Vec::new(),
+            field_weights: Vec::new(),
             distance_mm: f64::INFINITY,
             film,
             n_rings: 4,
@@ -216,6 +218,7 @@ mod tests {
             wavelengths_nm: vec![550.0],
             film: AnalysisFilm::BestFocus,
             focus_nm: Vec::new(),
+            main_nm: None,
             diffraction: dioptric_psf::Diffraction::Wave,
             pixel_um: 20.0,
             size: None,

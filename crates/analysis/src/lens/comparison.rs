@@ -154,6 +154,8 @@ mod tests {
             fields: AnalysisFields::above_axis_deg(&[0.0, 10.0]),
             wavelengths_nm: vec![500.0, 550.0],
             main_wavelength_nm: None,
+            wavelength_weights: Vec::new(),
+            field_weights: Vec::new(),
             distance_mm: f64::INFINITY,
             film: AnalysisFilm::FocusMm(f64::INFINITY),
             n_rings: 6,

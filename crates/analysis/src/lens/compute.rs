@@ -20,7 +20,7 @@ use rayon::prelude::*;
 
 use super::{
     afocal::AfocalView,
-    film::{AnalysisFilm, DARK_AXIS, FilmUse, IDEAL_MM, RINGS},
+    film::{FilmUse, RINGS},
     request::{AnalysisRequest, Field},
     rows::{
         AxialColorRow, FanRow, FieldRow, FocusData, GridRow, LensAnalysis, OpdMap, PupilRow, SpotRow, WavefrontRow,
@@ -81,8 +81,16 @@ impl AnalysisRequest {
     /// # Errors
     /// When a glass is not known at the reference wavelength.
     pub fn lens_with_image<'a>(&self, lens: &'a Lens) -> Result<(Cow<'a, Lens>, Option<AfocalView>), PipelineError> {
-        let (wavelengths_nm, reference_nm, distance_mm) = (&self.wavelengths_nm, self.reference_nm(), self.distance_mm);
-        AfocalView::applied(lens, self.film, &FilmUse { wavelengths_nm, reference_nm, distance_mm })
+        AfocalView::applied(lens, self.film, &self.film_use())
+    }
+
+    fn film_use(&self) -> FilmUse<'_> {
+        FilmUse {
+            main_nm: self.main_wavelength_nm,
+            wavelengths_nm: &self.wavelengths_nm,
+            weights: &self.wavelength_weights,
+            distance_mm: self.distance_mm,
+        }
     }
 
     fn compute_imaging(&self, lens: &Lens, cancel: &Cancel) -> Result<LensAnalysis, PipelineError> {
@@ -148,16 +156,23 @@ impl Bench {
         ObjectPoint::from_field(self.reference(), field_tan, self.dioptres)
     }
 
-    /// Returns the film with the least spots of these points, mm, and their size, mm rms.
-    fn best(&self, points: &[ObjectPoint], lenses: &[MonoLens], from_mm: f64) -> Option<(f64, f64)> {
+    /// Returns the film with the least spots of these points at all wavelengths, mm, and their size, mm rms; each counts by its weight.
+    fn best(&self, points: &[ObjectPoint], request: &AnalysisRequest, from_mm: f64) -> Option<(f64, f64)> {
+        let of = |weights: &'_ [f64], n: usize| if weights.len() == n { weights.to_vec() } else { Vec::new() };
+        let wavelength_weights = &of(&request.wavelength_weights, self.lenses.len());
+        let point_weights = &of(&request.field_weights, points.len());
         // By the rays that every command focuses with, however many its spots have.
-        Autofocus { lenses, points, rule: PupilRule::of_rings(RINGS) }.best_film_mm(from_mm)
+        let alike = Autofocus::alike(&self.lenses, points, PupilRule::of_rings(RINGS));
+        Autofocus { wavelength_weights, point_weights, ..alike }.best_film_mm(from_mm)
     }
 
     /// Returns where each wavelength of a point on the axis focuses; films are sought about `from_mm`.
     fn axial_color(&self, distance_mm: f64, from_mm: f64) -> Vec<AxialColorRow> {
         let axis = [self.point_of_tan(DVec2::ZERO)];
-        let focus_mm = |lens: &MonoLens| self.best(&axis, std::slice::from_ref(lens), from_mm).map(|found| found.0);
+        let focus_mm = |lens: &MonoLens| {
+            let focus = Autofocus::alike(std::slice::from_ref(lens), &axis, PupilRule::of_rings(RINGS));
+            focus.best_film_mm(from_mm).map(|found| found.0)
+        };
         let reference_focus_mm = focus_mm(self.reference());
         let image_z_mm = |lens: &MonoLens| lens.conjugate(distance_mm).image_z_mm;
         let row = |lens: &MonoLens| AxialColorRow {
@@ -178,17 +193,12 @@ impl Bench {
         let paraxial = self.reference().film_distance_mm_for(request.distance_mm);
         let axis = self.point_of_tan(DVec2::ZERO);
         let on_axis =
-            paraxial.as_ref().ok().and_then(|&film_distance_mm| self.best(&[axis], &self.lenses, film_distance_mm));
-        self.film_distance_mm = match (request.film, on_axis) {
-            (AnalysisFilm::FilmMm(film_mm) | AnalysisFilm::OfFile(film_mm), _) => film_mm,
-            (AnalysisFilm::FocusMm(distance_mm), _) => self.reference().film_distance_mm_for(distance_mm)?,
-            (AnalysisFilm::Afocal, _) => IDEAL_MM,
-            (AnalysisFilm::BestFocus, Some((film_distance_mm, _))) => film_distance_mm,
-            (AnalysisFilm::BestFocus, None) => paraxial.clone()?,
-        };
+            paraxial.as_ref().ok().and_then(|&film_distance_mm| self.best(&[axis], request, film_distance_mm));
+        let film = request.film.place(lens, request.film_use())?;
+        self.film_distance_mm = film.distance_mm;
         let from_mm = paraxial.as_ref().map_or(self.film_distance_mm, |film_distance_mm| *film_distance_mm);
         let points: Vec<ObjectPoint> = fields.iter().map(|field| self.point(field)).collect();
-        let over_fields = self.best(&points, &self.lenses, from_mm);
+        let over_fields = self.best(&points, request, from_mm);
         let wavefront = on_axis.and_then(|(film_distance_mm, _)| {
             best_wavefront_film_mm(self.reference(), &axis, film_distance_mm, PupilGrid::STANDARD).ok()
         });
@@ -216,6 +226,7 @@ impl Bench {
             distance_mm: request.distance_mm,
             reference_nm: self.reference().wavelength_nm(),
             wavelengths_nm: request.wavelengths_nm.clone(),
+            wavelength_weights: request.wavelength_weights.clone(),
             notes,
             afocal: None,
             object_index: first.object_index,
@@ -228,10 +239,7 @@ impl Bench {
             f_number: first.f_number,
             working_f_number: self.reference().working_f_number(request.distance_mm),
             film_distance_mm: self.film_distance_mm,
-            film: match request.film == AnalysisFilm::BestFocus && on_axis.is_none() {
-                true => DARK_AXIS.to_owned(),
-                false => request.film.origin(),
-            },
+            film: film.origin,
             half_illumination_deg: field_limit_deg(self.reference(), 0.5),
             focus: FocusData {
                 paraxial_film_mm: paraxial.ok(),

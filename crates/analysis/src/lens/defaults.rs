@@ -27,6 +27,8 @@ pub struct LensDefaults {
     pub surface_comments: Vec<String>,
     /// The points of the field, as the file names them.
     fields: Vec<Field>,
+    /// How much each of them counts; empty where they count alike.
+    field_weights: Vec<f64>,
     /// The file, of one that has several configurations.
     several: Option<Box<LensFile>>,
     /// Distance of the film behind the last vertex that the file states, mm.
@@ -62,7 +64,8 @@ impl LensDefaults {
         let lens = stop.apply_at(with_blades(self.lens, iris)?, wavelength_nm)?;
         notes.extend(lens.note_on_iris());
         let lens = movements.apply_at(lens, wavelength_nm)?;
-        notes.extend(lens.at(wavelength_nm)?.note_on_limit(self.distance_mm));
+        let mono = lens.at(wavelength_nm)?;
+        notes.extend([mono.note_on_limit(self.distance_mm), mono.note_on_bent_axis()].into_iter().flatten());
         Ok(Self { lens, notes, ..self })
     }
 
@@ -87,6 +90,7 @@ impl LensDefaults {
             distance_mm: file.object_distance_mm.unwrap_or(f64::INFINITY),
             surface_comments: file.surface_comments,
             fields: file.fields,
+            field_weights: file.field_weights,
             film_distance_mm: file.film_distance_mm.filter(|_| is_solved),
             lens: file.lens,
             notes: file.notes.into_iter().chain(unsolved).collect(),
@@ -127,6 +131,13 @@ impl LensDefaults {
             true => weights.clone(),
             false => Vec::new(),
         }
+    }
+
+    /// Returns how much so many points of the field count, if they are those of the file and it weighs them; none where they count alike.
+    pub fn field_weights(&self, n_fields: usize) -> Vec<f64> {
+        let weights = &self.field_weights;
+        let are_weights = weights.iter().all(|weight| *weight >= 0.0) && weights.iter().any(|weight| *weight > 0.0);
+        if weights.len() == n_fields && are_weights { weights.clone() } else { Vec::new() }
     }
 
     /// Returns where the film is that nobody asked for: at the image plane that the file states, else where the spot on the axis is

@@ -6,7 +6,10 @@ use dioptric_optics::{
     glam::DVec2,
 };
 
-use dioptric_pipeline::PipelineError;
+use dioptric_pipeline::{PipelineError, REFERENCE_WAVELENGTH_NM, nearest_to_reference_nm};
+
+/// Wavelengths that are seen.
+const VISIBLE_NM: std::ops::RangeInclusive<f64> = 380.0..=780.0;
 
 /// The focal length of the ideal lens through which afocal light is looked at, mm: on its film 1 mm is 1/1000 of a tangent, and so
 /// 1 µm is 1 µrad near the axis, and 1 mm of focus is 1/1000 of a dioptre.
@@ -17,9 +20,9 @@ pub(crate) const IDEAL_MM: f64 = 1000.0;
 pub enum AnalysisFilm {
     /// At the image plane that the file of the lens states, this far behind the last vertex, mm.
     OfFile(f64),
-    /// Where the spot on the axis is smallest, all wavelengths together.
+    /// Where the spot on the axis is smallest, all wavelengths together by their weights.
     BestFocus,
-    /// At the paraxial image, at the reference wavelength, of an object this far before the first vertex, mm.
+    /// At the paraxial image, at the wavelength of its focus ([`FilmUse::reference`]), of an object this far before the first vertex, mm.
     FocusMm(f64),
     /// This far behind the last vertex, mm.
     FilmMm(f64),
@@ -30,12 +33,30 @@ pub enum AnalysisFilm {
 /// For what a film is looked for.
 #[derive(Clone, Copy, Debug)]
 pub struct FilmUse<'a> {
-    /// The wavelengths that are to be in focus together, nm.
+    /// The main wavelength of the lens's file, nm, where it states one.
+    pub main_nm: Option<f64>,
+    /// The wavelengths that are looked at, nm: those that are to be in focus together.
     pub wavelengths_nm: &'a [f64],
-    /// The wavelength of paraxial images and of the field, nm.
-    pub reference_nm: f64,
+    /// How much each of them counts for the smallest spot; empty where all count alike.
+    pub weights: &'a [f64],
     /// Distance of the object before the first vertex, mm; infinite for a far one.
     pub distance_mm: f64,
+}
+
+impl FilmUse<'_> {
+    /// Returns the lens at the wavelength of paraxial images: the main one of its file, else 550 nm, so that the film stays where it is
+    /// whatever wavelengths are looked at. Where the lens is not known there, or none of these is visible as it is, theirs that is nearest
+    /// to 550 nm.
+    ///
+    /// # Errors
+    /// When the lens is not known there either.
+    pub fn reference(&self, lens: &Lens) -> Result<MonoLens, PipelineError> {
+        let usual_nm = self.main_nm.unwrap_or(REFERENCE_WAVELENGTH_NM);
+        let own_nm = nearest_to_reference_nm(self.wavelengths_nm);
+        let is_as_visible = VISIBLE_NM.contains(&own_nm) || !VISIBLE_NM.contains(&usual_nm);
+        let usual = lens.at(usual_nm).ok().filter(|_| is_as_visible);
+        Ok(usual.map_or_else(|| lens.at(own_nm), Ok)?)
+    }
 }
 
 /// A film that was found.
@@ -59,9 +80,9 @@ impl AnalysisFilm {
     /// # Errors
     /// When a glass is not known at a wavelength, or there is no image to focus on.
     pub fn place(self, lens: &Lens, of: FilmUse<'_>) -> Result<FilmPlace, PipelineError> {
-        let reference = lens.at(of.reference_nm)?;
+        let reference = of.reference(lens)?;
         let paraxial = |distance_mm| Ok::<f64, PipelineError>(reference.film_distance_mm_for(distance_mm)?);
-        let mut origin = self.origin();
+        let mut origin = self.origin(reference.wavelength_nm());
         let distance_mm = match self {
             Self::OfFile(film_mm) | Self::FilmMm(film_mm) => film_mm,
             Self::FocusMm(distance_mm) => paraxial(distance_mm)?,
@@ -69,8 +90,12 @@ impl AnalysisFilm {
             Self::BestFocus => {
                 let from = paraxial(of.distance_mm);
                 let lenses = of.wavelengths_nm.iter().map(|&nm| lens.at(nm)).collect::<Result<Vec<MonoLens>, _>>()?;
-                let found =
-                    from.as_ref().ok().and_then(|&from_mm| best_on_axis(&reference, &lenses, of.distance_mm, from_mm));
+                let dioptres = 1e3 / (of.distance_mm + reference.projection_center_z_mm());
+                let axis = [ObjectPoint::from_field(&reference, DVec2::ZERO, dioptres)];
+                let wavelength_weights = if of.weights.len() == lenses.len() { of.weights } else { &[] };
+                let autofocus =
+                    Autofocus { wavelength_weights, ..Autofocus::alike(&lenses, &axis, PupilRule::of_rings(RINGS)) };
+                let found = from.as_ref().ok().and_then(|&from_mm| autofocus.best_film_mm(from_mm));
                 if found.is_none() {
                     DARK_AXIS.clone_into(&mut origin);
                 }
@@ -80,23 +105,19 @@ impl AnalysisFilm {
         Ok(FilmPlace { distance_mm, origin })
     }
 
-    /// Returns what is at the film, in a few words.
-    pub fn origin(self) -> String {
+    /// Returns what is at the film, in a few words; paraxial images are at this wavelength, nm.
+    fn origin(self, reference_nm: f64) -> String {
         match self {
             Self::OfFile(_) => "the image plane of the lens's file".to_owned(),
             Self::BestFocus => "the smallest spot on the axis".to_owned(),
-            Self::FocusMm(distance_mm) if distance_mm.is_infinite() => "the paraxial image of a far object".to_owned(),
-            Self::FocusMm(distance_mm) => format!("the paraxial image of an object at {distance_mm} mm"),
+            Self::FocusMm(distance_mm) if distance_mm.is_infinite() => {
+                format!("the paraxial image of a far object at {reference_nm} nm")
+            }
+            Self::FocusMm(distance_mm) => {
+                format!("the paraxial image of an object at {distance_mm} mm at {reference_nm} nm")
+            }
             Self::FilmMm(_) => "where it was asked for".to_owned(),
             Self::Afocal => "the focal plane of an ideal lens".to_owned(),
         }
     }
-}
-
-/// Returns the film with the smallest spot of the point on the axis, sought about `from_mm`, and its size, both mm; `None` where no
-/// light comes from there.
-fn best_on_axis(reference: &MonoLens, lenses: &[MonoLens], distance_mm: f64, from_mm: f64) -> Option<(f64, f64)> {
-    let dioptres = 1e3 / (distance_mm + reference.projection_center_z_mm());
-    let axis = [ObjectPoint::from_field(reference, DVec2::ZERO, dioptres)];
-    Autofocus { lenses, points: &axis, rule: PupilRule::of_rings(RINGS) }.best_film_mm(from_mm)
 }

@@ -76,6 +76,8 @@ mod tests {
             fields: AnalysisFields::above_axis_deg(&[0.0, 10.0]),
             wavelengths_nm: vec![550.0],
             main_wavelength_nm: None,
+            wavelength_weights: Vec::new(),
+            field_weights: Vec::new(),
             distance_mm: f64::INFINITY,
             film: AnalysisFilm::FocusMm(f64::INFINITY),
             n_rings: 6,

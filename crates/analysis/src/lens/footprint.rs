@@ -113,6 +113,8 @@ mod tests {
             fields: AnalysisFields::above_axis_deg(&[0.0, 5.0]),
             wavelengths_nm: vec![550.0],
             main_wavelength_nm: None,
+            wavelength_weights: Vec::new(),
+            field_weights: Vec::new(),
             distance_mm: f64::INFINITY,
             film: AnalysisFilm::BestFocus,
             n_rings: 4,

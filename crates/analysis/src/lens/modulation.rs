@@ -66,10 +66,10 @@ impl LensAnalysis {
     ///
     /// # Errors
     /// When a glass is not known at a wavelength, or no field sends waves to the film that can be summed.
-    pub fn modulation(&self, lens: &Lens, weights: &[f64]) -> Result<LensModulation, PipelineError> {
+    pub fn modulation(&self, lens: &Lens) -> Result<LensModulation, PipelineError> {
         let lenses = self.wavelengths_nm.iter().map(|&nm| lens.at(nm)).collect::<Result<Vec<MonoLens>, _>>()?;
-        let weights = match weights.len() == lenses.len() {
-            true => weights.to_vec(),
+        let weights = match self.wavelength_weights.len() == lenses.len() {
+            true => self.wavelength_weights.clone(),
             false => vec![1.0; lenses.len()],
         };
         let reference = lens.at(self.reference_nm)?;
@@ -355,11 +355,13 @@ mod tests {
             fields: AnalysisFields::above_axis_deg(&[0.0, 10.0]),
             wavelengths_nm: vec![500.0],
             main_wavelength_nm: None,
+            wavelength_weights: Vec::new(),
+            field_weights: Vec::new(),
             distance_mm: f64::INFINITY,
             film: AnalysisFilm::FilmMm(50.0),
             n_rings: 6,
         };
-        let found = request.compute(&lens).unwrap().modulation(&lens, &[]).unwrap();
+        let found = request.compute(&lens).unwrap().modulation(&lens).unwrap();
         // A round pupil of f/10 leaves 2/π (acos s − s √(1 − s²)) at the share s of 200 cycles per mm.
         // The first line is the limit.
         let axis = &found.over_frequency.series[..3];
@@ -385,11 +387,13 @@ mod tests {
             fields: AnalysisFields::above_axis_deg(&[0.0]),
             wavelengths_nm: vec![500.0],
             main_wavelength_nm: None,
+            wavelength_weights: Vec::new(),
+            field_weights: Vec::new(),
             distance_mm: f64::INFINITY,
             film: AnalysisFilm::FilmMm(50.5),
             n_rings: 6,
         };
-        let found = request.compute(&lens).unwrap().modulation(&lens, &[]).unwrap();
+        let found = request.compute(&lens).unwrap().modulation(&lens).unwrap();
         // Half a millimetre behind the focus of f/10.
         let radius_mm = 0.5 / 20.0;
         for line in &found.geometric.series[1..] {

@@ -52,13 +52,12 @@ impl LensPageData {
             };
             LensData::new(&used.lens, &question)
         };
-        let weights = used.weights_of(&request.wavelengths_nm);
         Ok(Self {
             data: request.wavelengths_nm.iter().map(data).collect::<Result<_, _>>()?,
             curves: analysis.lens_curves(&lens)?,
             focus_spots: analysis.focus_spots(&lens)?,
             footprints: analysis.footprints(&lens)?,
-            modulation: analysis.modulation(&lens, &weights).map_err(|error| error.to_string()),
+            modulation: analysis.modulation(&lens).map_err(|error| error.to_string()),
             surface_comments: used.surface_comments.clone(),
             sums_field_deg,
             lens,

@@ -33,6 +33,14 @@ pub enum AnalysisFields {
 }
 
 impl AnalysisFields {
+    /// The number of points that are named.
+    pub fn count(&self) -> usize {
+        match self {
+            Self::ByLight => 0,
+            Self::AnglesDeg(points) | Self::HeightsMm(points) => points.len(),
+        }
+    }
+
     /// Returns angles above the axis, degrees.
     pub fn above_axis_deg(angles_deg: &[f64]) -> Self {
         Self::AnglesDeg(angles_deg.iter().map(|&angle_deg| [0.0, angle_deg]).collect())
@@ -46,6 +54,10 @@ pub struct AnalysisRequest {
     pub fields: AnalysisFields,
     /// Wavelengths, nm.
     pub wavelengths_nm: Vec<f64>,
+    /// How much each of them counts, in foci and modulations; empty where all count alike.
+    pub wavelength_weights: Vec<f64>,
+    /// How much each point of the field counts for the film of least spots; empty where all count alike.
+    pub field_weights: Vec<f64>,
     /// Which of them is the reference, nm; `None` for that nearest to 550 nm.
     pub main_wavelength_nm: Option<f64>,
     /// Distance of the object before the first vertex, mm; infinity for a far one.

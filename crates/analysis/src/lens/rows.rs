@@ -22,6 +22,9 @@ pub struct LensAnalysis {
     pub reference_nm: f64,
     /// All wavelengths, nm.
     pub wavelengths_nm: Vec<f64>,
+    /// How much each of them counts in foci and modulations; empty where all count alike.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub wavelength_weights: Vec<f64>,
     /// What there is to say of the request, a sentence each.
     pub notes: Vec<String>,
     /// How light that leaves in parallel is looked at: focal length, heights, spots and foci are then those of the lens with an ideal

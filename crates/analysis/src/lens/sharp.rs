@@ -24,8 +24,11 @@ pub struct SharpDepths {
 }
 
 impl SharpDepths {
-    /// Returns them for a lens, focused at a distance before the first vertex, mm; `None` of lenses without power, and of those
-    /// whose entrance pupil is infinitely far.
+    /// Returns them for a lens, focused at a distance before the first vertex, mm; `None` of lenses without power, and of those with
+    /// another in the x–z than in the y–z plane.
+    ///
+    /// Before an entrance pupil that is infinitely far the cone of light has one width everywhere: blurred by 2 u |m| |s − s′| for its slope
+    /// u, such a lens is sharp as far on either side, and has no hyperfocal distance.
     ///
     /// # Errors
     /// When the blur is no diameter above 0.
@@ -41,10 +44,22 @@ impl SharpDepths {
         let first = lens.first_order_for(focused_mm.unwrap_or(f64::INFINITY));
         let far = lens.first_order();
         let pupil_mm = far.entrance_pupil_diameter_mm;
-        if !(pupil_mm.is_finite() && far.efl_mm.is_finite() && far.entrance_pupil_z_mm.is_finite()) {
+        let x_plane = lens.first_order_x();
+        let has_one_power = (x_plane.power_per_mm - far.power_per_mm).abs() <= 1e-9 * far.power_per_mm.abs();
+        if !(far.efl_mm.is_finite() && has_one_power) {
             return Ok(None);
         }
         let blur_mm = 1e-3 * blur_um;
+        if !(pupil_mm.is_finite() && far.entrance_pupil_z_mm.is_finite()) {
+            let of_cone = |focused_mm: f64| {
+                let slope = lens.axial_beam(focused_mm)?.slope_before.abs();
+                let half_mm = blur_mm / (2.0 * slope * lens.conjugate(focused_mm).magnification.abs());
+                Some([focused_mm - half_mm, focused_mm + half_mm])
+            };
+            let Some(limits_mm) = focused_mm.filter(|mm| mm.is_finite()).and_then(of_cone) else { return Ok(None) };
+            let [sharp_from_mm, sharp_to_mm] = limits_mm.map(Some);
+            return Ok(Some(Self { blur_um, hyperfocal_mm: f64::INFINITY, sharp_from_mm, sharp_to_mm }));
+        }
         // Where |m| is the blur over the pupil, the distance from the front focal point being f n / |m|.
         let hyperfocal_mm = far.efl_mm.abs() * far.object_index * pupil_mm / blur_mm - far.ffl_mm;
         let limits_mm = focused_mm.map(|focused_mm| {
@@ -69,7 +84,7 @@ impl SharpDepths {
 #[cfg(test)]
 mod tests {
     use approx::assert_relative_eq;
-    use dioptric_optics::Lens;
+    use dioptric_optics::{Glass, Interface, Lens, Shape, Surface};
 
     use super::*;
 
@@ -88,6 +103,25 @@ mod tests {
         let found = SharpDepths::of(&lens, 30.0, None).unwrap().unwrap();
         assert_eq!((found.sharp_from_mm, found.sharp_to_mm), (None, None));
         assert!(SharpDepths::of(&lens, 0.0, None).is_err());
+    }
+
+    /// A stop in the rear focal plane of a thin lens: the cone from an object in front of it has the slope a/f for a stop of radius a,
+    /// whatever its distance s, and is magnified by f/(s − f).
+    #[test]
+    fn telecentric_lens_is_sharp_as_far_on_either_side() {
+        let (f, a, s) = (50.0, 2.0, 100.0);
+        let row = |shape, semi_aperture_mm, thickness_after_mm| Interface {
+            surface: Surface { curvature_per_mm: 0.0, shape, semi_aperture_mm },
+            medium_after: Glass::Air,
+            thickness_after_mm,
+        };
+        let rows = vec![row(Shape::ThinLens { power_per_mm: 1.0 / f }, 20.0, f), row(Shape::Sphere, a, 0.0)];
+        let lens = Lens::new("telecentric", "test", rows, 1).unwrap().at(550.0).unwrap();
+        let found = SharpDepths::of(&lens, 20.0, Some(s)).unwrap().unwrap();
+        let half_mm = 0.02 / (2.0 * (a / f) * f / (s - f));
+        assert_relative_eq!(found.sharp_from_mm.unwrap(), s - half_mm, max_relative = 1e-6);
+        assert_relative_eq!(found.sharp_to_mm.unwrap(), s + half_mm, max_relative = 1e-6);
+        assert_eq!(SharpDepths::of(&lens, 20.0, None).unwrap(), None);
     }
 
     /// At the limits that a thick lens has, its own first-order image is blurred by as much.

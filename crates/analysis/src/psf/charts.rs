@@ -289,6 +289,7 @@ mod tests {
             wavelengths_nm: vec![450.0, 600.0],
             film: AnalysisFilm::FilmMm(51.8145),
             focus_nm: Vec::new(),
+            main_nm: None,
             diffraction: Diffraction::Hurb { gamma: 1.0 },
             pixel_um: 4.0,
             size: None,

@@ -164,7 +164,7 @@ impl PsfSet {
         let part = |&(index, share): &(usize, f64)| Part {
             index,
             share: share / total,
-            offset_px: (self.rows[index].centroid_mm() - centroid_mm) * to_px,
+            offset_px: (self.rows[index].middle_mm - centroid_mm) * to_px,
         };
         Some((centroid_mm, lit.iter().map(part).collect()))
     }

@@ -9,10 +9,8 @@ use crate::{
     AfocalView, AnalysisFilm, FilmPlace, FilmUse,
     field_angles::{FieldAngles, KNOWN_ANGLES},
 };
-use dioptric_pipeline::{PipelineError, REFERENCE_WAVELENGTH_NM, nearest_to_reference_nm};
+use dioptric_pipeline::PipelineError;
 
-/// Wavelengths that are seen.
-const VISIBLE_NM: std::ops::RangeInclusive<f64> = 380.0..=780.0;
 /// Pixels along the side of the largest picture that is made.
 pub(crate) const LARGEST: usize = 4097;
 /// Rings and azimuths of the rays through a pupil.
@@ -33,6 +31,8 @@ pub struct PsfRequest {
     pub film: AnalysisFilm,
     /// Wavelengths that are in focus together on a film that is sought, nm; none for those of the pictures.
     pub focus_nm: Vec<f64>,
+    /// The main wavelength of the lens's file, nm, where it states one: of paraxial images, fields and f-numbers.
+    pub main_nm: Option<f64>,
     /// Diffraction at the stop.
     pub diffraction: Diffraction,
     /// Side of a pixel, µm.
@@ -102,13 +102,10 @@ impl Item {
 impl PsfRequest {
     /// Returns the lens at [`reference_nm`](Self::reference_nm).
     pub(crate) fn reference(&self, lens: &Lens) -> Result<MonoLens, PipelineError> {
-        let asked_nm = nearest_to_reference_nm(&self.wavelengths_nm);
-        let usual = lens.at(REFERENCE_WAVELENGTH_NM).ok().filter(|_| VISIBLE_NM.contains(&asked_nm));
-        Ok(usual.map_or_else(|| lens.at(asked_nm), Ok)?)
+        self.film_use().reference(lens)
     }
 
-    /// The wavelength of fields, focus and f-numbers, nm: 550; where the lens is not known at it, or no wavelength asked
-    /// for is visible, that of them which is nearest to it.
+    /// The wavelength of fields, focus and f-numbers, nm, as [`FilmUse::reference`] has it.
     ///
     /// # Errors
     /// When the lens is not known at that wavelength.
@@ -116,10 +113,14 @@ impl PsfRequest {
         Ok(self.reference(lens)?.wavelength_nm())
     }
 
-    fn film_use(&self, reference_nm: f64) -> FilmUse<'_> {
-        let wavelengths_nm = if self.focus_nm.is_empty() { &self.wavelengths_nm } else { &self.focus_nm };
+    fn film_use(&self) -> FilmUse<'_> {
+        let is_own = self.focus_nm.is_empty() || self.focus_nm == self.wavelengths_nm;
+        let (wavelengths_nm, weights) = match is_own {
+            true => (&self.wavelengths_nm, self.spectral_weights.as_slice()),
+            false => (&self.focus_nm, [].as_slice()),
+        };
         let distance_mm = self.distances_mm.first().copied().unwrap_or(f64::INFINITY);
-        FilmUse { wavelengths_nm, reference_nm, distance_mm }
+        FilmUse { main_nm: self.main_nm, wavelengths_nm, weights, distance_mm }
     }
 
     /// Returns the lens that is looked through: where its light leaves in parallel and no film is given, the lens with an ideal one
@@ -128,7 +129,7 @@ impl PsfRequest {
         &self,
         lens: &'a Lens,
     ) -> Result<(Cow<'a, Lens>, Option<AfocalView>), PipelineError> {
-        AfocalView::applied(lens, self.film, &self.film_use(self.reference_nm(lens)?))
+        AfocalView::applied(lens, self.film, &self.film_use())
     }
 
     /// Returns where the film is: of a focus to be found, that of the first distance.
@@ -136,7 +137,7 @@ impl PsfRequest {
     /// # Errors
     /// When the lens is not known at a wavelength, or has no image to focus on.
     pub fn film_place(&self, lens: &Lens) -> Result<FilmPlace, PipelineError> {
-        self.film.place(lens, self.film_use(self.reference_nm(lens)?))
+        self.film.place(lens, self.film_use())
     }
 
     /// Returns the lens with the functions of an array, where they take the place of its own.

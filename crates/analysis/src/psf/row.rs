@@ -32,6 +32,9 @@ pub struct PsfRow {
     /// Whether this is the light of all wavelengths of the point together.
     #[serde(skip_serializing_if = "is_false")]
     pub is_polychromatic: bool,
+    /// Where the middle of the picture lies, mm from the axis: at the centroid, but for own functions, which lie about their chief ray.
+    #[serde(skip)]
+    pub(crate) middle_mm: DVec2,
     /// Centroid, to the right, mm from the axis.
     pub centroid_x_mm: f64,
     /// Centroid, upwards, mm from the axis.
@@ -146,6 +149,7 @@ impl PsfRow {
             film: String::new(),
             wavelength_nm: name.wavelength_nm,
             is_polychromatic: false,
+            middle_mm: place_mm,
             // Adding 0 takes the sign from a zero.
             centroid_x_mm: place_mm.x + 0.0,
             centroid_y_mm: place_mm.y + 0.0,

@@ -198,7 +198,11 @@ impl PsfRequest {
             distance_mm: item.distance_mm,
             wavelength_nm: item.wavelength_nm,
         };
-        let row = PsfRow::measure(name, place_mm, second, &measured);
+        let mut row = PsfRow::measure(name, place_mm, second, &measured);
+        if matches!(self.sampling, PsfSampling::Stored(_)) {
+            let aside_um = measured.centroid_um();
+            (row.centroid_x_mm, row.centroid_y_mm) = (place_mm.x + 1e-3 * aside_um.x, place_mm.y + 1e-3 * aside_um.y);
+        }
         let picture_share = picture.iter().map(|e| f64::from(*e)).sum();
         let whole = Windowed::new(picture.view(), self.pixel_um);
         PsfRow { energy: spot.energy, picture_share, ..row }
@@ -325,9 +329,11 @@ fn resized(picture: &Array2<f32>, size: usize) -> Array2<f32> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::AnalysisFilm;
+    use crate::{AnalysisFilm, FilmUse};
     use approx::assert_relative_eq;
     use dioptric_optics::{Glass, Interface, PupilPlane, Surface, Vignetting};
+    use dioptric_psf::{ArrayFields, PsfArray, PsfArrayParts};
+    use std::sync::Arc;
 
     fn to_the_right(fields_deg: &[f64]) -> Vec<[f64; 2]> {
         fields_deg.iter().map(|&deg| [deg, 0.0]).collect()
@@ -340,6 +346,7 @@ mod tests {
             wavelengths_nm: vec![450.0, 650.0],
             film: AnalysisFilm::FilmMm(51.8145),
             focus_nm: Vec::new(),
+            main_nm: None,
             diffraction: Diffraction::None,
             pixel_um: 2.0,
             size: None,
@@ -507,6 +514,36 @@ mod tests {
     }
 
     #[test]
+    fn own_functions_have_their_light_where_it_is() {
+        // Of the second color the light lies 4 samples to the right of the chief ray and 2 above it.
+        let mut samples = ndarray::Array5::zeros((1, 1, 2, 9, 9));
+        samples[(0, 0, 0, 4, 4)] = 1.0;
+        samples[(0, 0, 1, 2, 8)] = 1.0;
+        let array = PsfArray::new(PsfArrayParts {
+            fields: ArrayFields::Everywhere,
+            distances_mm: vec![],
+            wavelengths_nm: vec![500.0, 600.0],
+            pitch_um: vec![2.0],
+            samples,
+        });
+        let sampling = PsfSampling::Stored(Arc::new(array.unwrap()));
+        let (fields_deg, wavelengths_nm) = (vec![[0.0; 2]], vec![500.0, 600.0]);
+        let set = PsfRequest { fields_deg, wavelengths_nm, pixel_um: 2.0, sampling, ..request() }
+            .compute(&Lens::thin(50.0, 12.5).unwrap())
+            .unwrap();
+        for (row, at_um) in set.rows.iter().zip([DVec2::ZERO, DVec2::new(8.0, 4.0)]) {
+            assert!((1e3 * row.centroid_mm() - at_um).length() < 1e-3, "{row:?}");
+        }
+        // The light of both: two dots that far apart.
+        let whole = &set.polychromatic(&[])[0];
+        assert!((1e3 * whole.row.centroid_mm() - DVec2::new(4.0, 2.0)).length() < 1e-3, "{:?}", whole.row);
+        let picture = Picture::new(whole.picture.view(), 2.0);
+        assert!(picture.centroid_um().length() < 1e-3, "{}", picture.centroid_um());
+        let [measured, stated] = [picture.rms_radius_um(), DVec2::new(4.0, 2.0).length()];
+        assert!((measured / stated - 1.0).abs() < 0.05 && (whole.row.rms_radius_um / stated - 1.0).abs() < 0.05);
+    }
+
+    #[test]
     fn infrared_light_is_focused_by_itself() {
         let glass = Glass::Sellmeier { b: vec![14.76, 0.24], c_um2: vec![0.19, 1530.0], range_nm: Some((2e3, 14e3)) };
         let side = |radius_mm: f64, medium_after: Glass, thickness_after_mm: f64| Interface {
@@ -534,6 +571,17 @@ mod tests {
             request.reference(&paper_lens()).unwrap().wavelength_nm()
         };
         assert_eq!([355.0, 450.0, 1064.0].map(reference_nm), [355.0, 550.0, 1064.0]);
+        // A file's main wavelength stands for 550 nm: its film is where every command has it, and says of which light it is.
+        let (main_nm, focus) = (Some(656.0), AnalysisFilm::FocusMm(f64::INFINITY));
+        for nm in [450.0, 656.0] {
+            let found = focus
+                .place(&paper_lens(), FilmUse { main_nm, wavelengths_nm: &[nm], weights: &[], distance_mm: 2000.0 })
+                .unwrap();
+            let expected_mm = paper_lens().at(656.0).unwrap().film_distance_mm_for(f64::INFINITY).unwrap();
+            assert_eq!((found.distance_mm, found.origin.contains("at 656 nm")), (expected_mm, true));
+            let request = PsfRequest { main_nm, wavelengths_nm: vec![nm], film: focus, ..request() };
+            assert_eq!(request.compute(&paper_lens()).unwrap().film_distance_mm, expected_mm);
+        }
     }
 
     #[test]

@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use dioptric_optics::{
-    COATING_CENTER_NM, Coating, GlassCatalogue, GlassRange, IdealLens, Iris, Lens, LensFile, MissingGlass, ReadOptions,
-    SchematicEye, SeqNumbers, SurfaceChange,
+    COATING_CENTER_NM, Coating, GlassCatalogue, GlassRange, IdealLens, Iris, Lens, LensFile, MissingGlass, MonoLens,
+    ReadOptions, SchematicEye, SeqNumbers, SurfaceChange,
 };
 use dioptric_sensor::Sensor;
 use serde::{Deserialize, Serialize};
@@ -217,13 +217,21 @@ impl StopSpec {
 }
 
 impl Camera {
-    /// Returns the lens with its blades and its stop set, not yet moved before the film.
+    /// Returns the lens with its blades and its stop set, not yet moved before the film, at the wavelength of its focus.
     ///
     /// # Errors
     /// When there is none of that name, its file cannot be read, it has no iris, or the stop does not open so far.
-    pub fn stopped_lens(&self) -> Result<Lens, PipelineError> {
-        self.stop.apply(with_blades(self.lens.open(&self.lens_reading)?.lens, self.iris)?)
+    pub fn stopped_lens(&self) -> Result<MonoLens, PipelineError> {
+        let file = self.lens.open(&self.lens_reading)?;
+        let reference_nm = reference_nm_of(&file);
+        Ok(self.stop.apply_at(with_blades(file.lens, self.iris)?, reference_nm)?.at(reference_nm)?)
     }
+}
+
+/// Returns the wavelength of focus, stop and field of a lens, nm: the main one of its file where that is visible, else 550 nm.
+pub fn reference_nm_of(file: &LensFile) -> f64 {
+    let is_visible = |nm: &f64| (380.0..=780.0).contains(nm) && file.lens.at(*nm).is_ok();
+    file.reference_wavelength_nm.filter(is_visible).unwrap_or(REFERENCE_WAVELENGTH_NM)
 }
 
 /// Returns a lens with these blades, or with its own where there are none.

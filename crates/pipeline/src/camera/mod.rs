@@ -37,7 +37,9 @@ pub use dual_pixel::DualPixelSpec;
 pub use filters::FilterSpec;
 pub(crate) use frames::at_rest;
 pub use frames::{Exposed, FramesSpec, PhotodiodeReads};
-pub use lens::{CoatingSpec, LensReadOptions, REFERENCE_WAVELENGTH_NM, nearest_to_reference_nm, with_blades};
+pub use lens::{
+    CoatingSpec, LensReadOptions, REFERENCE_WAVELENGTH_NM, nearest_to_reference_nm, reference_nm_of, with_blades,
+};
 pub use light_field::LightFieldSpec;
 pub use measured_eye::DrawnEye;
 pub use movements::Movements;
@@ -198,7 +200,7 @@ pub enum StopSpec {
     /// As the lens file says.
     #[default]
     AsGiven,
-    /// At this f-number, for an object at infinity and the reference wavelength; up to 5 % below that of the lens it is fully open.
+    /// At this f-number, for an object at infinity, at the main wavelength of the lens's file, else at 550 nm; up to 5 % below that of the lens it is fully open.
     FNumber(f64),
     /// At this diameter of the stop, mm.
     DiameterMm(f64),
@@ -209,7 +211,7 @@ pub enum StopSpec {
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub enum FocusSpec {
-    /// In focus for an object at this distance from the first vertex, mm, by first-order optics at the reference wavelength; `lens
+    /// In focus for an object at this distance from the first vertex, mm, by first-order optics at the main wavelength of the lens's file, else at 550 nm; `lens
     /// analyze` tells where the least spot is.
     DistanceMm(f64),
     /// At this distance from the last vertex, mm.
@@ -336,13 +338,8 @@ impl Camera {
     /// # Errors
     /// As [`read`](Self::read).
     pub fn parse(text: &str, path: &Path) -> Result<Self, PipelineError> {
-        let options = ron::Options::default().with_default_extension(Extensions::IMPLICIT_SOME);
-        let mut camera: Self = options.from_str(text).map_err(|e| PipelineError::Syntax {
-            path: path.to_owned(),
-            line: e.span.start.line,
-            column: e.span.start.col,
-            reason: syntax::reason(text, &e),
-        })?;
+        let mut camera: Self = dioptric_files::ron::from_text(text)
+            .map_err(|error| PipelineError::syntax(path, syntax::with_values(error)))?;
         camera.check(&Checker::of_file(path, text))?;
         camera.resolve_paths(path.parent().unwrap_or(Path::new("")));
         Ok(camera)

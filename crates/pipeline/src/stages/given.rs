@@ -2,7 +2,7 @@
 
 use std::{ops::Deref, sync::Arc};
 
-use dioptric_optics::Lens;
+use dioptric_optics::LensFile;
 use dioptric_scene::Scene;
 use dioptric_sensor::Sensor;
 
@@ -42,8 +42,8 @@ impl<T> Deref for Given<T> {
 /// The parts of a camera that a program made, each in place of what the camera file names.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct GivenParts {
-    /// The lens; the camera's stop and movements are applied to it.
-    pub lens: Option<Given<Lens>>,
+    /// The lens as a file would state it; the camera's stop and movements are applied to it.
+    pub lens: Option<Given<LensFile>>,
     /// The scene; the camera's bands, light and luminance are applied to it.
     pub scene: Option<Given<Scene>>,
     /// The sensor.

@@ -2,12 +2,12 @@
 
 use std::sync::OnceLock;
 
-use dioptric_optics::{Lens, LensFile, MonoLens};
+use dioptric_optics::{Lens, MonoLens};
 use dioptric_sensor::{Layer, Sensor};
 use dioptric_spectrum::{Spectrum, WavelengthGrid};
 
 use super::spec::LensInputs;
-use crate::{PipelineError, PsfFile, REFERENCE_WAVELENGTH_NM, with_blades};
+use crate::{PipelineError, PsfFile, reference_nm_of, with_blades};
 
 /// A lens ready for use.
 #[derive(Clone, Debug)]
@@ -87,19 +87,21 @@ impl ResolvedLens {
 
 pub(super) fn resolve(inputs: &LensInputs) -> Result<ResolvedLens, PipelineError> {
     let file = match inputs.given.as_deref() {
-        Some(lens) => LensFile::from(lens.clone()),
+        Some(file) => file.clone(),
         None => inputs.choice.open(&inputs.reading)?,
     };
-    let note_on_stop = inputs.stop.note_at(&file.lens, REFERENCE_WAVELENGTH_NM);
-    let lens = inputs.stop.apply(with_blades(file.lens, inputs.iris)?)?;
+    let reference_nm = reference_nm_of(&file);
+    let note_on_stop = inputs.stop.note_at(&file.lens, reference_nm);
+    let lens = inputs.stop.apply_at(with_blades(file.lens, inputs.iris)?, reference_nm)?;
     let note_on_iris = lens.note_on_iris();
-    let lens = inputs.movements.apply(lens)?;
-    let reference = lens.at(REFERENCE_WAVELENGTH_NM)?;
+    let lens = inputs.movements.apply_at(lens, reference_nm)?;
+    let reference = lens.at(reference_nm)?;
     // What limits the light is that of the lens's own object.
     let psfs = inputs.psfs.as_deref().map(PsfFile::read).transpose()?;
     let object_distance_mm = file.object_distance_mm.unwrap_or(f64::INFINITY);
-    let note_on_limit = reference.note_on_limit(object_distance_mm);
-    let notes = file.notes.into_iter().chain(note_on_stop).chain(note_on_iris).chain(note_on_limit).collect();
+    let of_axis = [reference.note_on_limit(object_distance_mm), reference.note_on_bent_axis()];
+    let own = file.notes.into_iter().chain(note_on_stop).chain(note_on_iris);
+    let notes = own.chain(of_axis.into_iter().flatten()).collect();
     let film_distance_mm = file.film_distance_mm;
     Ok(ResolvedLens {
         lens,

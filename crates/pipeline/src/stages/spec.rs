@@ -10,7 +10,7 @@ use std::{
 
 use dioptric_backward::MicroArray;
 use dioptric_forward::Film;
-use dioptric_optics::{Iris, Lens};
+use dioptric_optics::{Iris, LensFile};
 use dioptric_scene::{FileReading, FillDepth, Scene, may_be_read_with};
 use dioptric_sensor::{ExposureControl, Noise, OpticalFilter, Processing, Sensor, WhiteBalance};
 use dioptric_spectrum::Illuminant;
@@ -66,7 +66,7 @@ impl FileStamp {
 /// The lens, its stop set, moved before the film.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct LensInputs {
-    pub(crate) given: Option<Given<Lens>>,
+    pub(crate) given: Option<Given<LensFile>>,
     pub(crate) choice: LensSpec,
     pub(crate) reading: LensReadOptions,
     pub(crate) stop: StopSpec,

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use dioptric_optics::Lens;
+use dioptric_optics::LensFile;
 use dioptric_scene::Scene;
 use dioptric_sensor::Sensor;
 
@@ -27,18 +27,18 @@ impl KeptCamera {
     /// Returns the camera with a lens that a program made, its stop as it is set; what is kept is shared.
     ///
     /// ```
-    /// use dioptric_optics::Lens;
+    /// use dioptric_optics::{Lens, LensFile};
     /// use dioptric_pipeline::{Camera, Given, KeptCamera};
     ///
-    /// let lens = Given::new(Lens::thin(50.0, 10.0)?);
+    /// let lens = Given::new(LensFile::from(Lens::thin(50.0, 10.0)?));
     /// let kept = KeptCamera::new(Camera::demo()?).with_given_lens(lens);
     /// assert!(kept.given().lens.is_some() && kept.given().check_none().is_err());
     /// # Ok::<(), dioptric_pipeline::PipelineError>(())
     /// ```
     #[must_use]
-    pub fn with_given_lens(&self, lens: Given<Lens>) -> Self {
+    pub fn with_given_lens(&self, lens: Given<LensFile>) -> Self {
         let mut changed = self.with(|camera| {
-            camera.lens = LensSpec::File(in_memory(lens.name()));
+            camera.lens = LensSpec::File(in_memory(lens.lens.name()));
             camera.lens_reading = LensReadOptions::default();
             (camera.stop, camera.iris) = (StopSpec::AsGiven, None);
         });

@@ -8,8 +8,8 @@ use dioptric_world::{CameraKind, World, WorldCamera};
 
 use super::world_view::{placement, reference_band};
 use crate::{
-    Camera as CameraFile, Diffraction, FilmSpec, FocusSpec, LensReadOptions, LensSpec, PipelineError,
-    REFERENCE_WAVELENGTH_NM, SceneSource, StopSpec,
+    Camera as CameraFile, Diffraction, FilmSpec, FocusSpec, LensReadOptions, LensSpec, PipelineError, SceneSource,
+    StopSpec, reference_nm_of,
 };
 
 /// The most columns of a view that is no more than the summary of a picture.
@@ -47,7 +47,9 @@ impl CameraFile {
             unreachable!("a camera with a lens")
         };
         let settings = camera.settings();
-        let lens = self.stop.apply(self.lens.open(&self.lens_reading)?.lens)?.at(REFERENCE_WAVELENGTH_NM)?;
+        let file = self.lens.open(&self.lens_reading)?;
+        let reference_nm = reference_nm_of(&file);
+        let lens = self.stop.apply_at(file.lens, reference_nm)?.at(reference_nm)?;
         let (columns, rows) = of_file.resolution;
         let film_distance_mm = settings.film_distance_mm;
         // The view is no more than the picture's summary.
@@ -72,7 +74,7 @@ impl CameraFile {
     /// When the lens cannot be read, or the camera stands outside the room of the still life.
     pub fn focus_ahead(&self, world: &World) -> Result<FocusSpec, PipelineError> {
         let SceneSource::World(spec) = &self.scene.source else { return Ok(self.focus) };
-        let lens = self.stopped_lens()?.at(REFERENCE_WAVELENGTH_NM)?;
+        let lens = self.stopped_lens()?;
         let ahead_m = distance_ahead_m(world, &placement(world, spec, self.scene.field_of_view_deg)?);
         let ahead_m = ahead_m.unwrap_or(f64::INFINITY);
         // The center of the entrance pupil stands at the camera's place, the first vertex before or behind it.

@@ -60,12 +60,14 @@ impl LensQuestion {
             fields: AnalysisFields::above_axis_deg(&[0.0, 0.7, 1.0].map(|share| share * corner_deg)),
             wavelengths_nm: LINES_NM.to_vec(),
             main_wavelength_nm: Some(LINES_NM[1]),
+            wavelength_weights: Vec::new(),
+            field_weights: Vec::new(),
             distance_mm: self.distance_mm,
             film: AnalysisFilm::FilmMm(self.film_distance_mm),
             n_rings: RINGS,
         };
         let analysis = request.compute(&self.lens.lens)?;
-        let modulation = analysis.modulation(&self.lens.lens, &[1.0; 3]).ok();
+        let modulation = analysis.modulation(&self.lens.lens).ok();
         Ok(LensAnswer { analysis, modulation })
     }
 }

@@ -2,13 +2,15 @@ use dioptric_optics::{CoordinateBreak, Glass, ImageSurface, Interface, Shape, Su
 use dioptric_psf::{Diffraction, ImageSettings, LensImage, LensImageModel};
 
 use super::*;
-use crate::AnalysisFields;
+use crate::{AnalysisFields, AnalysisFilm};
 
 fn request(fields_deg: Vec<f64>) -> AnalysisRequest {
     AnalysisRequest {
         fields: AnalysisFields::above_axis_deg(&fields_deg),
         wavelengths_nm: vec![450.0, 550.0, 650.0],
         main_wavelength_nm: None,
+        wavelength_weights: Vec::new(),
+        field_weights: Vec::new(),
         distance_mm: f64::INFINITY,
         film: AnalysisFilm::BestFocus,
         n_rings: 6,
@@ -319,4 +321,21 @@ fn afocal_lens_is_analyzed_by_angles() {
     let height_mm = analysis.spots[1].height_mm.unwrap();
     assert!((height_mm.abs() - 5000.0 * 1_f64.to_radians().tan()).abs() < 1e-6, "{height_mm}");
     assert!(analysis.spots.iter().all(|spot| spot.rms_um.unwrap() < 1e-3));
+}
+
+/// Light and fields of weight 0 have no part in a focus.
+#[test]
+fn foci_are_those_of_what_is_weighed() {
+    let lens = Lens::built_in("singlet-50mm").unwrap().with_f_number(8.0, 550.0).unwrap();
+    let all = request(vec![0.0, 10.0]);
+    let red = AnalysisRequest { wavelengths_nm: vec![650.0], ..all.clone() }.compute(&lens).unwrap().focus;
+    let weighed = AnalysisRequest { wavelength_weights: vec![0.0, 0.0, 2.0], ..all.clone() }.compute(&lens).unwrap();
+    let close = |a: Option<f64>, b: Option<f64>| (a.unwrap() - b.unwrap()).abs() < 1e-6;
+    assert!(close(weighed.focus.axis_film_mm, red.axis_film_mm), "{:?} {red:?}", weighed.focus);
+    assert!(close(Some(weighed.film_distance_mm), red.axis_film_mm));
+    let alike = all.compute(&lens).unwrap().focus;
+    assert!((alike.axis_film_mm.unwrap() - red.axis_film_mm.unwrap()).abs() > 0.1);
+    let axis_alone = AnalysisRequest { field_weights: vec![1.0, 0.0], ..all }.compute(&lens).unwrap().focus;
+    assert!(close(axis_alone.fields_film_mm, axis_alone.axis_film_mm), "{axis_alone:?}");
+    assert!(!close(alike.fields_film_mm, alike.axis_film_mm));
 }
