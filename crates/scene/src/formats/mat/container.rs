@@ -10,7 +10,7 @@ use flate2::read::ZlibDecoder;
 use super::{
     super::unusable::{TRUNCATED, check_memory, unreadable},
     elements::{self, LIMIT_ARRAYS, LIMIT_DEPTH, Listed},
-    hdf5::Hdf5,
+    hdf5::{Entry, Hdf5},
     packing::Attribute,
 };
 use crate::SceneError;
@@ -39,8 +39,8 @@ pub(super) struct MatFile {
     pub(super) listed: Vec<Listed>,
     /// What is stated of those of HDF5 besides their numbers.
     attributes: Vec<(String, Vec<Attribute>)>,
-    /// What those of HDF5 are in words, and the names of their axes.
-    words: Vec<(String, String, Vec<String>)>,
+    /// What those of HDF5 are in words, the names of their axes, and the paths of the scales of each.
+    words: Vec<(String, String, Vec<String>, Vec<Vec<String>>)>,
 }
 
 /// An array: its sides, and what it holds.
@@ -108,7 +108,8 @@ impl MatFile {
         }
         let own = entries.iter().map(|entry| (entry.listed.name.clone(), entry.attributes.clone()));
         let attributes = std::iter::once((WHOLE.to_owned(), file.attributes())).chain(own).collect();
-        let words = entries.iter().map(|own| (own.listed.name.clone(), own.words.clone(), own.axes.clone())).collect();
+        let said = |own: &Entry| (own.listed.name.clone(), own.words.clone(), own.axes.clone(), own.scales.clone());
+        let words = entries.iter().map(said).collect();
         let listed = entries.into_iter().map(|entry| entry.listed).collect();
         Ok(Self { is_big_endian: false, is_row_major: !file.is_matlab, variables, listed, attributes, words })
     }
@@ -147,7 +148,12 @@ impl MatFile {
 
     /// Returns what a variable is called in words, and the names of its axes; both empty where nothing is stated.
     pub(super) fn words_of(&self, name: &str) -> (&str, &[String]) {
-        self.words.iter().find(|(own, ..)| own == name).map_or(("", &[]), |(_, words, axes)| (words, axes))
+        self.words.iter().find(|(own, ..)| own == name).map_or(("", &[]), |(_, words, axes, _)| (words, axes))
+    }
+
+    /// Returns the paths of the scales of each axis of a variable; several where nothing says which is its own.
+    pub(super) fn scales_of(&self, name: &str) -> &[Vec<String>] {
+        self.words.iter().find(|(own, ..)| own == name).map_or(&[], |(.., scales)| scales)
     }
 
     /// Returns a variable, or a field of a structure as `data.cube`; `None` where the file has none of this name.
@@ -394,7 +400,7 @@ impl Header<'_> {
     fn listed(self) -> Listed {
         let has_numbers = (6..=15).contains(&self.class);
         let [is_numeric, is_complex] = [false, true].map(|is_complex| has_numbers && self.is_complex == is_complex);
-        Listed { name: self.name, sides: self.sides, is_numeric, is_complex }
+        Listed { name: self.name, sides: self.sides, is_numeric, is_complex, is_scale: false }
     }
 }
 

@@ -14,6 +14,8 @@ pub(super) struct Listed {
     pub(super) is_numeric: bool,
     /// Whether it is one of complex numbers.
     pub(super) is_complex: bool,
+    /// Whether it is the scale of an axis of another.
+    pub(super) is_scale: bool,
 }
 
 /// Classes of arrays.
