@@ -10,7 +10,7 @@ use super::{
     reading::FileQuantity,
     stated::{name_of, note_of, short},
     unusable::{check_made, unreadable},
-    wavelength_unit::wavelengths_of_column,
+    wavelength_unit::{comments_of, wavelengths_of_column},
 };
 use crate::SceneError;
 
@@ -66,7 +66,7 @@ pub(super) fn read_chart(path: &Path) -> Result<Cube, SceneError> {
         ));
     }
     const OTHERS: [&str; 12] = [
-        "absorb",
+        "absor",
         "radian",
         "emission",
         "photon",
@@ -87,15 +87,14 @@ pub(super) fn read_chart(path: &Path) -> Result<Cube, SceneError> {
     if let Some(other) = names.iter().find(is_other) {
         return Err(wrong(format!("its column '{}' says that it holds no reflectances, expected such", short(other))));
     }
-    let wavelengths_nm = wavelengths_of_column(&first, &wavelengths_nm).map_err(wrong)?;
+    let wavelengths_nm = wavelengths_of_column(&first, &wavelengths_nm, comments_of(&text)).map_err(wrong)?;
     let mut notes = vec![];
     let is_percent = |name: &&String| name.contains('%') || name.to_lowercase().contains("percent");
     if names.iter().chain([&first]).any(|name| is_percent(&name)) {
         lines.iter_mut().flatten().for_each(|value| *value /= 100.0);
         notes.push(format!("{}: its reflectances are in percent", name_of(path)));
     }
-    let comments: Vec<_> = text.lines().filter_map(|line| line.strip_prefix('#')).map(str::trim).collect();
-    let comments: Vec<_> = comments.into_iter().filter(|comment| !comment.is_empty()).map(str::to_owned).collect();
+    let comments: Vec<String> = comments_of(&text).map(str::to_owned).collect();
     notes.extend(note_of(path, "comment", &comments));
     // As wide to its height as the usual charts of 6 × 4.
     let across = ((1.5 * n as f64).sqrt().ceil() as usize).min(n);
@@ -175,6 +174,7 @@ mod tests {
             ("", "it is empty"),
             ("# nothing\n", "no line of numbers"),
             ("nm,absorbance\n400,.2\n", "'absorbance' says that it holds no reflectances"),
+            ("nm,absorption coefficient (1/cm)\n400,.2\n", "says that it holds no reflectances"),
             ("nm,W/m2/nm\n400,.2\n", "'W/m2/nm' says that it holds no reflectances"),
             ("nm,catalog red,Optical_Density\n400,.2,.3\n", "'Optical_Density' says that it holds no reflectances"),
             ("nm,log(1/T)\n400,.2\n", "'log(1/T)' says that it holds no reflectances"),

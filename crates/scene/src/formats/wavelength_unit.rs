@@ -109,17 +109,52 @@ pub(super) fn unit_in(name: &str) -> Option<&str> {
         .or_else(|| name.rsplit(BETWEEN).find_map(|word| Some(&word[behind(&word)?..]).filter(is_unit)))
 }
 
-/// Returns the wavelengths, nm, of the column of a table, as the unit in its name says (`wavelength_nm`, `Wavelength (µm)`, `cm^-1`) or, where
-/// there is none, its numbers.
+/// Returns the wavelengths, nm, of the column of a table, as the unit in its name says (`wavelength_nm`, `Wavelength (µm)`, `cm^-1`), or that in a
+/// comment on wavelengths which they can be in, or, where there is none, its numbers.
 ///
 /// # Errors
-/// When its unit is not known, or its numbers are no likely wavelengths.
-pub fn wavelengths_of_column(name: &str, numbers: &[f64]) -> Result<Vec<f64>, String> {
+/// When its unit is not known, or its numbers are no likely wavelengths, or may be nm as well as Å.
+pub(super) fn wavelengths_of_column<'a>(
+    name: &str,
+    numbers: &[f64],
+    comments: impl IntoIterator<Item = &'a str>,
+) -> Result<Vec<f64>, String> {
     let bracketed = name.rsplit_once(['(', '[']).map(|(_, rest)| rest.trim_end_matches([')', ']', ' ']));
+    let can_be = |unit: &&str| {
+        let nm = in_nm(unit, numbers);
+        nm.is_some_and(|own| own.iter().all(|nm| PLAUSIBLE_NM.contains(nm)))
+    };
     let unit = bracketed.or_else(|| unit_in(name));
+    let unit = unit.or_else(|| comments.into_iter().filter_map(unit_of_waves).find(can_be));
+    if unit.is_none()
+        && !name.ends_with('A')
+        && !numbers.is_empty()
+        && numbers.iter().all(|number| *number >= MAYBE_ANGSTROM)
+    {
+        return Err(format!(
+            "its wavelengths, {} and more, have no unit and may be nm or Å: expected it in the name of their column",
+            shown(numbers.iter().copied().fold(f64::INFINITY, f64::min))
+        ));
+    }
     let name = if name.is_empty() { "first column" } else { name };
     let counted = || format!("its '{}' counts bands: expected wavelengths in nm", short(name));
     list_of(name, unit, numbers, "")?.ok_or_else(counted)
+}
+
+/// Numbers from which on wavelengths without a unit may be Å: no light of so many nm is seen.
+const MAYBE_ANGSTROM: f64 = 2500.0;
+
+/// Returns the comments of a table, which begin with #.
+pub(super) fn comments_of(text: &str) -> impl Iterator<Item = &str> {
+    text.lines().filter_map(|line| line.strip_prefix('#')).map(str::trim).filter(|comment| !comment.is_empty())
+}
+
+/// Returns the first unit behind a word for wavelengths.
+fn unit_of_waves(text: &str) -> Option<&str> {
+    let lower = text.to_lowercase();
+    let at = ["wavelength", "lambda", "wavenumber"].iter().find_map(|word| lower.find(word))?;
+    let is_between = |c: char| c.is_whitespace() || "/_-,;:=[]()".contains(c);
+    text.get(at..)?.split(is_between).find(|word| unit_in(word).is_some() || *word == "A")
 }
 
 /// Returns the wavelength of a text such as `450 nm`, `Band 450.5nm, FWHM 10 nm` or, of a band, `445-455 nm`: the first that it names.
@@ -225,11 +260,22 @@ mod tests {
             ("wavelength", 0.5),
             ("", 500.0),
         ] {
-            let nm = wavelengths_of_column(name, &[number]).map(|nm| nm[0].round());
+            let nm = wavelengths_of_column(name, &[number], []).map(|nm| nm[0].round());
             assert_eq!(nm, Ok(500.0), "{name}");
         }
-        assert!(wavelengths_of_column("waves (zorp)", &[500.0]).unwrap_err().contains("'zorp'"));
-        assert!(wavelengths_of_column("band", &[1.0, 2.0]).unwrap_err().contains("counts bands"));
+        assert!(wavelengths_of_column("waves (zorp)", &[500.0], []).unwrap_err().contains("'zorp'"));
+        assert!(wavelengths_of_column("band", &[1.0, 2.0], []).unwrap_err().contains("counts bands"));
+        // Comments say it where they can be right.
+        for (comment, expected) in
+            [("Wavelength (Angstroms), flux (W/um)", 500.0), ("lambda: A", 500.0), ("wavelength in angstrom", 500.0)]
+        {
+            assert_eq!(wavelengths_of_column("", &[5000.0], [comment]), Ok(vec![expected]), "{comment}");
+        }
+        for comment in ["made by A", "a slit of 10 um", "calibrated wavelengths, slit of 10 um"] {
+            assert!(wavelengths_of_column("", &[5000.0], [comment]).unwrap_err().contains("nm or Å"), "{comment}");
+            assert_eq!(wavelengths_of_column("", &[500.0], [comment]), Ok(vec![500.0]), "{comment}");
+        }
+        assert_eq!(wavelengths_of_column("nm", &[5000.0], ["wavelength in Å"]), Ok(vec![5000.0]));
     }
 
     #[test]
