@@ -26,6 +26,24 @@ const LISTS: [&str; 2] = ["wavelengths.txt", "wavelengths.csv"];
 /// Endings of pictures that are no bands.
 const OTHERS: [&str; 10] = ["bmp", "jpg", "jpeg", "webp", "ppm", "pgm", "pnm", "exr", "hdr", "pfm"];
 
+/// Words before the numbers of pictures that are no bands, among pictures of another name.
+const NO_BANDS: [&str; 14] = [
+    "ref",
+    "reference",
+    "white",
+    "dark",
+    "flat",
+    "mask",
+    "depth",
+    "thumb",
+    "thumbnail",
+    "preview",
+    "rgb",
+    "img",
+    "photo",
+    "dsc",
+];
+
 /// Files that systems leave in folders.
 const OF_SYSTEMS: [&str; 2] = ["thumbs.db", "desktop.ini"];
 
@@ -210,11 +228,17 @@ fn listing(folder: &Path, n_told: Option<usize>) -> Result<Listing, SceneError> 
         let odd = without_wavelengths(&mut pictures, n_told);
         unused.extend(odd.iter().map(|(_, path)| name_of(path)));
     }
-    // Bands are called alike before their numbers: one of another name with the number of a year is none of them.
+    // Bands are called alike before their numbers: one of another name with the number of a year is none of them, nor are those whose name says so.
     let starts: Vec<String> = pictures.iter().map(|(_, path)| start(path)).collect();
     let n_called = |own: &String| starts.iter().filter(|start| *start == own).count();
     if starts.iter().map(n_called).max().is_some_and(|most| most > 2 && 2 * most > starts.len()) {
-        let odd = pictures.extract_if(.., |(nm, path)| n_called(&start(path)) == 1 && (1990.0..2100.0).contains(nm));
+        let is_odd = |(nm, path): &Numbered| {
+            let own = start(path);
+            let last = own.rsplit(|c: char| !c.is_alphanumeric()).next().unwrap_or_default().to_lowercase();
+            let is_named = NO_BANDS.contains(&last.as_str()) && 2 * n_called(&own) < starts.len();
+            is_named || n_called(&own) == 1 && (1990.0..2100.0).contains(nm)
+        };
+        let odd = pictures.extract_if(.., |own| is_odd(own));
         unused.extend(odd.map(|(_, path)| name_of(&path)));
     }
     pictures.sort_by(|a, b| a.0.total_cmp(&b.0).then_with(|| a.1.cmp(&b.1)));
@@ -223,10 +247,19 @@ fn listing(folder: &Path, n_told: Option<usize>) -> Result<Listing, SceneError> 
     Ok(Listing { pictures, unused, files })
 }
 
-/// Returns what a picture is called before its number.
+/// Returns what a picture is called before its number, or its range.
 fn start(path: &Path) -> String {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    stem.trim_end_matches(|c: char| c.is_ascii_digit() || ".nmto_- ".contains(c)).to_owned()
+    let is_number = |c: char| c.is_ascii_digit() || "._- ".contains(c);
+    let mut own = stem.trim_end_matches(is_number);
+    // Units, and words of ranges, stand behind numbers.
+    while let Some(rest) = own.strip_suffix("nm").or_else(|| own.strip_suffix("to")) {
+        if !rest.trim_end_matches(['_', '-', ' ']).ends_with(|c: char| c.is_ascii_digit()) {
+            break;
+        }
+        own = rest.trim_end_matches(is_number);
+    }
+    own.to_owned()
 }
 
 /// Takes out the few pictures whose numbers are no wavelengths, as copies (`b_450_1`) and dates have them, where those of most are and lie closer to
@@ -412,6 +445,8 @@ mod tests {
         for (names, n_bands) in [
             (&["b_450.png", "b_500.png", "b_560.png", "photo_2024.png"][..], 3),
             (&["blue_450.png", "green_550.png", "red_650.png"], 3),
+            (&["b_450.png", "b_500.png", "b_560.png", "ref_700.png", "ref_800.png"], 3),
+            (&["ref_450.png", "ref_500.png", "ref_560.png", "b_700.png"], 4),
             (&["vis_450.png", "vis_500.png", "vis_560.png", "nir_850.png"], 4),
             (&["vis_450.png", "vis_550.png", "vis_650.png", "nir_850.png", "nir_900.png"], 5),
         ] {
@@ -419,7 +454,8 @@ mod tests {
             let cube = band_folder(folder.path(), &ReadOptions::default()).unwrap();
             let notes = cube.notes.join(" ");
             assert_eq!(cube.planes.len(), n_bands, "{names:?}");
-            assert_eq!(notes.contains("'photo_2024.png'"), n_bands < names.len(), "{names:?}");
+            let is_named = ["photo_2024", "ref_700"].iter().any(|own| notes.contains(&format!("'{own}.png'")));
+            assert_eq!(is_named, n_bands < names.len(), "{names:?}");
             // What may be a stranger is named.
             assert_eq!(notes.contains("'nir…'"), names.contains(&"nir_850.png"), "{notes}");
         }
