@@ -236,10 +236,13 @@ fn listing(folder: &Path, n_told: Option<usize>) -> Result<Listing, SceneError> 
             let own = start(path);
             let last = own.rsplit(|c: char| !c.is_alphanumeric()).next().unwrap_or_default().to_lowercase();
             let is_named = NO_BANDS.contains(&last.as_str()) && 2 * n_called(&own) < starts.len();
-            is_named || n_called(&own) == 1 && (1990.0..2100.0).contains(nm)
+            // What is of a wavelength that one of the usual name has is a copy or a part of it.
+            let is_twin = pictures.iter().any(|(other, path)| other == nm && n_called(&start(path)) > n_called(&own));
+            is_named || is_twin || n_called(&own) == 1 && (1990.0..2100.0).contains(nm)
         };
-        let odd = pictures.extract_if(.., |own| is_odd(own));
-        unused.extend(odd.map(|(_, path)| name_of(&path)));
+        let (odd, bands): (Vec<Numbered>, _) = pictures.iter().cloned().partition(is_odd);
+        unused.extend(odd.iter().map(|(_, path)| name_of(path)));
+        pictures = bands;
     }
     pictures.sort_by(|a, b| a.0.total_cmp(&b.0).then_with(|| a.1.cmp(&b.1)));
     unused.sort();
@@ -446,6 +449,7 @@ mod tests {
             (&["b_450.png", "b_500.png", "b_560.png", "photo_2024.png"][..], 3),
             (&["blue_450.png", "green_550.png", "red_650.png"], 3),
             (&["b_450.png", "b_500.png", "b_560.png", "ref_700.png", "ref_800.png"], 3),
+            (&["b_450.png", "b_500.png", "b_560.png", "Copy of b_450.png", "ref_700.png"], 3),
             (&["ref_450.png", "ref_500.png", "ref_560.png", "b_700.png"], 4),
             (&["vis_450.png", "vis_500.png", "vis_560.png", "nir_850.png"], 4),
             (&["vis_450.png", "vis_550.png", "vis_650.png", "nir_850.png", "nir_900.png"], 5),

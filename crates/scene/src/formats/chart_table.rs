@@ -65,7 +65,7 @@ pub(super) fn read_chart(path: &Path) -> Result<Cube, SceneError> {
             "it has no line of numbers: expected wavelengths in nm and a reflectance a column".to_owned(),
         ));
     }
-    const OTHERS: [&str; 12] = [
+    const OTHERS: [&str; 14] = [
         "absor",
         "radian",
         "emission",
@@ -74,15 +74,18 @@ pub(super) fn read_chart(path: &Path) -> Result<Cube, SceneError> {
         "w m-2",
         "w/cm",
         "counts",
-        "optical density",
-        "optical_density",
-        "opticaldensity",
+        "density",
+        "extinction",
+        "attenuation",
+        "coefficient",
+        "mu_a",
         "k/s",
     ];
     let is_other = |name: &&String| {
         let lower = name.to_lowercase();
         let has_word = |word: &str| lower.split(|c: char| !c.is_alphabetic()).any(|own| own == word);
-        OTHERS.iter().any(|other| lower.contains(other)) || ["od", "dn", "abs", "db", "log"].into_iter().any(has_word)
+        OTHERS.iter().any(|other| lower.contains(other))
+            || ["od", "dn", "abs", "db", "log", "logr", "ln"].into_iter().any(has_word)
     };
     if let Some(other) = names.iter().find(is_other) {
         return Err(wrong(format!("its column '{}' says that it holds no reflectances, expected such", short(other))));
@@ -177,6 +180,7 @@ mod tests {
             ("nm,absorption coefficient (1/cm)\n400,.2\n", "says that it holds no reflectances"),
             ("nm,W/m2/nm\n400,.2\n", "'W/m2/nm' says that it holds no reflectances"),
             ("nm,catalog red,Optical_Density\n400,.2,.3\n", "'Optical_Density' says that it holds no reflectances"),
+            ("nm,logR\n400,.2\n", "'logR' says that it holds no reflectances"),
             ("nm,log(1/T)\n400,.2\n", "'log(1/T)' says that it holds no reflectances"),
             ("waves (zorp),a\n400,.2\n", "'zorp'"),
             ("nm,a\n400,0.1\n500\n", "line 3: 1 numbers"),

@@ -63,7 +63,7 @@ pub fn read_light(path: &Path) -> Result<Illuminant, SceneError> {
     let wavelengths_nm = wavelengths_of_column(first, &wavelengths_nm, comments_of(&text)).map_err(unreadable)?;
     // Of a line of names that is not told apart, all of it.
     let of_power = names.get(1).or(names.first());
-    let counts_photons = of_power.is_some_and(|name| has(name, &["photon", "quanta", "mol", "ppfd"]));
+    let counts_photons = of_power.is_some_and(|name| has(name, &["photon", "quant", "mol", "pfd", "einstein"]));
     let is_comment = |line: &&str| line.starts_with('#') && has(line, &["photon", "quanta"]);
     if let Some(comment) = text.lines().find(is_comment).filter(|_| !counts_photons) {
         return Err(unreadable(format!(
@@ -162,6 +162,7 @@ mod tests {
             "nm photons\n400 400\n500 1000\n800 800\n",
             "Wavelength (Å)  Power [W/nm]\n4000 1\n5000 2\n8000 1\n",
             "# Wavelength (Angstroms), flux\n4000 1\n5000 2\n8000 1\n",
+            "nm, quantum flux\n400, 400\n500, 1000\n800, 800\n",
             "nm, PPFD\n400, 400\n500, 1000\n800, 800\n",
             "\u{feff}Å, W\n4000, 1\n5000, 2\n8000, 1\n",
         ] {

@@ -46,9 +46,12 @@ pub(super) fn without_unit(numbers: &[f64]) -> Option<Vec<f64>> {
     all(150.0..20_000.0).then(|| numbers.to_vec())
 }
 
-/// Whether numbers count bands, from 0 or 1.
+/// Whether numbers count bands, from 0 or 1, or are those of some of them, as 2, 3, 4 and 8 of a satellite.
 pub(super) fn are_counted(numbers: &[f64]) -> bool {
-    numbers.len() > 1 && numbers.windows(2).all(|pair| pair[1] - pair[0] == 1.0) && [0.0, 1.0].contains(&numbers[0])
+    let are_in_turn = numbers.windows(2).all(|pair| pair[1] - pair[0] == 1.0)
+        && numbers.first().is_some_and(|first| [0.0, 1.0].contains(first));
+    numbers.len() > 1
+        && (are_in_turn || numbers.iter().all(|number| number.fract() == 0.0 && (0.0..20.0).contains(number)))
 }
 
 /// Returns the wavelengths, nm, of a list beside a cube, as its unit says or as [`without_unit`]; `None` of a list that counts bands.
@@ -234,6 +237,7 @@ mod tests {
         assert_eq!(of(None, &[0.45, 0.55]), Ok(Some(vec![450.0, 550.0])));
         assert_eq!(of(None, &[450.0, 550.0]), Ok(Some(vec![450.0, 550.0])));
         assert_eq!(of(None, &[1.0, 2.0, 3.0]), Ok(None));
+        assert_eq!(of(None, &[2.0, 3.0, 4.0, 8.0]), Ok(None));
         assert_eq!(of(Some("THz"), &[599.584_916]).map(|list| list.map(|list| list[0].round())), Ok(Some(500.0)));
         for (unit, numbers) in [(None, [22_222.0, 15_384.0]), (Some("zorp"), [1.0, 2.0]), (Some("um"), [450.0, 550.0])]
         {

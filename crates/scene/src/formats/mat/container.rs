@@ -417,7 +417,7 @@ impl Header<'_> {
     fn listed(self) -> Listed {
         let has_numbers = (6..=15).contains(&self.class);
         let [is_numeric, is_complex] = [false, true].map(|is_complex| has_numbers && self.is_complex == is_complex);
-        Listed { name: self.name, sides: self.sides, is_numeric, is_complex, is_scale: false }
+        Listed { name: self.name, sides: self.sides, is_numeric, is_complex, is_list: false }
     }
 }
 

@@ -98,7 +98,7 @@ impl Hdf5 {
         entries.retain(|entry| !entry.dimensions.is_bare);
         for (name, target) in &self.links {
             let name = format!("{name} (a link to {target})");
-            let listed = Listed { name, sides: vec![], is_numeric: false, is_complex: false, is_scale: false };
+            let listed = Listed { name, sides: vec![], is_numeric: false, is_complex: false, is_list: false };
             entries.push(Entry::without_content(listed, String::new(), false));
         }
         Ok(entries)
@@ -113,7 +113,7 @@ impl Hdf5 {
             // A link to what is not there, or not here, is known by its name alone.
             let Ok(dataset) = group.dataset(&name) else {
                 let listed =
-                    Listed { name: path.clone(), sides: vec![], is_numeric: false, is_complex: false, is_scale: false };
+                    Listed { name: path.clone(), sides: vec![], is_numeric: false, is_complex: false, is_list: false };
                 entries.push(Entry::without_content(listed, path, false));
                 continue;
             };
@@ -122,7 +122,8 @@ impl Hdf5 {
             let n_bytes = sides.iter().map(|side| *side as u64).fold(8, u64::saturating_mul);
             let is_complex = dataset.dtype().is_ok_and(|kind| is_complex(&kind));
             let (words, dimensions) = (words_of(&dataset), Dimensions::of(&dataset));
-            let listed = Listed { name: path.clone(), sides, is_numeric, is_complex, is_scale: dimensions.is_scale };
+            let is_list = dimensions.is_scale || words.contains(RADIATION);
+            let listed = Listed { name: path.clone(), sides, is_numeric, is_complex, is_list };
             let attributes = telling(dataset.attrs(), dataset.attr_datatypes());
             entries.push(Entry {
                 n_bytes,
@@ -144,7 +145,7 @@ impl Hdf5 {
                     sides: vec![1, 1],
                     is_numeric: false,
                     is_complex: false,
-                    is_scale: false,
+                    is_list: false,
                 };
                 entries.push(Entry::without_content(listed, path, true));
             } else {
@@ -218,6 +219,9 @@ impl Hdf5 {
         elements::stored(name, &sides, class, &numbers).ok_or_else(too_large)
     }
 }
+
+/// What standard names call wavelengths (Climate and Forecast, `standard_name` table).
+pub(super) const RADIATION: &str = "radiation_wavelength";
 
 /// Attributes that call an array something.
 pub(super) const NAMING: [&str; 2] = ["long_name", "standard_name"];

@@ -21,6 +21,7 @@ use super::{
     },
     container::{Content, MatArray, MatFile, WHOLE},
     elements::Listed,
+    hdf5::RADIATION,
     iset_kinds,
     packing::{Nearness, Packing, Value, is_wave_unit, nearest_list, rank_of_waves},
 };
@@ -105,7 +106,7 @@ pub(in super::super) struct IsetScene {
 pub(in super::super) fn read_mat(path: &Path, reading: &FileReading) -> Result<MatScene, SceneError> {
     let told = reading.variable.as_deref();
     let is_cube = |own: &Listed| own.is_numeric && own.sides.len() == 3;
-    let is_list = |own: &Listed| (own.is_scale || rank_of_waves(last_part(&own.name)).is_some()) && own.is_numeric;
+    let is_list = |own: &Listed| (own.is_list || rank_of_waves(last_part(&own.name)).is_some()) && own.is_numeric;
     let wanted = |own: &Listed| {
         let name = own.name.as_str();
         match told {
@@ -341,6 +342,8 @@ fn waves_of(
     let names = inner.iter().map(|(name, _)| name).chain(file.listed.iter().map(|own| &own.name));
     let rank = |own: &&String| rank_of_waves(last_part(own).rsplit('.').next().unwrap_or_default());
     let names: Vec<&String> = names.filter(|own| *own != cube).collect();
+    // What standard names call it, whatever its own.
+    let is_said = |own: &String| file.words_of(own).0.contains(RADIATION);
     // The only scale of the axis of bands is one whatever it is called: of the axis that is named so, or that alone is as long as a list.
     let n_of =
         |own: &str| file.listed.iter().find(|listed| listed.name == own).map(|listed| listed.sides.iter().product());
@@ -350,13 +353,13 @@ fn waves_of(
     };
     let bands = order
         .and_then(|order| order.find('b'))
-        .or_else(|| names.iter().filter(|own| rank(own).is_some()).find_map(as_long));
+        .or_else(|| names.iter().filter(|own| rank(own).is_some() || is_said(own)).find_map(as_long));
     let is_scale = |own: &String| {
-        let is_said = file.words_of(own).0.to_lowercase().contains("wavelength");
         let mut scales = file.scales_of(cube).iter().enumerate();
-        scales.any(|(axis, all)| all[..] == [own.as_str()] && (bands == Some(axis) || bands.is_none() && is_said))
+        scales.any(|(axis, all)| all[..] == [own.as_str()] && bands == Some(axis))
     };
-    let mut lists: Vec<&String> = names.iter().copied().filter(|own| rank(own).is_some() || is_scale(own)).collect();
+    let is_list = |own: &&String| rank(own).is_some() || is_scale(own) || is_said(own);
+    let mut lists: Vec<&String> = names.iter().copied().filter(is_list).collect();
     // Those along a dimension of the cube before others.
     let axes = file.words_of(cube).1;
     // As netCDF has them ("Climate and Forecast", 5).
