@@ -88,6 +88,7 @@ mod word_tests;
 mod written_tests;
 
 pub(crate) use picture::decode as decode_picture;
+pub(crate) use understood::note_of_gaps;
 pub(crate) use unusable::{check_made, unwritable};
 
 pub use belonging::may_be_read_with;
