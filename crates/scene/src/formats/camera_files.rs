@@ -15,6 +15,7 @@ use super::{
     camera::CameraFile,
     camera_models::{HARMLESS, check_matrix, is_fisheye, unknown_model},
     camera_yaml::{of_xml, of_yaml},
+    depth_names::words_of,
     distortion::Distortion,
     npy::parse as parse_npy,
     stated::{Stated, name_of, short},
@@ -275,7 +276,10 @@ fn of_object(path: &Path, object: Value, picture: &Path) -> Result<CameraFile, S
         depth_unit_m,
         depth_file,
         notes: keys
-            .note(path, |name| HARMLESS.contains(&name) || name.contains("error"))
+            .note(path, |name| {
+                HARMLESS.contains(&name)
+                    || words_of(name).iter().any(|word| ["error", "errors"].contains(&word.as_str()))
+            })
             .into_iter()
             .chain(frames_note)
             .collect(),
