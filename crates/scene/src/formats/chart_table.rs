@@ -65,11 +65,10 @@ pub(super) fn read_chart(path: &Path) -> Result<Cube, SceneError> {
             "it has no line of numbers: expected wavelengths in nm and a reflectance a column".to_owned(),
         ));
     }
-    const OTHERS: [&str; 14] = [
+    const OTHERS: [&str; 13] = [
         "absor",
         "radian",
         "emission",
-        "photon",
         "w/m",
         "w m-2",
         "w/cm",
@@ -81,11 +80,16 @@ pub(super) fn read_chart(path: &Path) -> Result<Cube, SceneError> {
         "mu_a",
         "k/s",
     ];
+    const SHORT: [&str; 7] = ["od", "dn", "abs", "db", "log", "logr", "ln"];
+    const BESIDE: [&str; 9] = ["r", "t", "i", "a", "u", "sample", "reflectance", "transmittance", "value"];
     let is_other = |name: &&String| {
         let lower = name.to_lowercase();
-        let has_word = |word: &str| lower.split(|c: char| !c.is_alphabetic()).any(|own| own == word);
+        let words: Vec<&str> = lower.split(|c: char| !c.is_alphabetic()).filter(|word| !word.is_empty()).collect();
+        // Beside other words they are names of patches, as of log cabins.
+        let is_short = words.iter().any(|word| SHORT.contains(word));
         OTHERS.iter().any(|other| lower.contains(other))
-            || ["od", "dn", "abs", "db", "log", "logr", "ln"].into_iter().any(has_word)
+            || words.iter().any(|word| word.starts_with("photon") && !word.starts_with("photonic"))
+            || is_short && words.iter().all(|word| SHORT.contains(word) || BESIDE.contains(word))
     };
     if let Some(other) = names.iter().find(is_other) {
         return Err(wrong(format!("its column '{}' says that it holds no reflectances, expected such", short(other))));
@@ -173,6 +177,8 @@ mod tests {
         }
         std::fs::write(&path, b"nm,Gr\xfcn\n400,.2\n500,.3\n").unwrap();
         assert!(read_scene(&path, &options).unwrap().notes[1].contains("Grün"));
+        write("nm,ABS plastic,log cabin,photonic paint\n400,.2,.3,.4\n500,.2,.3,.4\n");
+        assert!(read_scene(&path, &options).is_ok());
         for (text, word) in [
             ("", "it is empty"),
             ("# nothing\n", "no line of numbers"),

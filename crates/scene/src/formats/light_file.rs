@@ -7,7 +7,7 @@ use dioptric_spectrum::{Illuminant, Spectrum};
 
 use super::{
     contents::is_of,
-    mat::read_mat_matrices,
+    mat::{has_variable, read_mat_matrices},
     unusable::unreadable,
     wavelength_unit::{comments_of, wavelengths_of_column},
 };
@@ -60,7 +60,9 @@ pub fn read_light(path: &Path) -> Result<Illuminant, SceneError> {
         }
     }
     let first = names.first().map_or("", String::as_str);
-    let wavelengths_nm = wavelengths_of_column(first, &wavelengths_nm, comments_of(&text)).map_err(unreadable)?;
+    let line = names.join(" ");
+    let comments = comments_of(&text).chain([line.trim_start_matches([';', '%', '/', ' '])]);
+    let wavelengths_nm = wavelengths_of_column(first, &wavelengths_nm, comments).map_err(unreadable)?;
     // Of a line of names that is not told apart, all of it.
     let of_power = names.get(1).or(names.first());
     let counts_photons = of_power.is_some_and(|name| has(name, &["photon", "quant", "mol", "pfd", "einstein"]));
@@ -78,7 +80,8 @@ pub fn read_light(path: &Path) -> Result<Illuminant, SceneError> {
     let is_other = |name: &String| {
         let lower = name.to_lowercase();
         let has_word = |of: &str| lower.split(|c: char| !c.is_alphabetic()).any(|word| word == of);
-        ["db", "dbm", "decibel", "decibels", "log", "logarithm"].into_iter().any(has_word)
+        ["db", "dbm", "decibel", "decibels", "log", "logarithm", "fnu"].into_iter().any(has_word)
+            || ["absor", "transm", "reflect", "%t", "%r", "wavenumber", "cm-1"].iter().any(|of| lower.contains(of))
             || lower.ends_with("hz")
             || lower.contains("hz-1")
             || lower.contains("hz^-1")
@@ -105,6 +108,10 @@ fn light_of(wavelengths_nm: &[f64], values: &[f64]) -> Result<Illuminant, String
 /// Reads a light of `ISETCam`: `wavelength`, nm, and `data`, energy, as `ieReadSpectra.m` has them.
 fn of_iset(path: &Path) -> Result<Illuminant, SceneError> {
     const WAVES: [&str; 2] = ["wavelength", "wave"];
+    if let Some(name) = ["units", "unit"].into_iter().find(|name| has_variable(path, name)) {
+        let reason = format!("its '{name}' is not read: expected energy a nanometre, and none");
+        return Err(unreadable(path, reason));
+    }
     let matrices = read_mat_matrices(path, &["wavelength", "wave", "data"])?;
     let of = |names: &[&str]| matrices.iter().find(|(name, _)| names.contains(&name.as_str())).map(|(_, own)| own);
     let (Some(waves), Some(data)) = (of(&WAVES), of(&["data"])) else {
@@ -161,6 +168,8 @@ mod tests {
             "400 1\n500   2\n800 1\n",
             "nm photons\n400 400\n500 1000\n800 800\n",
             "Wavelength (Å)  Power [W/nm]\n4000 1\n5000 2\n8000 1\n",
+            "wavelength in Angstroms\n4000 1\n5000 2\n8000 1\n",
+            "% Angstrom power\n4000 1\n5000 2\n8000 1\n",
             "# Wavelength (Angstroms), flux\n4000 1\n5000 2\n8000 1\n",
             "nm, quantum flux\n400, 400\n500, 1000\n800, 800\n",
             "nm, PPFD\n400, 400\n500, 1000\n800, 800\n",
@@ -173,6 +182,8 @@ mod tests {
             ("waves (zorp), a\n400, 1\n700, 1\n", "'zorp'"),
             ("400, 1\n500; 2\n", "line 2"),
             ("nm,dBm\n400, -1\n500, -2\n", "'dBm' is no power"),
+            ("nm,absorbance\n400, 1\n500, 2\n", "'absorbance' is no power"),
+            ("nm,%T\n400, 1\n500, 2\n", "'%T' is no power"),
             ("nm,dB\n400, -1\n500, -2\n", "'dB' is no power"),
             ("nm,absolute log irradiance\n400, -1\n500, -2\n", "irradiance' is no power"),
             ("nm,W m-2 Hz-1\n400, 1\n500, 2\n", "Hz-1' is no power"),
@@ -198,6 +209,9 @@ mod tests {
         write(1);
         let light = Spectrum::new(vec![400.0, 500.0, 800.0], vec![1.0, 2.0, 1.0]).unwrap();
         assert_eq!(read_light(&path), Ok(Illuminant::Spectrum(light)));
+        let all = std::fs::read(&path).unwrap();
+        std::fs::write(&path, [all, variable_of("units", &[1, 1], 6, &[1.0])].concat()).unwrap();
+        assert!(read_light(&path).unwrap_err().to_string().contains("'units' is not read"));
         write(2);
         assert!(read_light(&path).unwrap_err().to_string().contains("expected one light"));
         std::fs::write(&path, mat_file(&[variable_of("x", &[3, 1], 6, &[1.0, 2.0, 3.0])])).unwrap();

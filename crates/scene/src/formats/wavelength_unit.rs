@@ -152,12 +152,15 @@ pub(super) fn comments_of(text: &str) -> impl Iterator<Item = &str> {
     text.lines().filter_map(|line| line.strip_prefix('#')).map(str::trim).filter(|comment| !comment.is_empty())
 }
 
-/// Returns the first unit behind a word for wavelengths.
+/// Returns the first unit behind a word for wavelengths, or that which a text begins with, as names of columns do.
 fn unit_of_waves(text: &str) -> Option<&str> {
     let lower = text.to_lowercase();
-    let at = ["wavelength", "lambda", "wavenumber"].iter().find_map(|word| lower.find(word))?;
-    let is_between = |c: char| c.is_whitespace() || "/_-,;:=[]()".contains(c);
-    text.get(at..)?.split(is_between).find(|word| unit_in(word).is_some() || *word == "A")
+    let at = ["wavelength", "lambda", "wavenumber", "frequency"].iter().find_map(|word| lower.find(word));
+    let mut words = text.get(at.unwrap_or(0)..)?.split(|c: char| c.is_whitespace() || ",;:=[]()".contains(c));
+    match at {
+        Some(_) => words.find(|word| unit_in(word).is_some() || *word == "A"),
+        None => words.next().filter(|word| unit_in(word).is_some()),
+    }
 }
 
 /// Returns the wavelength of a text such as `450 nm`, `Band 450.5nm, FWHM 10 nm` or, of a band, `445-455 nm`: the first that it names.
@@ -270,10 +273,15 @@ mod tests {
         assert!(wavelengths_of_column("waves (zorp)", &[500.0], []).unwrap_err().contains("'zorp'"));
         assert!(wavelengths_of_column("band", &[1.0, 2.0], []).unwrap_err().contains("counts bands"));
         // Comments say it where they can be right.
-        for (comment, expected) in
-            [("Wavelength (Angstroms), flux (W/um)", 500.0), ("lambda: A", 500.0), ("wavelength in angstrom", 500.0)]
-        {
-            assert_eq!(wavelengths_of_column("", &[5000.0], [comment]), Ok(vec![expected]), "{comment}");
+        for (comment, number) in [
+            ("Wavelength (Angstroms), flux (W/um)", 5000.0),
+            ("lambda: A", 5000.0),
+            ("wavelength in angstrom", 5000.0),
+            ("Angstrom power", 5000.0),
+            ("Wavelength (1/cm), flux (erg/s/cm2/A)", 20_000.0),
+            ("1/cm power", 20_000.0),
+        ] {
+            assert_eq!(wavelengths_of_column("", &[number], [comment]), Ok(vec![500.0]), "{comment}");
         }
         for comment in ["made by A", "a slit of 10 um", "calibrated wavelengths, slit of 10 um"] {
             assert!(wavelengths_of_column("", &[5000.0], [comment]).unwrap_err().contains("nm or Å"), "{comment}");

@@ -36,6 +36,11 @@ pub(in super::super) struct Plane {
     pub(in super::super) words: String,
 }
 
+/// Whether a MATLAB or HDF5 file has a variable of this name, of whatever kind; not where it cannot be read.
+pub(in super::super) fn has_variable(path: &Path, name: &str) -> bool {
+    MatFile::read(path, &|_| false).is_ok_and(|file| file.listed.iter().any(|own| own.name == name))
+}
+
 /// Returns the real matrices of these names that a MATLAB or HDF5 file has, with their names.
 ///
 /// # Errors
