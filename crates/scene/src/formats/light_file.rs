@@ -81,7 +81,8 @@ pub fn read_light(path: &Path) -> Result<Illuminant, SceneError> {
         let lower = name.to_lowercase();
         let has_word = |of: &str| lower.split(|c: char| !c.is_alphabetic()).any(|word| word == of);
         ["db", "dbm", "decibel", "decibels", "log", "logarithm", "fnu"].into_iter().any(has_word)
-            || ["absor", "transm", "reflect", "%t", "%r", "wavenumber", "cm-1"].iter().any(|of| lower.contains(of))
+            || ["absor", "transmi", "reflectance", "wavenumber", "cm-1"].iter().any(|of| lower.contains(of))
+            || ["%t", "%r"].contains(&lower.trim())
             || lower.ends_with("hz")
             || lower.contains("hz-1")
             || lower.contains("hz^-1")
