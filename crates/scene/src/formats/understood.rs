@@ -122,7 +122,7 @@ pub(super) fn bands(grid: &WavelengthGrid) -> String {
 /// Neighboring bands may be so far apart, and the outer edges of bands so far inside the light that is seen, nm: beyond, patches of the usual chart
 /// are off by 10 and more in color (CIEDE2000), since a band stands for a flat spectrum.
 const WIDEST_NM: f64 = 100.0;
-const EDGES_NM: [f64; 2] = [460.0, 620.0];
+const EDGES_NM: [f64; 2] = [450.0, 630.0];
 /// What is seen best, nm.
 const SEEN_NM: [f64; 2] = [420.0, 680.0];
 
