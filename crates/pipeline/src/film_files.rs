@@ -21,20 +21,17 @@ pub fn convert_irradiance(
 ) -> Result<Option<Vec<String>>, PipelineError> {
     let SceneSource::File(input) = &request.scene.source else { return Ok(None) };
     let is_mat = |path: &Path| path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("mat"));
+    let told = request.scene.reading.variable.as_deref();
     let is_irradiance = match input.extension() {
         Some(ending) if ending.eq_ignore_ascii_case("exr") => is_irradiance_exr(input),
-        _ => is_mat(input) && holds_iset_irradiance(input),
+        _ => is_mat(input) && holds_iset_irradiance(input, told),
     };
     if !is_irradiance {
         return Ok(None);
     }
-    let plain = SceneRequest {
-        scene: SceneSpec::of_file(input.clone()),
-        wavelengths_nm: None,
-        crop: None,
-        bin: 1,
-        quarter_turns: 0,
-    };
+    let mut scene = SceneSpec::of_file(input.clone());
+    scene.reading.variable = request.scene.reading.variable.clone().filter(|_| is_mat(input));
+    let plain = SceneRequest { scene, wavelengths_nm: None, crop: None, bin: 1, quarter_turns: 0 };
     if *request != plain {
         let reason = format!("do not apply to {}, which holds irradiance: expected it without", input.display());
         return Err(PipelineError::Unsuitable { what: "choices of a scene", reason });

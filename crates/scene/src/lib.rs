@@ -47,10 +47,11 @@ pub use error::SceneError;
 pub use formats::{
     DepthKind, ExrParts, ExrSamples, FileQuantity, FileReading, FillDepth, IsetIrradiance, NamedArray, NamedPlanes,
     NoData, Noted, Panorama, Part, PictureSamples, PointTable, ReadOptions, SpectralFile, SpectralHead, envi_bytes,
-    filled_depth, flat_size_of, holds_iset_irradiance, is_irradiance_exr, joules_per_photon, may_be_read_with,
-    notes_on_samples, read_exr_text, read_iset_display, read_iset_irradiance, read_mat_matrices, read_npz_arrays,
-    read_picture, read_picture_samples, read_planes_exr, read_scene, read_spectral_exr, wavelengths_of_column,
-    write_iset_irradiance, write_iset_scene, write_npz_arrays, write_planes_exr, write_scene_exr, write_spectral_exr,
+    filled_depth, flat_size_of, holds_iset_irradiance, is_irradiance_exr, is_light_file, joules_per_photon,
+    may_be_read_with, notes_on_samples, read_exr_text, read_iset_display, read_iset_irradiance, read_light,
+    read_mat_matrices, read_npz_arrays, read_picture, read_picture_samples, read_planes_exr, read_scene,
+    read_spectral_exr, write_iset_irradiance, write_iset_scene, write_npz_arrays, write_planes_exr, write_scene_exr,
+    write_spectral_exr,
 };
 pub use light::SceneLight;
 pub use point_lights::{PointBrightness, PointLight, PointPlace};

@@ -64,7 +64,10 @@ pub(crate) const LINES: &[(&str, &str)] = &[
     ),
     ("run camera.ron --scene . --fov-deg 10 --depth-m 2", ".: no spectral band found: expected PNG or TIFF"),
     ("run camera.ron --scene absent.png --fov-deg 10 --depth-m 2", "absent.png: cannot be read: there is no such file"),
-    ("run camera.ron --illuminant note.txt", "note.txt: it has no line of a wavelength in nm and a power"),
+    (
+        "run camera.ron --illuminant note.txt",
+        "note.txt: cannot be read: it has no line of a wavelength in nm and a power",
+    ),
     ("run camera.ron --illuminant absent.txt", "no illuminant is named 'absent.txt'; known: A, D50, D55"),
     ("run camera.ron --illuminant 0K", "the temperature of a black body is 0 K, expected 500 to"),
     ("run camera.ron --illuminant 5,5", "the chromaticity of a light is 5, 5, expected x, y of a"),

@@ -11,7 +11,7 @@ use std::{
 use dioptric_backward::MicroArray;
 use dioptric_forward::Film;
 use dioptric_optics::{Iris, LensFile};
-use dioptric_scene::{FileReading, FillDepth, Scene, may_be_read_with};
+use dioptric_scene::{FileReading, FillDepth, PointTable, Scene, may_be_read_with};
 use dioptric_sensor::{ExposureControl, Noise, OpticalFilter, Processing, Sensor, WhiteBalance};
 use dioptric_spectrum::Illuminant;
 use serde::{Deserialize, Serialize};
@@ -327,7 +327,8 @@ impl SceneInputs {
                 files: scene
                     .points
                     .iter()
-                    .flat_map(|path| FileStamp::all_of(path))
+                    .flat_map(|path| PointTable::light_files(path).into_iter().chain([path.clone()]))
+                    .flat_map(|path| FileStamp::all_of(&path))
                     .chain(match &scene.source {
                         SceneSource::File(path) if given.scene.is_none() => {
                             let others = [&scene.hidden, &scene.reading.depth, &scene.reading.view];

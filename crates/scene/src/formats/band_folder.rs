@@ -13,7 +13,7 @@ use super::{
     gray_picture::{GrayPicture, read_gray},
     read_options::ReadOptions,
     reading::FileQuantity,
-    stated::{merged, name_of, note_of},
+    stated::{merged, name_of, note_of, short},
     tiff_file::TiffAs,
     unusable::unreadable,
     wavelength_unit::{PLAUSIBLE_NM, listed_nm, unit_in},
@@ -25,6 +25,24 @@ const LISTS: [&str; 2] = ["wavelengths.txt", "wavelengths.csv"];
 
 /// Endings of pictures that are no bands.
 const OTHERS: [&str; 10] = ["bmp", "jpg", "jpeg", "webp", "ppm", "pgm", "pnm", "exr", "hdr", "pfm"];
+
+/// Words before the numbers of pictures that are no bands, among pictures of another name.
+const NO_BANDS: [&str; 14] = [
+    "ref",
+    "reference",
+    "white",
+    "dark",
+    "flat",
+    "mask",
+    "depth",
+    "thumb",
+    "thumbnail",
+    "preview",
+    "rgb",
+    "img",
+    "photo",
+    "dsc",
+];
 
 /// Files that systems leave in folders.
 const OF_SYSTEMS: [&str; 2] = ["thumbs.db", "desktop.ini"];
@@ -45,7 +63,7 @@ pub(super) fn band_folder(folder: &Path, options: &ReadOptions) -> Result<Cube, 
         || reading.scale.is_some()
         || reading.unit.is_some()
         || reading.quantity.is_some_and(|quantity| quantity != FileQuantity::Reflectance);
-    let Listing { pictures, unused, files } = listing(folder)?;
+    let Listing { pictures, unused, files } = listing(folder, told_nm.map(<[f64]>::len))?;
     if pictures.is_empty() {
         return Err(SceneError::NoBands {
             file: folder.to_owned(),
@@ -54,6 +72,7 @@ pub(super) fn band_folder(folder: &Path, options: &ReadOptions) -> Result<Cube, 
     }
     let notes = [note_of(folder, "picture", &unused), note_of(folder, "file", &files)];
     let mut notes: Vec<String> = notes.into_iter().flatten().collect();
+    notes.extend(note_of_names(folder, &pictures));
     let wavelengths_nm = match (told_nm, wavelengths_of(folder, &pictures)) {
         (None, own) => {
             let own = own?;
@@ -181,7 +200,8 @@ struct Listing {
     files: Vec<String>,
 }
 
-fn listing(folder: &Path) -> Result<Listing, SceneError> {
+/// Lists a folder, for which so many wavelengths may be told.
+fn listing(folder: &Path, n_told: Option<usize>) -> Result<Listing, SceneError> {
     let entries = fs::read_dir(folder).map_err(|error| unreadable(folder, error))?;
     let Listing { mut pictures, mut unused, mut files } = Listing::default();
     for entry in entries {
@@ -204,22 +224,85 @@ fn listing(folder: &Path) -> Result<Listing, SceneError> {
             None => unused.push(name_of(&path)),
         }
     }
-    // Bands are called alike before their numbers: one of another name with the number of a year is none of them.
-    let start = |path: &Path| {
-        let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        stem.trim_end_matches(|c: char| c.is_ascii_digit() || ".nmto_- ".contains(c)).to_owned()
-    };
+    if !LISTS.iter().any(|name| folder.join(name).is_file()) {
+        let odd = without_wavelengths(&mut pictures, n_told);
+        unused.extend(odd.iter().map(|(_, path)| name_of(path)));
+    }
+    // Bands are called alike before their numbers: one of another name with the number of a year is none of them, nor are those whose name says so.
     let starts: Vec<String> = pictures.iter().map(|(_, path)| start(path)).collect();
     let n_called = |own: &String| starts.iter().filter(|start| *start == own).count();
     if starts.iter().map(n_called).max().is_some_and(|most| most > 2 && 2 * most > starts.len()) {
-        let odd = pictures.extract_if(.., |(nm, path)| n_called(&start(path)) == 1 && (1990.0..2100.0).contains(nm));
-        unused.extend(odd.map(|(_, path)| name_of(&path)));
+        let is_odd = |(nm, path): &Numbered| {
+            let own = start(path);
+            let last = own.rsplit(|c: char| !c.is_alphanumeric()).next().unwrap_or_default().to_lowercase();
+            let is_named = NO_BANDS.contains(&last.as_str()) && 2 * n_called(&own) < starts.len();
+            // What is of a wavelength that one of the usual name has is a copy or a part of it.
+            let is_twin = pictures.iter().any(|(other, path)| other == nm && n_called(&start(path)) > n_called(&own));
+            is_named || is_twin || n_called(&own) == 1 && (1990.0..2100.0).contains(nm)
+        };
+        let (odd, bands): (Vec<Numbered>, _) = pictures.iter().cloned().partition(is_odd);
+        unused.extend(odd.iter().map(|(_, path)| name_of(path)));
+        pictures = bands;
     }
     pictures.sort_by(|a, b| a.0.total_cmp(&b.0).then_with(|| a.1.cmp(&b.1)));
     unused.sort();
     files.sort();
     Ok(Listing { pictures, unused, files })
 }
+
+/// Returns what a picture is called before its number, or its range.
+fn start(path: &Path) -> String {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let is_number = |c: char| c.is_ascii_digit() || "._- ".contains(c);
+    let mut own = stem.trim_end_matches(is_number);
+    // Units, and words of ranges, stand behind numbers.
+    while let Some(rest) = own.strip_suffix("nm").or_else(|| own.strip_suffix("to")) {
+        if !rest.trim_end_matches(['_', '-', ' ']).ends_with(|c: char| c.is_ascii_digit()) {
+            break;
+        }
+        own = rest.trim_end_matches(is_number);
+    }
+    own.to_owned()
+}
+
+/// Takes out the few pictures whose numbers are no wavelengths, as copies (`b_450_1`) and dates have them, where those of most are and lie closer to
+/// each other than to them, so that they are no numbers of frames; and are as many as are told.
+fn without_wavelengths(pictures: &mut Vec<Numbered>, n_told: Option<usize>) -> Vec<Numbered> {
+    let is_odd = |(number, _): &Numbered| !are_wavelengths(&[*number]);
+    let mut bands: Vec<f64> = pictures.iter().filter(|own| !is_odd(own)).map(|(number, _)| *number).collect();
+    bands.sort_by(f64::total_cmp);
+    let (Some(&first), Some(&last)) = (bands.first(), bands.last()) else { return vec![] };
+    let widest = bands.windows(2).map(|pair| pair[1] - pair[0]).fold(0.0, f64::max);
+    let is_apart = |(number, _): &Numbered| (first - number).max(number - last) > widest;
+    let are_few = bands.len() > 1 && 2 * bands.len() > pictures.len() && n_told.is_none_or(|n| n == bands.len());
+    if !are_few || !pictures.iter().filter(|own| is_odd(own)).all(is_apart) {
+        return vec![];
+    }
+    pictures.extract_if(.., |own| is_odd(own)).collect()
+}
+
+/// Returns what is said of bands of several names, of which some may be no bands.
+fn note_of_names(folder: &Path, pictures: &[Numbered]) -> Option<String> {
+    let mut named: Vec<(String, usize)> = vec![];
+    for (_, path) in pictures {
+        let own = start(path);
+        match named.iter_mut().find(|(name, _)| *name == own) {
+            Some((_, n)) => *n += 1,
+            None => named.push((own, 1)),
+        }
+    }
+    // Where each has a name of its own these are the names of bands.
+    if named.len() < 2 || named.iter().all(|(_, n)| *n == 1) {
+        return None;
+    }
+    let shown: Vec<String> =
+        named.iter().take(MOST_STARTS).map(|(name, n)| format!("{n} '{}…'", short(name))).collect();
+    let more = if named.len() > MOST_STARTS { " and others" } else { "" };
+    Some(format!("{}: its pictures are called {}{more}: all are taken for bands", name_of(folder), shown.join(", ")))
+}
+
+/// Names before numbers that a note holds.
+const MOST_STARTS: usize = 6;
 
 /// Returns the middle of the range of wavelengths that a stem ends in, as `b_445-455`, `b_445nm_455` or `b_445to455`: none wider than a filter's.
 fn middle_of_range(stem: &str) -> Option<f64> {
@@ -365,14 +448,36 @@ mod tests {
         for (names, n_bands) in [
             (&["b_450.png", "b_500.png", "b_560.png", "photo_2024.png"][..], 3),
             (&["blue_450.png", "green_550.png", "red_650.png"], 3),
+            (&["b_450.png", "b_500.png", "b_560.png", "ref_700.png", "ref_800.png"], 3),
+            (&["b_450.png", "b_500.png", "b_560.png", "Copy of b_450.png", "ref_700.png"], 3),
+            (&["ref_450.png", "ref_500.png", "ref_560.png", "b_700.png"], 4),
             (&["vis_450.png", "vis_500.png", "vis_560.png", "nir_850.png"], 4),
             (&["vis_450.png", "vis_550.png", "vis_650.png", "nir_850.png", "nir_900.png"], 5),
         ] {
             let folder = folder_of(names);
             let cube = band_folder(folder.path(), &ReadOptions::default()).unwrap();
+            let notes = cube.notes.join(" ");
             assert_eq!(cube.planes.len(), n_bands, "{names:?}");
-            assert_eq!(cube.notes.join(" ").contains("'photo_2024.png'"), n_bands < names.len(), "{names:?}");
+            let is_named = ["photo_2024", "ref_700"].iter().any(|own| notes.contains(&format!("'{own}.png'")));
+            assert_eq!(is_named, n_bands < names.len(), "{names:?}");
+            // What may be a stranger is named.
+            assert_eq!(notes.contains("'nir…'"), names.contains(&"nir_850.png"), "{notes}");
         }
+    }
+
+    #[test]
+    fn a_number_that_is_no_wavelength_is_left_out() {
+        let bands = ["b_450.png", "b_500.png", "b_560.png"];
+        for odd in ["b_450_1.png", "b_450-2.png", "b_1.png", "b_0.png", "2024-05-01.png", "b_20240501.png"] {
+            let folder = folder_of(&[&bands[..], &[odd]].concat());
+            let cube = band_folder(folder.path(), &ReadOptions::default()).unwrap();
+            assert_eq!(cube.wavelengths_nm.as_deref(), Some(&[450.0, 500.0, 560.0][..]), "{odd}");
+            assert!(cube.notes.iter().any(|note| note.contains(odd)), "{:?}", cube.notes);
+        }
+        // Numbers of frames, of which most could be wavelengths.
+        let frames: Vec<String> = (1..=9).map(|i| format!("b_{}.png", 100 * i)).collect();
+        let folder = folder_of(&frames.iter().map(String::as_str).collect::<Vec<_>>());
+        assert!(read_band_folder(folder.path(), None).unwrap_err().to_string().contains("wavelengths.txt"));
     }
 
     #[test]

@@ -21,8 +21,8 @@ pub fn may_be_read_with(scene: &Path, other: &Path) -> bool {
     other != name(scene) && (goes_on(bare) || shared.is_some_and(is_part) || is_reference || is_list)
 }
 
-/// Returns what is said of units, scales and masks that GDAL has put beside a file.
-pub(super) fn note_of_gdal(path: &Path) -> Option<String> {
+/// Returns what is said of units, scales and masks that GDAL has put beside a file, and of what editors have.
+pub(super) fn notes_of_companions(path: &Path) -> impl Iterator<Item = String> {
     // Those of a header are beside its data.
     let is_header = path.extension().is_some_and(|own| own.eq_ignore_ascii_case("hdr"));
     let data = ["", "dat", "img", "bin", "raw", "bsq", "bil", "bip"].into_iter().filter(|_| is_header);
@@ -34,7 +34,9 @@ pub(super) fn note_of_gdal(path: &Path) -> Option<String> {
     };
     let both = files.flat_map(|file| [".aux.xml", ".msk"].map(|ending| (file.clone(), ending)));
     let names: Vec<String> = both.filter_map(beside).collect();
-    note_of(path, "companion of GDAL", &names)
+    let of_editors = [path.to_owned(), path.with_extension("")].map(|file| (file, ".xmp"));
+    let side_cars: Vec<String> = of_editors.into_iter().filter_map(beside).collect();
+    [note_of(path, "companion of GDAL", &names), note_of(path, "side-car", &side_cars)].into_iter().flatten()
 }
 
 #[cfg(test)]

@@ -15,6 +15,7 @@ use super::{
     camera::CameraFile,
     camera_models::{HARMLESS, check_matrix, is_fisheye, unknown_model},
     camera_yaml::{of_xml, of_yaml},
+    depth_names::words_of,
     distortion::Distortion,
     npy::parse as parse_npy,
     stated::{Stated, name_of, short},
@@ -233,7 +234,10 @@ fn of_object(path: &Path, object: Value, picture: &Path) -> Result<CameraFile, S
     if keys.get("units").and_then(Value::as_str).is_some_and(|unit| ["px", "pixel", "pixels"].contains(&unit)) {
         keys.take("units");
     }
-    let size = match keys.take("resolution") {
+    // What is called so may be a text or a number of dots an inch, which is named.
+    let is_list = |own: &Value| own.is_array() || own.get("data").is_some();
+    let listed = if keys.get("resolution").is_some_and(is_list) { keys.take("resolution") } else { None };
+    let size = match listed {
         None => (
             side(&mut keys, &["width", "w", "image_width", "image_Width"])?,
             side(&mut keys, &["height", "h", "image_height", "image_Height"])?,
@@ -272,7 +276,10 @@ fn of_object(path: &Path, object: Value, picture: &Path) -> Result<CameraFile, S
         depth_unit_m,
         depth_file,
         notes: keys
-            .note(path, |name| HARMLESS.contains(&name) || name.contains("error"))
+            .note(path, |name| {
+                HARMLESS.contains(&name)
+                    || words_of(name).iter().any(|word| ["error", "errors"].contains(&word.as_str()))
+            })
             .into_iter()
             .chain(frames_note)
             .collect(),
@@ -407,9 +414,10 @@ fn pinhole_of(keys: &mut Keys) -> Result<[Option<f64>; 4], String> {
     ];
     const MATRICES: [&str; 6] = ["intrinsic_matrix", "camera_matrix", "Camera_Matrix", "cameraMatrix", "K", "k"];
     let matrix = keys.take_any(&MATRICES).map(|own| (own, "intrinsic_matrix"));
-    let Some((matrix, name)) = matrix.or_else(|| Some((keys.take("intrinsics")?, "intrinsics"))) else {
-        return Ok(named);
-    };
+    // A text names a file.
+    let has_list = keys.get("intrinsics").is_some_and(|own| !own.is_string());
+    let intrinsics = || if has_list { Some((keys.take("intrinsics")?, "intrinsics")) } else { None };
+    let Some((matrix, name)) = matrix.or_else(intrinsics) else { return Ok(named) };
     let m = match numbers_of(&matrix, name)? {
         m if m.len() == 9 => m,
         // Those of Kalibr.
@@ -450,8 +458,10 @@ fn distortion_of(keys: &mut Keys, is_fisheye: bool, is_nerf: bool) -> Result<Dis
         "D",
         "d",
     ];
-    let list = keys.take_any(&LISTS);
-    if let Some(list) = list.filter(|list| !list.is_null()) {
+    let list = keys.take_any(&LISTS).filter(|list| !list.is_null());
+    // Of none.
+    let list = list.filter(|list| !list.as_str().is_some_and(|text| text.eq_ignore_ascii_case("none")));
+    if let Some(list) = list {
         if k.iter().any(|v| *v != 0.0) {
             return Err("it states its distortion twice, as a list and by names: expected one".to_owned());
         }

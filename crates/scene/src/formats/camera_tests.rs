@@ -144,6 +144,18 @@ fn other_programs_are_read() {
     ] {
         same(flow, None);
     }
+    // Words that are no numbers are named.
+    for (words, named) in [
+        (r#""resolution": "1080p""#, "'resolution'"),
+        (r#""resolution": {"dpi": 72}"#, "'resolution'"),
+        (r#""intrinsics": "file.txt""#, "'intrinsics'"),
+        (r#""dist": "none""#, ""),
+    ] {
+        let text =
+            format!(r#"{{"width": 640, "height": 480, "fx": 525, "fy": 526, "cx": 319.5, "cy": 239.5, {words}}}"#);
+        let notes = read(&text, 480, 640).unwrap().notes.join("\n");
+        assert!(notes.contains(named) && notes.is_empty() == named.is_empty(), "{words}: {notes}");
+    }
     let slam = "%YAML:1.0\nCamera.type: \"PinHole\"\nCamera.fx: 525.0\nCamera.fy: 526.0\nCamera.cx: 319.5\nCamera.cy: 239.5\nCamera.width: 640\n\
                 Camera.height: 480\nDepthMapFactor: 5000.0\n";
     same(slam, Some(2e-4));

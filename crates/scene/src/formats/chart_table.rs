@@ -10,7 +10,7 @@ use super::{
     reading::FileQuantity,
     stated::{name_of, note_of, short},
     unusable::{check_made, unreadable},
-    wavelength_unit::wavelengths_of_column,
+    wavelength_unit::{comments_of, wavelengths_of_column},
 };
 use crate::SceneError;
 
@@ -65,37 +65,43 @@ pub(super) fn read_chart(path: &Path) -> Result<Cube, SceneError> {
             "it has no line of numbers: expected wavelengths in nm and a reflectance a column".to_owned(),
         ));
     }
-    const OTHERS: [&str; 12] = [
-        "absorb",
+    const OTHERS: [&str; 13] = [
+        "absor",
         "radian",
         "emission",
-        "photon",
         "w/m",
         "w m-2",
         "w/cm",
         "counts",
-        "optical density",
-        "optical_density",
-        "opticaldensity",
+        "density",
+        "extinction",
+        "attenuation",
+        "coefficient",
+        "mu_a",
         "k/s",
     ];
+    const SHORT: [&str; 7] = ["od", "dn", "abs", "db", "log", "logr", "ln"];
+    const BESIDE: [&str; 9] = ["r", "t", "i", "a", "u", "sample", "reflectance", "transmittance", "value"];
     let is_other = |name: &&String| {
         let lower = name.to_lowercase();
-        let has_word = |word: &str| lower.split(|c: char| !c.is_alphabetic()).any(|own| own == word);
-        OTHERS.iter().any(|other| lower.contains(other)) || ["od", "dn", "abs", "db", "log"].into_iter().any(has_word)
+        let words: Vec<&str> = lower.split(|c: char| !c.is_alphabetic()).filter(|word| !word.is_empty()).collect();
+        // Beside other words they are names of patches, as of log cabins.
+        let is_short = words.iter().any(|word| SHORT.contains(word));
+        OTHERS.iter().any(|other| lower.contains(other))
+            || words.iter().any(|word| word.starts_with("photon") && !word.starts_with("photonic"))
+            || is_short && words.iter().all(|word| SHORT.contains(word) || BESIDE.contains(word))
     };
     if let Some(other) = names.iter().find(is_other) {
         return Err(wrong(format!("its column '{}' says that it holds no reflectances, expected such", short(other))));
     }
-    let wavelengths_nm = wavelengths_of_column(&first, &wavelengths_nm).map_err(wrong)?;
+    let wavelengths_nm = wavelengths_of_column(&first, &wavelengths_nm, comments_of(&text)).map_err(wrong)?;
     let mut notes = vec![];
     let is_percent = |name: &&String| name.contains('%') || name.to_lowercase().contains("percent");
     if names.iter().chain([&first]).any(|name| is_percent(&name)) {
         lines.iter_mut().flatten().for_each(|value| *value /= 100.0);
         notes.push(format!("{}: its reflectances are in percent", name_of(path)));
     }
-    let comments: Vec<_> = text.lines().filter_map(|line| line.strip_prefix('#')).map(str::trim).collect();
-    let comments: Vec<_> = comments.into_iter().filter(|comment| !comment.is_empty()).map(str::to_owned).collect();
+    let comments: Vec<String> = comments_of(&text).map(str::to_owned).collect();
     notes.extend(note_of(path, "comment", &comments));
     // As wide to its height as the usual charts of 6 × 4.
     let across = ((1.5 * n as f64).sqrt().ceil() as usize).min(n);
@@ -171,12 +177,16 @@ mod tests {
         }
         std::fs::write(&path, b"nm,Gr\xfcn\n400,.2\n500,.3\n").unwrap();
         assert!(read_scene(&path, &options).unwrap().notes[1].contains("Grün"));
+        write("nm,ABS plastic,log cabin,photonic paint\n400,.2,.3,.4\n500,.2,.3,.4\n");
+        assert!(read_scene(&path, &options).is_ok());
         for (text, word) in [
             ("", "it is empty"),
             ("# nothing\n", "no line of numbers"),
             ("nm,absorbance\n400,.2\n", "'absorbance' says that it holds no reflectances"),
+            ("nm,absorption coefficient (1/cm)\n400,.2\n", "says that it holds no reflectances"),
             ("nm,W/m2/nm\n400,.2\n", "'W/m2/nm' says that it holds no reflectances"),
             ("nm,catalog red,Optical_Density\n400,.2,.3\n", "'Optical_Density' says that it holds no reflectances"),
+            ("nm,logR\n400,.2\n", "'logR' says that it holds no reflectances"),
             ("nm,log(1/T)\n400,.2\n", "'log(1/T)' says that it holds no reflectances"),
             ("waves (zorp),a\n400,.2\n", "'zorp'"),
             ("nm,a\n400,0.1\n500\n", "line 3: 1 numbers"),

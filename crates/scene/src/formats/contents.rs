@@ -9,6 +9,7 @@ use rayon::prelude::*;
 
 use super::{
     camera::{CameraData, Straightened},
+    depth_names::words_of,
     light_unit::LightUnit,
     no_data::mend,
     raw_depth::RawDepth,
@@ -242,6 +243,7 @@ impl Cube {
         let unit = self.unit(path, options)?;
         let (level, what) = self.level(path, options, unit)?;
         self.notes.extend(self.note_of_name(path, options));
+        self.notes.extend(self.note_of_kind(path, unit.is_some()));
         let values = |reason: SpectrumError| SceneError::Values { file: path.to_owned(), reason };
         let grid = WavelengthGrid::new(order.iter().map(|&band| wavelengths_nm[band]).collect()).map_err(values)?;
         let mut planes: Vec<Option<Array2<f32>>> = self.planes.into_iter().map(Some).collect();
@@ -273,6 +275,22 @@ impl Cube {
         let note =
             || format!("{file}: the unit in the name '{name}' is not used: --unit, --scale or --white-level says it");
         (!is_told).then(note)
+    }
+
+    /// Returns what is said of an array that is called another kind of quantity than its numbers are taken for.
+    fn note_of_kind(&self, path: &Path, is_light: bool) -> Option<String> {
+        const SHARES: [&str; 4] = ["reflectance", "reflectances", "transmittance", "albedo"];
+        const LIGHT: [&str; 4] = ["radiance", "radiances", "irradiance", "photons"];
+        let name = self.called.as_deref()?;
+        let words = words_of(name);
+        let says = |known: [&str; 4]| words.iter().any(|word| known.contains(&word.as_str()));
+        let (is_other, taken) = if is_light {
+            (says(SHARES) && !says(LIGHT), "light")
+        } else {
+            (says(LIGHT) && !says(SHARES), "reflectance")
+        };
+        is_other
+            .then(|| format!("{}: its '{}' is taken for {taken}, whatever its name says", name_of(path), short(name)))
     }
 
     /// Returns the wavelength of each band: those of the file, or those told.

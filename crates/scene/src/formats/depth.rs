@@ -6,7 +6,7 @@ use std::{
 };
 
 use super::{
-    belonging::note_of_gdal,
+    belonging::notes_of_companions,
     camera_files::beside,
     contents::{MATLAB_OR_HDF5, is_of},
     depth_names::SaidOfDepth,
@@ -114,7 +114,7 @@ pub(super) fn read_depth(path: &Path, words: DepthWords<'_>) -> Result<RawDepth,
     }
     // Distances that are counted from the camera say so by the name of their channel, or their file.
     let kind = if is_of_hypersim(path) { DepthKind::Radial } else { numbers.kind };
-    notes.extend(note_of_gdal(path));
+    notes.extend(notes_of_companions(path));
     let (unit_m, is_stated) = unit_m_of(path, &numbers, words)?;
     // Whole metres, and many of them, are rarely measured.
     let most = numbers.values.iter().copied().filter(|v| v.is_finite() && *v < NEVER_M).fold(0.0, f32::max);

@@ -49,7 +49,7 @@ pub(super) fn contents_of_envi(path: &Path, options: &ReadOptions) -> Result<Con
     let file = EnviFile::open(path, options.reading.wavelengths_nm.as_deref(), wanted_nm)?;
     let (meaning, what) = file.meaning(options)?;
     let mut notes: Vec<String> = file.notes.clone();
-    notes.extend(file.unused_unit(path));
+    notes.extend(file.unused_unit(path, matches!(meaning, Meaning::Light(_)) && file.header.gains.is_none()));
     let references = match &meaning {
         Meaning::Between(pair, _) => &pair[..],
         _ => &[],
@@ -259,13 +259,16 @@ impl EnviFile {
         (0..self.header.bands).filter(|band| !self.header.bad_bands.get(*band).copied().unwrap_or(false))
     }
 
-    /// Returns the note of data units that are none of light, and say more than that the numbers are a share or a count.
-    fn unused_unit(&self, path: &Path) -> Option<String> {
-        const PLAIN: [&str; 8] =
-            ["", "reflectance", "transmittance", "unitless", "dimensionless", "none", "unknown", "dn"];
+    /// Returns the note of data units that are none of light, and say more than that the numbers are a share or a count where they are taken for such.
+    fn unused_unit(&self, path: &Path, is_light: bool) -> Option<String> {
+        const OF_ANY: [&str; 2] = ["", "unknown"];
+        const OF_SHARES: [&str; 6] = ["reflectance", "transmittance", "unitless", "dimensionless", "none", "dn"];
         let unit = self.header.data_units.as_deref()?;
-        let is_plain =
-            PLAIN.contains(&unit.to_lowercase().as_str()) || self.has_percent() || LightUnit::parse(unit).is_some();
+        let words = unit.to_lowercase();
+        let is_plain = OF_ANY.contains(&words.as_str())
+            || !is_light && OF_SHARES.contains(&words.as_str())
+            || self.has_percent()
+            || LightUnit::parse(unit).is_some();
         if is_plain { None } else { note_of(path, "unit", &[unit.to_owned()]) }
     }
 

@@ -38,6 +38,7 @@ mod input_tests;
 #[cfg(test)]
 mod kinds_tests;
 mod length_unit;
+mod light_file;
 mod light_unit;
 mod lighting;
 mod mat;
@@ -87,6 +88,7 @@ mod word_tests;
 mod written_tests;
 
 pub(crate) use picture::decode as decode_picture;
+pub(crate) use understood::note_of_gaps;
 pub(crate) use unusable::{check_made, unwritable};
 
 pub use belonging::may_be_read_with;
@@ -95,6 +97,7 @@ pub use exr_samples::ExrSamples;
 pub use exr_stream::{SpectralHead, is_irradiance_exr, read_exr_text};
 pub use exr_write::{ExrParts, write_planes_exr, write_scene_exr, write_spectral_exr};
 pub use flat_size::flat_size_of;
+pub use light_file::{is_light_file, read_light};
 pub use mat::{
     IsetIrradiance, holds_iset_irradiance, read_iset_display, read_iset_irradiance, read_mat_matrices,
     write_iset_irradiance, write_iset_scene,
@@ -109,4 +112,3 @@ pub use reading::{DepthKind, FileQuantity, FileReading, NoData, Panorama};
 pub use spectral_exr::{NamedPlanes, SpectralFile, read_planes_exr, read_spectral_exr};
 pub use stated::Noted;
 pub use unmeasured::{FillDepth, filled_depth};
-pub use wavelength_unit::wavelengths_of_column;

@@ -97,7 +97,9 @@ impl<'a> Archive<'a> {
 
     /// Returns those that are no lists of wavelengths.
     fn but_wavelengths(&mut self, is_wanted: impl Fn(&[usize]) -> bool) -> Result<Vec<String>, SceneError> {
-        Ok(self.of_sides(is_wanted)?.into_iter().filter(|name| rank_of_waves(bare(name)).is_none()).collect())
+        let lists = self.of_sides(|sides| sides.iter().filter(|side| **side != 1).count() < 2)?;
+        let is_list = |name: &String| lists.contains(name) && rank_of_waves(bare(name)).is_some();
+        Ok(self.of_sides(is_wanted)?.into_iter().filter(|name| !is_list(name)).collect())
     }
 }
 

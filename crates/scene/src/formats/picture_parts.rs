@@ -86,14 +86,14 @@ pub(super) fn note_on_exif(path: &Path, of_scene: bool) -> Option<String> {
     if exif.is_damaged {
         return Some(format!("{}: its Exif data are damaged: not all that they state is used", name_of(path)));
     }
-    let (mut columns, mut rows) = size_of(path).ok()?;
-    if orientation_of(path).to_exif() > 4 {
-        std::mem::swap(&mut columns, &mut rows);
-    }
-    let on_film = exif.horizontal_fov_deg(columns, rows).map(|fov_deg| {
-        let mm = exif.focal_on_film_mm.unwrap_or_default();
-        format!("{mm} mm on 35 mm film, with which it would be {fov_deg:.1}° wide (--fov-deg)")
+    // A cube has no size of a picture.
+    let fov_deg = size_of(path).ok().and_then(|(columns, rows)| {
+        let is_turned = orientation_of(path).to_exif() > 4;
+        let (columns, rows) = if is_turned { (rows, columns) } else { (columns, rows) };
+        exif.horizontal_fov_deg(columns, rows)
     });
+    let wide = fov_deg.map_or_else(String::new, |deg| format!(", with which it would be {deg:.1}° wide (--fov-deg)"));
+    let on_film = exif.focal_on_film_mm.map(|mm| format!("{mm} mm on 35 mm film{wide}"));
     let stated: Vec<String> = [
         exif.focal_mm.filter(|_| of_scene).map(|mm| format!("a focal length of {mm} mm")),
         on_film.filter(|_| of_scene).map(|words| format!("a focal length of {words}")),

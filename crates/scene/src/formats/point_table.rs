@@ -1,11 +1,17 @@
 //! Tables of points that shine (`.csv`): stars, LEDs, lamps.
 
-use std::{collections::BTreeMap, path::Path};
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+};
 
 use dioptric_files::text;
 use dioptric_spectrum::{Illuminant, Observer, WavelengthGrid};
 
-use super::stated::short;
+use super::{
+    light_file::{is_light_file, read_light},
+    stated::short,
+};
 use crate::{PointBrightness, PointLight, PointPlace, SceneError};
 
 /// Points as a table states them, on no bands yet.
@@ -54,19 +60,30 @@ const OTHERS: [&str; 3] = ["depth_m", "light", "name"];
 
 impl PointTable {
     /// Reads a table with a line of names: `x_deg` and `y_deg` (angles to the right and upwards) or `x_mm` and `y_mm` (on the film); `magnitude`, `lux`,
-    /// `candela` or `w_per_sr`; and, if there are, `depth_m` (left out or `inf` for stars), `light` (as [`Illuminant::parse`] has it, or a line as `589nm`; D65
-    /// if left out) and `name`. Lines that begin with # are comments.
+    /// `candela` or `w_per_sr`; and, if there are, `depth_m` (left out or `inf` for stars), `light` (as [`Illuminant::parse`] has it, a line as `589nm`, or the file of a
+    /// light beside the table; D65 if left out) and `name`. Lines that begin with # are comments.
     ///
     /// # Errors
     /// Names the line and the column that cannot be read.
     pub fn read(path: &Path) -> Result<Self, SceneError> {
         let unreadable = |reason: String| SceneError::Unreadable { file: path.to_owned(), reason };
         let text = text::read(path).map_err(|error| unreadable(error.to_string()))?;
-        Self::parse(&text::with_commas(&text))
+        Self::parse(&text::with_commas(&text), path.parent().unwrap_or(Path::new("")))
             .map_err(|reason| SceneError::Unreadable { file: path.to_owned(), reason })
     }
 
-    fn parse(text: &str) -> Result<Self, String> {
+    /// Returns the files of lights that a table names, as far as it can be read.
+    pub fn light_files(path: &Path) -> Vec<PathBuf> {
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let text = text::read(path).unwrap_or_default();
+        let text = text::with_commas(&text);
+        let cells =
+            text.lines().flat_map(|line| line.split(',')).map(|cell| folder.join(cell.trim().trim_matches('"')));
+        cells.filter(|path| path.is_file()).collect()
+    }
+
+    /// Parses a table that lies in this folder.
+    fn parse(text: &str, folder: &Path) -> Result<Self, String> {
         let mut reader = csv::ReaderBuilder::new()
             .flexible(true)
             .comment(Some(b'#'))
@@ -130,7 +147,7 @@ impl PointTable {
                 _ => Amount::WattsPerSteradian(value),
             };
             let color = match cell("light") {
-                Some(text) => Color::parse(text).map_err(|reason| format!("line {line}: {reason}"))?,
+                Some(text) => Color::parse(text, folder).map_err(|reason| format!("line {line}: {reason}"))?,
                 None => Color::Of(Illuminant::D65),
             };
             let point = Line { place, depth_m, amount, color };
@@ -159,17 +176,21 @@ impl PointTable {
 }
 
 impl Color {
-    fn parse(text: &str) -> Result<Self, String> {
+    fn parse(text: &str, folder: &Path) -> Result<Self, String> {
         if let Some(nm) = text.strip_suffix("nm").and_then(|number| number.trim().parse::<f64>().ok()) {
             return match (100.0..1e5).contains(&nm) {
                 true => Ok(Self::Line(nm)),
                 false => Err(format!("light is '{}', expected a wavelength of 100 nm to 100000 nm", short(text))),
             };
         }
+        let path = folder.join(text);
+        if is_light_file(&path) {
+            return read_light(&path).map(Self::Of).map_err(|error| error.to_string());
+        }
         Illuminant::parse(text).map(Self::Of).map_err(|_| {
             let names = Illuminant::NAMES.join(", ");
             let text = short(text);
-            format!("light is '{text}', expected {names}, a temperature (3000K), a chromaticity (\"0.46,0.414\") or a line (589nm)")
+            format!("light is '{text}', expected {names}, a temperature (3000K), a chromaticity (\"0.46,0.414\"), a line (589nm) or the file of a light")
         })
     }
 
@@ -255,6 +276,24 @@ mod tests {
         WavelengthGrid::uniform(400.0, 700.0, 10.0).unwrap()
     }
 
+    #[test]
+    fn lights_may_be_files_beside_the_table() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name);
+        std::fs::write(path("lamp.txt"), "nm power\n400 1\n700 2\n").unwrap();
+        let read = |light: &str| {
+            std::fs::write(path("p.csv"), format!("x_deg,y_deg,lux,light\n0,0,1,{light}\n")).unwrap();
+            PointTable::read(&path("p.csv")).map_err(|error| error.to_string())
+        };
+        let spectrum = dioptric_spectrum::Spectrum::new(vec![400.0, 700.0], vec![1.0, 2.0]).unwrap();
+        assert_eq!(read("lamp.txt").unwrap().points[0].color, Color::Of(Illuminant::Spectrum(spectrum)));
+        assert_eq!(PointTable::light_files(&path("p.csv")), [path("lamp.txt")]);
+        assert!(
+            read("lamp2.csv").unwrap_err().contains("line 2")
+                && read("lamp2").unwrap_err().contains("the file of a light")
+        );
+    }
+
     fn lumens(by_band: &[f32]) -> f64 {
         let values: Vec<f64> = by_band.iter().map(|value| f64::from(*value)).collect();
         Observer::Cie1931.xyz(&grid(), &values).luminance_cd_m2()
@@ -263,7 +302,7 @@ mod tests {
     #[test]
     fn a_table_says_where_points_are_and_how_bright() {
         let text = "# an LED, and a lamp\nName, x_deg, y_deg, depth_m, candela, light\nLED, 1.5, -0.5, 3, 2, 589nm\nlamp, 0, 0, 10, 40, 2856K\n";
-        let points = PointTable::parse(text).unwrap().on(&grid()).unwrap();
+        let points = PointTable::parse(text, Path::new("")).unwrap().on(&grid()).unwrap();
         assert_eq!(points.len(), 2);
         let PointPlace::Field { tan_x, tan_y } = points[0].place else { panic!("{:?}", points[0].place) };
         assert!((tan_x - 1.5_f64.to_radians().tan()).abs() < 1e-12 && tan_y < 0.0);
@@ -279,8 +318,10 @@ mod tests {
     /// A star of magnitude 0 brings 2.54 µlx to 2.65 µlx (Allen, Astrophysical Quantities, section 3.5: 2.54e-6 outside of the atmosphere).
     #[test]
     fn magnitudes_are_those_of_v() {
-        let points =
-            PointTable::parse("x_mm,y_mm,magnitude,light\n1,2,0,5800K\n1,2,5,5800K\n").unwrap().on(&grid()).unwrap();
+        let points = PointTable::parse("x_mm,y_mm,magnitude,light\n1,2,0,5800K\n1,2,5,5800K\n", Path::new(""))
+            .unwrap()
+            .on(&grid())
+            .unwrap();
         let lux: Vec<f64> = points.iter().map(|point| lumens(point.light.by_band())).collect();
         assert!((2.4e-6..2.75e-6).contains(&lux[0]), "{lux:?}");
         assert!((lux[0] / lux[1] - 100.0).abs() < 1e-3);
@@ -308,7 +349,7 @@ mod tests {
             ("x_deg,y_deg,lux\n1,2\n", "line 2: 2 columns, expected 3"),
             ("x_deg,y_deg,lux\n1,2,3,4\n", "line 2: 4 columns, expected 3"),
         ] {
-            let found = PointTable::parse(text).unwrap_err();
+            let found = PointTable::parse(text, Path::new("")).unwrap_err();
             assert!(found.contains(words), "{text}: {found}");
         }
     }

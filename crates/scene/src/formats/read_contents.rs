@@ -8,7 +8,7 @@ use ndarray::Array2;
 
 use super::{
     band_folder::band_folder,
-    belonging::note_of_gdal,
+    belonging::notes_of_companions,
     camera::CameraData,
     chart_table::read_chart,
     contents::{Contents, Cube, Heeds, Hidden, Image, MATLAB_OR_HDF5, is_of},
@@ -47,7 +47,7 @@ const WORLD_ENDINGS: &[&str] = &["pbrt", "gltf", "glb", "obj", "ply", "stl"];
 /// Reads what is in a file of a scene, by its name and its first bytes; what GDAL puts beside it is named.
 pub(super) fn contents_of(path: &Path, options: &ReadOptions) -> Result<Contents, SceneError> {
     let mut contents = contents_of_file(path, options)?;
-    contents.notes.extend(note_of_gdal(path));
+    contents.notes.extend(notes_of_companions(path));
     Ok(contents)
 }
 

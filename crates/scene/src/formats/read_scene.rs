@@ -15,7 +15,7 @@ use super::{
     read_options::ReadOptions,
     scene_depth::{depth_of, raw_depth},
     stated::{name_of, note_of},
-    understood::{self, Sources, resampling_note},
+    understood::{self, Sources, note_of_gaps, resampling_note},
     unusable::{check_made, unreadable},
 };
 use crate::{Scene, SceneError, View};
@@ -127,6 +127,7 @@ fn finish(path: &Path, name: String, mut contents: Contents, options: &ReadOptio
     notes.extend(understood::doubt_of_reflectances(&name, &contents.image));
     let (is_part_already, is_lit) = (contents.part.is_some(), contents.is_reflectance(options));
     let (mut radiance, light) = lit(path, contents, options, &mut notes)?;
+    notes.extend(note_of_gaps(&name, radiance.grid()));
     if let Some(light) = light.as_ref().filter(|_| is_lit) {
         sources.what += &under(light);
     }

@@ -506,6 +506,121 @@ fn lists_belong_to_the_cube_that_is_near() {
     }
     let twice = [("cube", None), ("wavelength", Some(near)), ("wavelengths", Some(far))];
     check_refused(read(&twice, "cube"), &["'wavelength' and 'wavelengths' differ", "--scene-wavelengths-nm"]);
+    // Single letters tell lists from each other, and are no units.
+    for (first, second) in [("wavelength_a", "wavelength_b"), ("wavelength_m", "wavelength_n")] {
+        let twice = [("cube", None), (first, Some(far)), (second, Some(near))];
+        check_refused(read(&twice, "cube"), &["differ", "--scene-wavelengths-nm"]);
+    }
+}
+
+/// The only scale of the axis of bands has its wavelengths, whatever it is called and wherever it lies.
+#[test]
+fn scales_of_axes_have_their_wavelengths() {
+    use hdf5_pure::{AttrValue, FileBuilder};
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.h5");
+    // A scale, its unit, a list beside the cube, and the axes that are told.
+    let read = |scale: &str, unit: &str, numbers: &[f64], list: Option<&str>, axes: Option<&str>, is_attached: bool| {
+        let mut file = FileBuilder::new();
+        let mut group = file.create_group("g");
+        group
+            .create_dataset("cube")
+            .with_data(&[0.5; 24])
+            .with_shape(&[2, 3, 4])
+            .set_attr("DIMENSION_LIST", AttrValue::I32(0));
+        if let Some(list) = list {
+            group.create_dataset(list).with_data(&[900.0, 1000.0, 1100.0, 1200.0]).with_shape(&[4]);
+        }
+        file.add_group(group.finish());
+        let own = file.create_dataset(scale).with_data(numbers).with_shape(&[4]);
+        own.set_attr("CLASS", AttrValue::AsciiString("DIMENSION_SCALE".to_owned()));
+        own.set_attr("units", AttrValue::AsciiString(unit.to_owned()));
+        if is_attached {
+            own.set_attr("REFERENCE_LIST", AttrValue::I32(0));
+        }
+        fs::write(&path, file.finish().unwrap()).unwrap();
+        let quantity = Some(FileQuantity::Radiance);
+        let reading = FileReading { quantity, axes: axes.map(str::to_owned), ..FileReading::default() };
+        read_scene(&path, &options(reading))
+    };
+    let (nm, um) = ([450.0, 500.0, 560.0, 620.0], [0.45, 0.5, 0.56, 0.62]);
+    for (scale, unit, numbers, list, axes) in [
+        ("good_wavelength", "nm", nm, Some("wavelength"), Some("yxb")),
+        ("wl_true", "nm", nm, Some("wavelength"), None),
+        ("centers", "um", um, Some("wavelength"), Some("yxb")),
+        ("centers", "um", um, None, Some("yxb")),
+        ("wavelength", "nm", nm, Some("wavelength"), None),
+    ] {
+        for is_attached in [true, false] {
+            let scene = read(scale, unit, &numbers, list, axes, is_attached).unwrap();
+            assert_eq!(scene.radiance.grid().centers_nm(), nm, "{scale} {axes:?}");
+            if let Some(list) = list {
+                check_noted(&scene, &[&format!("'g/{list}' is not used")]);
+            }
+        }
+    }
+    // A scale of numbers that are no wavelengths is none.
+    for (scale, unit, numbers) in [("band", "", [1.0, 2.0, 3.0, 4.0]), ("t", "s", [450.0, 500.0, 560.0, 620.0])] {
+        let scene = read(scale, unit, &numbers, Some("wavelength"), Some("yxb"), true).unwrap();
+        assert_eq!(scene.radiance.grid().centers_nm(), [900.0, 1000.0, 1100.0, 1200.0], "{scale}");
+    }
+    // Where nothing says which axis is that of bands.
+    check_refused(read("centers", "um", &um, None, None, true), &["--scene-wavelengths-nm"]);
+}
+
+/// An array or a unit that says something else than is asked for is named.
+#[test]
+fn names_and_units_of_another_quantity_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.npz");
+    let read = |name: &str, quantity: FileQuantity| {
+        let arrays = [
+            (name, npy("<f4", false, "(2, 3, 2)", &floats(&[0.5; 12]))),
+            ("wave", npy("<f4", false, "(2,)", &floats(&[450.0, 550.0]))),
+        ];
+        fs::write(&path, zip_of(&arrays, false)).unwrap();
+        let reading = FileReading { quantity: Some(quantity), axes: Some("yxb".to_owned()), ..FileReading::default() };
+        read_scene(&path, &options(reading)).unwrap()
+    };
+    check_noted(&read("reflectance", FileQuantity::Radiance), &["'reflectance' is taken for light"]);
+    check_noted(&read("raw_radiance", FileQuantity::Reflectance), &["'raw_radiance' is taken for reflectance"]);
+    for (name, quantity) in [
+        ("reflectance", FileQuantity::Reflectance),
+        ("radiance", FileQuantity::Photons),
+        ("cube", FileQuantity::Radiance),
+    ] {
+        assert!(!read(name, quantity).notes.iter().any(|note| note.contains("is taken for")), "{name}");
+    }
+    let header = folder.path().join("b.hdr");
+    fs::write(header.with_extension("raw"), floats(&[0.5; 12])).unwrap();
+    for (unit, quantity, is_named) in [
+        ("DN", FileQuantity::Radiance, true),
+        ("unitless", FileQuantity::Photons, true),
+        ("DN", FileQuantity::Reflectance, false),
+        ("none", FileQuantity::Reflectance, false),
+    ] {
+        let text = format!(
+            "ENVI\nsamples = 3\nlines = 2\nbands = 2\ndata type = 4\ninterleave = bsq\nbyte order = 0\nwavelength = {{450, 550}}\ndata units = {unit}\n"
+        );
+        fs::write(&header, text).unwrap();
+        let scene =
+            read_scene(&header, &options(FileReading { quantity: Some(quantity), ..FileReading::default() })).unwrap();
+        assert_eq!(scene.notes.iter().any(|note| note.contains(unit)), is_named, "{unit}: {:?}", scene.notes);
+    }
+}
+
+/// A file of an editor beside a picture is named.
+#[test]
+fn side_cars_of_editors_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.png");
+    dioptric_pictures::save(&image::GrayImage::from_pixel(4, 3, image::Luma([99])).into(), &path).unwrap();
+    for name in ["a.xmp", "a.png.xmp"] {
+        fs::write(folder.path().join(name), "<x/>").unwrap();
+        let scene = read_scene(&path, &options(FileReading::default())).unwrap();
+        check_noted(&scene, &[&format!("its side-car '{name}' is not used")]);
+        fs::remove_file(folder.path().join(name)).unwrap();
+    }
 }
 
 /// Layers of other bands are one cube unless one of them is asked for.

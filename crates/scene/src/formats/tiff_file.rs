@@ -156,7 +156,7 @@ pub(super) struct TiffStack {
 /// # Errors
 /// When it is none, is truncated or too large, or its pages differ in size.
 pub(super) fn read_tiff(path: &Path, wanted: TiffAs) -> Result<Noted<TiffFile>, SceneError> {
-    let Pages { mut pages, unused, mut notes } = pages_of(path, wanted)?;
+    let Pages { mut pages, unused, mut notes } = pages_of(path, wanted, wanted != TiffAs::Depths)?;
     let Some((first, _)) = pages.first() else { return Err(no_page(path)) };
     let words = first.words();
     // A picture of two gray samples may be told by its description to be one of two bands.
@@ -270,8 +270,8 @@ struct Pages {
     notes: Vec<String>,
 }
 
-/// Reads what pages state: those of depths where they are wanted and there, or else all others.
-fn pages_of(path: &Path, wanted: TiffAs) -> Result<Pages, SceneError> {
+/// Reads what pages state, and of a scene their words of geometry: those of depths where they are wanted and there, or else all others.
+fn pages_of(path: &Path, wanted: TiffAs, of_scene: bool) -> Result<Pages, SceneError> {
     let broken = |error| broken(path, &error);
     let (reader, maps) = AsGray::with_depth_maps(path, LIMIT_PAGES).map_err(|error| unreadable(path, error))?;
     let length = fs::metadata(path).map_err(|error| unreadable(path, error))?.len();
@@ -368,7 +368,7 @@ fn pages_of(path: &Path, wanted: TiffAs) -> Result<Pages, SceneError> {
     }
     let mut notes = vec![];
     if !pages.is_empty() {
-        notes = notes_on_page(path, &xmp, matches!(wanted, TiffAs::Marked | TiffAs::Planes(Some(_))));
+        notes = notes_on_page(path, &xmp, of_scene);
     }
     for (kind, mut names) in [("item of GDAL", items), ("text", told), ("tag", unknown)] {
         names.sort();
@@ -383,7 +383,7 @@ fn pages_of(path: &Path, wanted: TiffAs) -> Result<Pages, SceneError> {
 /// # Errors
 /// When the file is of a kind that is not read, or its samples are no picture's.
 pub(super) fn float_planes(path: &Path) -> Result<Option<Noted<Vec<Array2<f32>>>>, SceneError> {
-    let Pages { mut pages, .. } = pages_of(path, TiffAs::Planes(None))?;
+    let Pages { mut pages, .. } = pages_of(path, TiffAs::Planes(None), false)?;
     pages.truncate(1);
     let Some((first, _)) = pages.first() else { return Err(no_page(path)) };
     match first.depth {
@@ -404,7 +404,7 @@ pub(super) fn float_planes(path: &Path) -> Result<Option<Noted<Vec<Array2<f32>>>
 /// Returns what is said of the pages and samples of a TIFF file of which the first picture is taken; of one that is not read here nothing, since whoever
 /// decodes it says what is wrong.
 pub(super) fn notes_on_pages(path: &Path) -> Vec<String> {
-    let Ok(Pages { pages, unused, mut notes }) = pages_of(path, TiffAs::Planes(None)) else { return vec![] };
+    let Ok(Pages { pages, unused, mut notes }) = pages_of(path, TiffAs::Planes(None), false) else { return vec![] };
     notes.extend(notes_on_others(path, &pages, unused));
     notes
 }

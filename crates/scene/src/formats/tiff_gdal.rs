@@ -234,5 +234,21 @@ mod tests {
         for word in ["a focal length of 35 mm", "reflectance in percent", "Camera:BandName (XMP)"] {
             assert!(notes.contains(word) && !notes.contains("'700'"), "{word}: {notes}");
         }
+        // Of cubes too.
+        drop(encoder);
+        let mut encoder = TiffEncoder::new(File::create(&path).unwrap()).unwrap();
+        for _ in 0..2 {
+            let mut page = encoder.new_image::<colortype::Gray32Float>(3, 2).unwrap();
+            let xmp = b"<x xmlns:exif='a' exif:FocalLengthIn35mmFilm='50'/>";
+            page.encoder().write_tag(Tag::Unknown(700), &xmp[..]).unwrap();
+            page.write_data(&[0.5; 6]).unwrap();
+        }
+        let reading = crate::FileReading {
+            quantity: Some(crate::FileQuantity::Radiance),
+            wavelengths_nm: Some(vec![450.0, 550.0]),
+            ..crate::FileReading::default()
+        };
+        let notes = read_scene(&path, &ReadOptions { reading, ..ReadOptions::default() }).unwrap().notes.join("\n");
+        assert!(notes.contains("a focal length of 50 mm on 35 mm film"), "{notes}");
     }
 }

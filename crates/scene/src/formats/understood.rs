@@ -119,6 +119,33 @@ pub(super) fn bands(grid: &WavelengthGrid) -> String {
     }
 }
 
+/// Neighboring bands may be so far apart, and the outer edges of bands so far inside the light that is seen, nm: beyond, patches of the usual chart
+/// are off by 10 and more in color (CIEDE2000), since a band stands for a flat spectrum.
+const WIDEST_NM: f64 = 100.0;
+const EDGES_NM: [f64; 2] = [450.0, 630.0];
+/// What is seen best, nm.
+const SEEN_NM: [f64; 2] = [420.0, 680.0];
+
+/// Returns in a sentence which visible light several bands leave out between or beside them.
+pub(crate) fn note_of_gaps(name: &str, grid: &WavelengthGrid) -> Option<String> {
+    let [low, high] = SEEN_NM;
+    let nm = grid.centers_nm();
+    if nm.iter().filter(|nm| (low..=high).contains(*nm)).count() < 3 {
+        return None;
+    }
+    let (first, last, n) = (nm[0], nm[nm.len() - 1], nm.len());
+    let below = (nm[0] - 0.5 * (nm[1] - nm[0]) > EDGES_NM[0]).then(|| format!("below {} nm", short(first)));
+    let above = (last + 0.5 * (last - nm[n - 2]) < EDGES_NM[1]).then(|| format!("above {} nm", short(last)));
+    let is_wide = |pair: &&[f64]| pair[1].min(high) - pair[0].max(low) > WIDEST_NM;
+    let between =
+        nm.windows(2).filter(is_wide).map(|pair| format!("between {} and {} nm", short(pair[0]), short(pair[1])));
+    let gaps: Vec<String> = below.into_iter().chain(between).chain(above).collect();
+    let gaps = (!gaps.is_empty()).then(|| gaps.join(" and "))?;
+    Some(format!(
+        "{name}: no band lies {gaps}: spectra are taken for flat there, so that colors and luminance are rough"
+    ))
+}
+
 /// Returns in a sentence how the bands of a file become those wanted, where they are others.
 pub(super) fn resampling_note(name: &str, own: &WavelengthGrid, wanted: Option<&WavelengthGrid>) -> Option<String> {
     let wanted = wanted.filter(|wanted| *wanted != own)?;
@@ -209,6 +236,24 @@ mod tests {
         assert!(doubt.contains("48.0 times") && doubt.contains("--scale 0.01"), "{doubt}");
         assert_eq!(doubt_of_reflectances("a.csv", &of(Quantity::Reflectance, 1.2)), None);
         assert_eq!(doubt_of_reflectances("a.csv", &of(Quantity::Radiance, 48.0)), None);
+    }
+
+    #[test]
+    fn gaps_between_few_bands_are_said() {
+        for (nm, said) in [
+            (&[450.0, 500.0, 560.0, 620.0][..], None),
+            (&[405.0, 440.0, 470.0, 525.0, 560.0, 610.0, 670.0], None),
+            (&[450.0, 550.0, 650.0, 850.0], None),
+            (&[900.0, 1000.0, 1200.0], None),
+            (&[550.0], None),
+            (&[450.0, 500.0, 610.0, 650.0], Some("no band lies between 500 and 610 nm:")),
+            (&[500.0, 510.0, 520.0, 700.0, 1300.0], Some("no band lies below 500 nm and between 520 and 700 nm:")),
+            (&[450.0, 500.0, 560.0], Some("no band lies above 560 nm:")),
+        ] {
+            let note = note_of_gaps("a", &WavelengthGrid::new(nm.to_vec()).unwrap());
+            assert_eq!(note.is_some(), said.is_some(), "{nm:?}: {note:?}");
+            assert!(said.is_none_or(|said| note.as_ref().is_some_and(|note| note.contains(said))), "{nm:?}: {note:?}");
+        }
     }
 
     fn scene(radiance: f32) -> Scene {

@@ -46,9 +46,12 @@ pub(super) fn without_unit(numbers: &[f64]) -> Option<Vec<f64>> {
     all(150.0..20_000.0).then(|| numbers.to_vec())
 }
 
-/// Whether numbers count bands, from 0 or 1.
+/// Whether numbers count bands, from 0 or 1, or are those of some of them, as 2, 3, 4 and 8 of a satellite.
 pub(super) fn are_counted(numbers: &[f64]) -> bool {
-    numbers.len() > 1 && numbers.windows(2).all(|pair| pair[1] - pair[0] == 1.0) && [0.0, 1.0].contains(&numbers[0])
+    let are_in_turn = numbers.windows(2).all(|pair| pair[1] - pair[0] == 1.0)
+        && numbers.first().is_some_and(|first| [0.0, 1.0].contains(first));
+    numbers.len() > 1
+        && (are_in_turn || numbers.iter().all(|number| number.fract() == 0.0 && (0.0..20.0).contains(number)))
 }
 
 /// Returns the wavelengths, nm, of a list beside a cube, as its unit says or as [`without_unit`]; `None` of a list that counts bands.
@@ -109,17 +112,55 @@ pub(super) fn unit_in(name: &str) -> Option<&str> {
         .or_else(|| name.rsplit(BETWEEN).find_map(|word| Some(&word[behind(&word)?..]).filter(is_unit)))
 }
 
-/// Returns the wavelengths, nm, of the column of a table, as the unit in its name says (`wavelength_nm`, `Wavelength (µm)`, `cm^-1`) or, where
-/// there is none, its numbers.
+/// Returns the wavelengths, nm, of the column of a table, as the unit in its name says (`wavelength_nm`, `Wavelength (µm)`, `cm^-1`), or that in a
+/// comment on wavelengths which they can be in, or, where there is none, its numbers.
 ///
 /// # Errors
-/// When its unit is not known, or its numbers are no likely wavelengths.
-pub fn wavelengths_of_column(name: &str, numbers: &[f64]) -> Result<Vec<f64>, String> {
+/// When its unit is not known, or its numbers are no likely wavelengths, or may be nm as well as Å.
+pub(super) fn wavelengths_of_column<'a>(
+    name: &str,
+    numbers: &[f64],
+    comments: impl IntoIterator<Item = &'a str>,
+) -> Result<Vec<f64>, String> {
     let bracketed = name.rsplit_once(['(', '[']).map(|(_, rest)| rest.trim_end_matches([')', ']', ' ']));
+    let can_be = |unit: &&str| {
+        let nm = in_nm(unit, numbers);
+        nm.is_some_and(|own| own.iter().all(|nm| PLAUSIBLE_NM.contains(nm)))
+    };
     let unit = bracketed.or_else(|| unit_in(name));
+    let unit = unit.or_else(|| comments.into_iter().filter_map(unit_of_waves).find(can_be));
+    if unit.is_none()
+        && !name.ends_with('A')
+        && !numbers.is_empty()
+        && numbers.iter().all(|number| *number >= MAYBE_ANGSTROM)
+    {
+        return Err(format!(
+            "its wavelengths, {} and more, have no unit and may be nm or Å: expected it in the name of their column",
+            shown(numbers.iter().copied().fold(f64::INFINITY, f64::min))
+        ));
+    }
     let name = if name.is_empty() { "first column" } else { name };
     let counted = || format!("its '{}' counts bands: expected wavelengths in nm", short(name));
     list_of(name, unit, numbers, "")?.ok_or_else(counted)
+}
+
+/// Numbers from which on wavelengths without a unit may be Å: no light of so many nm is seen.
+const MAYBE_ANGSTROM: f64 = 2500.0;
+
+/// Returns the comments of a table, which begin with #.
+pub(super) fn comments_of(text: &str) -> impl Iterator<Item = &str> {
+    text.lines().filter_map(|line| line.strip_prefix('#')).map(str::trim).filter(|comment| !comment.is_empty())
+}
+
+/// Returns the first unit behind a word for wavelengths, or that which a text begins with, as names of columns do.
+fn unit_of_waves(text: &str) -> Option<&str> {
+    let lower = text.to_lowercase();
+    let at = ["wavelength", "lambda", "wavenumber", "frequency"].iter().find_map(|word| lower.find(word));
+    let mut words = text.get(at.unwrap_or(0)..)?.split(|c: char| c.is_whitespace() || ",;:=[]()".contains(c));
+    match at {
+        Some(_) => words.find(|word| unit_in(word).is_some() || *word == "A"),
+        None => words.next().filter(|word| unit_in(word).is_some()),
+    }
 }
 
 /// Returns the wavelength of a text such as `450 nm`, `Band 450.5nm, FWHM 10 nm` or, of a band, `445-455 nm`: the first that it names.
@@ -199,6 +240,7 @@ mod tests {
         assert_eq!(of(None, &[0.45, 0.55]), Ok(Some(vec![450.0, 550.0])));
         assert_eq!(of(None, &[450.0, 550.0]), Ok(Some(vec![450.0, 550.0])));
         assert_eq!(of(None, &[1.0, 2.0, 3.0]), Ok(None));
+        assert_eq!(of(None, &[2.0, 3.0, 4.0, 8.0]), Ok(None));
         assert_eq!(of(Some("THz"), &[599.584_916]).map(|list| list.map(|list| list[0].round())), Ok(Some(500.0)));
         for (unit, numbers) in [(None, [22_222.0, 15_384.0]), (Some("zorp"), [1.0, 2.0]), (Some("um"), [450.0, 550.0])]
         {
@@ -225,11 +267,27 @@ mod tests {
             ("wavelength", 0.5),
             ("", 500.0),
         ] {
-            let nm = wavelengths_of_column(name, &[number]).map(|nm| nm[0].round());
+            let nm = wavelengths_of_column(name, &[number], []).map(|nm| nm[0].round());
             assert_eq!(nm, Ok(500.0), "{name}");
         }
-        assert!(wavelengths_of_column("waves (zorp)", &[500.0]).unwrap_err().contains("'zorp'"));
-        assert!(wavelengths_of_column("band", &[1.0, 2.0]).unwrap_err().contains("counts bands"));
+        assert!(wavelengths_of_column("waves (zorp)", &[500.0], []).unwrap_err().contains("'zorp'"));
+        assert!(wavelengths_of_column("band", &[1.0, 2.0], []).unwrap_err().contains("counts bands"));
+        // Comments say it where they can be right.
+        for (comment, number) in [
+            ("Wavelength (Angstroms), flux (W/um)", 5000.0),
+            ("lambda: A", 5000.0),
+            ("wavelength in angstrom", 5000.0),
+            ("Angstrom power", 5000.0),
+            ("Wavelength (1/cm), flux (erg/s/cm2/A)", 20_000.0),
+            ("1/cm power", 20_000.0),
+        ] {
+            assert_eq!(wavelengths_of_column("", &[number], [comment]), Ok(vec![500.0]), "{comment}");
+        }
+        for comment in ["made by A", "a slit of 10 um", "calibrated wavelengths, slit of 10 um"] {
+            assert!(wavelengths_of_column("", &[5000.0], [comment]).unwrap_err().contains("nm or Å"), "{comment}");
+            assert_eq!(wavelengths_of_column("", &[500.0], [comment]), Ok(vec![500.0]), "{comment}");
+        }
+        assert_eq!(wavelengths_of_column("nm", &[5000.0], ["wavelength in Å"]), Ok(vec![5000.0]));
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Words that nobody knows, put into every format at random: each is named in the notes, every time. Headers that are cut off, huge or
 //! contradict themselves are refused in one sentence.
 //!
-//! `DIOPTRIC_FUZZ_CASES=1000000 cargo test --release --workspace --lib -- unknown_words` makes that many files a format.
+//! `DIOPTRIC_FUZZ_CASES=10000 TMPDIR=/dev/shm cargo test --workspace --lib -- word_tests` puts a hundred times as many words into files of each format.
 
 use std::{fs, path::Path};
 
@@ -35,10 +35,48 @@ pub(super) fn word(rng: &mut ChaCha8Rng) -> String {
     format!("zq{tail}")
 }
 
-/// Checks that a word in a file is named, or the file refused by its name.
-fn check_named(path: &Path, options: &ReadOptions, word: &str) {
+/// How many words are put into files of each reader: by `DIOPTRIC_FUZZ_CASES` a hundred a case.
+fn n_words() -> usize {
+    100 * n_cases()
+}
+
+/// Makes files until all words are used up, each with one word or with up to some hundreds, no two alike.
+fn with_words(seed: u64, check: impl Fn(&mut ChaCha8Rng, &[String])) {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut n_left = n_words();
+    while n_left > 0 {
+        let n = 1 + (400.0 * rng.random::<f64>().powi(3)) as usize;
+        // The last tells words of one file apart.
+        let own: Vec<String> = (0..n).map(|i| format!("{}q{i}q", word(&mut rng))).collect();
+        check(&mut rng, &own);
+        n_left = n_left.saturating_sub(n);
+    }
+}
+
+/// Puts lines that words are made into among others.
+fn among(
+    rng: &mut ChaCha8Rng,
+    lines: &[&str],
+    words: &[String],
+    line: impl Fn(&mut ChaCha8Rng, &str) -> String,
+) -> Vec<String> {
+    let mut all: Vec<String> = lines.iter().map(|line| (*line).to_owned()).collect();
+    for word in words {
+        let line = line(rng, word);
+        all.insert(rng.random_range(0..=all.len()), line);
+    }
+    all
+}
+
+/// Checks that each of the words in a file is named, those that a note has no room for by their number.
+fn check_named(path: &Path, options: &ReadOptions, words: &[String]) {
     match read_scene(path, options) {
-        Ok(scene) => assert!(scene.notes.iter().any(|note| note.contains(word)), "{word}: {:?}", scene.notes),
+        Ok(scene) => {
+            let notes = scene.notes.join("\n");
+            let more = notes.split(" and ").filter_map(|part| part.split_once(" more")?.0.parse::<usize>().ok());
+            let n_named = words.iter().filter(|word| notes.contains(word.as_str())).count();
+            assert_eq!(n_named + more.sum::<usize>(), words.len(), "{words:?}: {:?}", scene.notes);
+        }
         Err(error) => {
             let message = error.to_string();
             assert!(
@@ -53,78 +91,77 @@ fn check_named(path: &Path, options: &ReadOptions, word: &str) {
 #[test]
 fn unknown_words_of_arrays_are_named() {
     alone(|| {
-        let mut rng = ChaCha8Rng::seed_from_u64(11);
         let (_a, packed) = folder_and("a.npz");
         let (_b, mat) = folder_and("a.mat");
         let (_c, h5) = folder_and("a.h5");
-        for _ in 0..n_cases() {
-            let word = word(&mut rng);
-            let options = told(Some(FileQuantity::Reflectance), Some("yxb"), false);
+        let options = told(Some(FileQuantity::Reflectance), Some("yxb"), false);
+        with_words(11, |rng, words| {
             let one = npy("<f8", false, "(1,)", &1.0_f64.to_le_bytes());
-            let bytes = zip_of(&[("cube", npy_of("<f4", "yxb")), ("wave", waves_npy()), (&word, one)], false);
-            fs::write(&packed, bytes).unwrap();
-            check_named(&packed, &options, &word);
-            let turned = in_order("bxy");
-            let cube = variable_of("cube", &sides("yxb"), 6, &turned);
-            let others = [variable_of("wave", &[5, 1], 6, &WAVE_NM), variable_of(&word, &[1, 2], 7, &[1.0, 2.0])];
-            fs::write(&mat, mat_file(&[vec![cube], others.to_vec()].concat())).unwrap();
-            check_named(&mat, &options, &word);
+            let mut arrays = vec![("cube", npy_of("<f4", "yxb")), ("wave", waves_npy())];
+            for word in words {
+                arrays.insert(rng.random_range(0..=arrays.len()), (word, one.clone()));
+            }
+            fs::write(&packed, zip_of(&arrays, false)).unwrap();
+            check_named(&packed, &options, words);
+            let mut variables = vec![
+                variable_of("cube", &sides("yxb"), 6, &in_order("bxy")),
+                variable_of("wave", &[5, 1], 6, &WAVE_NM),
+            ];
             let mut file = hdf5_pure::FileBuilder::new();
             file.create_dataset("cube").with_data(&in_order("yxb")).with_shape(&[3, 4, 5]);
             file.create_dataset("wave").with_data(&WAVE_NM).with_shape(&[5]);
-            file.create_dataset(&word).with_data(&[1.0, 2.0]).with_shape(&[2]);
+            for word in words {
+                let class = [6, 7, 9][rng.random_range(0..3)];
+                variables.insert(rng.random_range(0..=variables.len()), variable_of(word, &[1, 2], class, &[1.0, 2.0]));
+                file.create_dataset(word).with_data(&[1.0, 2.0]).with_shape(&[2]);
+            }
+            fs::write(&mat, mat_file(&variables)).unwrap();
+            check_named(&mat, &options, words);
             fs::write(&h5, file.finish().unwrap()).unwrap();
-            check_named(&h5, &options, &word);
-        }
+            check_named(&h5, &options, words);
+        });
     });
 }
 
 #[test]
 fn unknown_words_of_headers_are_named() {
     alone(|| {
-        let mut rng = ChaCha8Rng::seed_from_u64(12);
         let (_a, envi) = folder_and("a.hdr");
         let (_b, exr) = folder_and("a.exr");
         fs::write(envi.with_extension("raw"), bytes_as("<f4", &in_order("byx"))).unwrap();
-        for case in 0..n_cases() {
-            let word = word(&mut rng);
-            let waves = WAVE_NM.map(|nm| nm.to_string()).join(", ");
-            let value = ["1", "{1, 2, 3}", "some words", "{\n a,\n b}"][case % 4];
-            let mut lines: Vec<String> = [
-                format!("samples = {COLUMNS}"),
-                format!("lines = {ROWS}"),
-                "bands = 5".to_owned(),
-                "data type = 4".to_owned(),
-                "interleave = bsq".to_owned(),
-                "byte order = 0".to_owned(),
-                format!("wavelength = {{{waves}}}"),
-            ]
-            .to_vec();
-            lines.insert(rng.random_range(0..=lines.len()), format!("{word} = {value}"));
+        let waves = format!("wavelength = {{{}}}", WAVE_NM.map(|nm| nm.to_string()).join(", "));
+        let samples = format!("samples = {COLUMNS}");
+        let rows = format!("lines = {ROWS}");
+        let lines = [&samples, &rows, "bands = 5", "data type = 4", "interleave = bsq", "byte order = 0", &waves];
+        let value = |rng: &mut ChaCha8Rng| ["1", "{1, 2, 3}", "some words", "{\n a,\n b}"][rng.random_range(0..4)];
+        let reflecting = told(Some(FileQuantity::Reflectance), None, false);
+        with_words(12, |rng, words| {
+            let lines = among(rng, &lines, words, |rng, word| format!("{word} = {}", value(rng)));
             fs::write(&envi, format!("ENVI\n{}\n", lines.join("\n"))).unwrap();
-            check_named(&envi, &told(Some(FileQuantity::Reflectance), None, false), &word);
-            // An attribute of the header, or a channel.
+            check_named(&envi, &reflecting, words);
+            // Attributes of the header, and channels.
             let samples = || FlatSamples::F32(vec![0.5; 4]);
             let mut channels: Vec<_> = ["R", "G", "B"].map(|name| AnyChannel::new(name, samples())).to_vec();
             let mut attributes = LayerAttributes::default();
-            if case % 2 == 0 {
-                channels.push(AnyChannel::new(word.as_str(), samples()));
-            } else {
-                attributes.other.insert(Text::from(word.as_str()), AttributeValue::Text(Text::from("x")));
+            for word in words {
+                if rng.random() {
+                    channels.push(AnyChannel::new(word.as_str(), samples()));
+                } else {
+                    attributes.other.insert(Text::from(word.as_str()), AttributeValue::Text(Text::from("x")));
+                }
             }
             let list: SmallVec<[_; 4]> = channels.into_iter().collect();
             let layer = Layer::new((2, 2), attributes, Encoding::FAST_LOSSLESS, AnyChannels::sort(list));
             Image::from_layer(layer).write().to_file(&exr).unwrap();
-            check_named(&exr, &ReadOptions::default(), &word);
-        }
+            check_named(&exr, &ReadOptions::default(), words);
+        });
     });
 }
 
-/// Camera files of each kind beside a picture: a key that nobody knows stands among theirs.
+/// Camera files of each kind beside a picture: keys that nobody knows stand among theirs.
 #[test]
 fn unknown_words_of_camera_files_are_named() {
     alone(|| {
-        let mut rng = ChaCha8Rng::seed_from_u64(14);
         let (_folder, picture) = folder_and("a.png");
         dioptric_pictures::save(&image::GrayImage::from_pixel(6, 4, image::Luma([99])).into(), &picture).unwrap();
         let camera = picture.with_file_name("a.camera.json");
@@ -132,56 +169,81 @@ fn unknown_words_of_camera_files_are_named() {
             ["\"width\": 6", "\"height\": 4", "\"fx_px\": 5", "\"fy_px\": 5", "\"cx_px\": 2.5", "\"cy_px\": 1.5"];
         let nerf = ["\"w\": 6", "\"h\": 4", "\"fl_x\": 5", "\"fl_y\": 5", "\"cx\": 3", "\"cy\": 2", "\"frames\": []"];
         let open3d = ["\"width\": 6", "\"height\": 4", "\"intrinsic_matrix\": [5, 0, 0, 0, 5, 0, 2.5, 1.5, 1]"];
-        let kinds: [&[&str]; 3] = [&ours, &nerf, &open3d];
-        for case in 0..n_cases() {
-            let word = word(&mut rng);
-            let mut lines: Vec<String> = kinds[case % 3].iter().map(|line| (*line).to_owned()).collect();
-            let value = ["1", "\"text\"", "[1, 2]", "{\"a\": 1}", "true"][rng.random_range(0..5)];
-            lines.insert(rng.random_range(0..=lines.len()), format!("\"{word}\": {value}"));
-            fs::write(&camera, format!("{{{}}}", lines.join(", "))).unwrap();
-            check_named(&picture, &ReadOptions::default(), &word);
-            // OpenCV's YAML, by its own name.
-            let matrix = "camera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   data: [5., 0., 2.5, 0., 5., 1.5, 0., 0., 1.]\n";
-            let mut parts = vec!["image_width: 6\n".to_owned(), "image_height: 4\n".to_owned(), matrix.to_owned()];
-            parts.insert(rng.random_range(0..=parts.len()), format!("{word}: 1.5\n"));
-            let yaml = picture.with_file_name("view.yml");
-            fs::write(&yaml, format!("%YAML:1.0\n---\n{}", parts.concat())).unwrap();
-            fs::remove_file(&camera).unwrap();
-            let mut options = ReadOptions::default();
-            options.reading.view = Some(yaml);
-            check_named(&picture, &options, &word);
+        let value = |rng: &mut ChaCha8Rng| ["1", "\"text\"", "[1, 2]", "{\"a\": 1}", "true"][rng.random_range(0..5)];
+        for kind in [&ours[..], &nerf, &open3d] {
+            with_words(14, |rng, words| {
+                let lines = among(rng, kind, words, |rng, word| format!("\"{word}\": {}", value(rng)));
+                fs::write(&camera, format!("{{{}}}", lines.join(", "))).unwrap();
+                check_named(&picture, &ReadOptions::default(), words);
+            });
         }
+        fs::remove_file(&camera).unwrap();
+        // OpenCV's YAML, by its own name.
+        let matrix = "camera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   data: [5., 0., 2.5, 0., 5., 1.5, 0., 0., 1.]\n";
+        let parts = ["image_width: 6\n", "image_height: 4\n", matrix];
+        let yaml = picture.with_file_name("view.yml");
+        let mut options = ReadOptions::default();
+        options.reading.view = Some(yaml.clone());
+        with_words(15, |rng, words| {
+            let parts = among(rng, &parts, words, |_, word| format!("{word}: 1.5\n"));
+            fs::write(&yaml, format!("%YAML:1.0\n---\n{}", parts.concat())).unwrap();
+            check_named(&picture, &options, words);
+        });
     });
 }
 
-/// Files and pictures beside those of a folder, fields of structures, lines of headers.
+/// Files and pictures beside those of a folder, fields of structures, items of TIFF files.
 #[test]
 fn unknown_words_of_folders_and_structures_are_named() {
     alone(|| {
-        let mut rng = ChaCha8Rng::seed_from_u64(15);
         let folder = tempfile::tempdir().unwrap();
         for nm in [450, 550, 650] {
             let plane = image::ImageBuffer::from_pixel(4, 3, image::Luma([30_000_u16]));
             dioptric_pictures::save(&plane.into(), &folder.path().join(format!("a_{nm}.png"))).unwrap();
         }
         let gray: image::DynamicImage = image::GrayImage::from_pixel(4, 3, image::Luma([9])).into();
-        for _ in 0..n_cases() {
-            let word = word(&mut rng);
-            let other = folder.path().join(format!("{word}.png"));
-            dioptric_pictures::save(&gray, &other).unwrap();
-            check_named(folder.path(), &ReadOptions::default(), &word);
-            fs::remove_file(&other).unwrap();
-        }
+        let gray = dioptric_pictures::encode(&gray, image::ImageFormat::Png).unwrap();
+        with_words(16, |rng, words| {
+            // Words that end in no number are no bands.
+            let words: Vec<String> = words.iter().map(|word| format!("{word}x")).collect();
+            let ending = |rng: &mut ChaCha8Rng| ["png", "tif", "jpg", "json", "bin"][rng.random_range(0..5)];
+            let names: Vec<String> = words.iter().map(|word| format!("{word}.{}", ending(rng))).collect();
+            names.iter().for_each(|name| fs::write(folder.path().join(name), &gray).unwrap());
+            check_named(folder.path(), &ReadOptions::default(), &words);
+            names.iter().for_each(|name| fs::remove_file(folder.path().join(name)).unwrap());
+        });
         let (_scene, mat) = folder_and("a.mat");
         let scene =
             fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures/scenes/iset_plain.mat")).unwrap();
-        for _ in 0..n_cases() {
-            let word = word(&mut rng);
-            // A variable beside the structure.
-            let more = variable_of(&word, &[1, 2], 7, &[1.0, 2.0]);
+        with_words(17, |_, words| {
+            // Variables beside the structure.
+            let more: Vec<u8> = words.iter().flat_map(|word| variable_of(word, &[1, 2], 7, &[1.0, 2.0])).collect();
             fs::write(&mat, [scene.clone(), more].concat()).unwrap();
-            check_named(&mat, &ReadOptions::default(), &word);
-        }
+            check_named(&mat, &ReadOptions::default(), words);
+        });
+        let (_tiff, tiff) = folder_and("a.tif");
+        let options = ReadOptions { white_level: None, ..told(Some(FileQuantity::Reflectance), None, true) };
+        with_words(18, |rng, words| {
+            let (json, items) = words.split_at(rng.random_range(0..=words.len()));
+            let json: Vec<String> = json.iter().map(|word| format!("\"{word}\": 1")).collect();
+            let items: Vec<String> = items.iter().map(|word| format!("<Item name=\"{word}\">1</Item>")).collect();
+            let mut encoder = tiff::encoder::TiffEncoder::new(fs::File::create(&tiff).unwrap()).unwrap();
+            for index in 0..WAVE_NM.len() {
+                let mut page = encoder.new_image::<tiff::encoder::colortype::Gray32Float>(4, 3).unwrap();
+                if index == 0 {
+                    let text = format!(
+                        "{{\"shape\": [5, 3, 4]{}}}",
+                        json.iter().map(|own| format!(", {own}")).collect::<String>()
+                    );
+                    page.encoder().write_tag(tiff::tags::Tag::ImageDescription, text.as_str()).unwrap();
+                    let text = format!("<GDALMetadata>{}</GDALMetadata>", items.concat());
+                    page.encoder().write_tag(tiff::tags::Tag::Unknown(42112), text.as_str()).unwrap();
+                }
+                page.write_data(&[0.5; 12]).unwrap();
+            }
+            drop(encoder);
+            check_named(&tiff, &options, words);
+        });
     });
 }
 
@@ -189,7 +251,6 @@ fn unknown_words_of_folders_and_structures_are_named() {
 #[test]
 fn lines_of_radiance_pictures_are_obeyed_or_named() {
     alone(|| {
-        let mut rng = ChaCha8Rng::seed_from_u64(16);
         let (_folder, path) = folder_and("a.hdr");
         let picture = |lines: &str| {
             // Mantissas of 128 and an exponent of 129 are 1: flat scanlines of fewer than 8 pixels.
@@ -211,11 +272,11 @@ fn lines_of_radiance_pictures_are_obeyed_or_named() {
             let (_, notes) = luminance(&format!("{line}\n"));
             assert!(notes.iter().any(|note| note.contains(line)), "{line}: {notes:?}");
         }
-        for _ in 0..n_cases() {
-            let word = word(&mut rng).to_uppercase();
-            let (_, notes) = luminance(&format!("{word}=1 2 3\n"));
-            assert!(notes.iter().any(|note| note.contains(&word)), "{word}: {notes:?}");
-        }
+        with_words(19, |_, words| {
+            let lines: String = words.iter().map(|word| format!("{word}=1 2 3\n")).collect();
+            fs::write(&path, picture(&lines)).unwrap();
+            check_named(&path, &ReadOptions::default(), words);
+        });
     });
 }
 

@@ -11,7 +11,7 @@ use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 
 use self::leaves::Leaves;
-use crate::{Scene, SceneError, SceneLight};
+use crate::{Scene, SceneError, SceneLight, formats::note_of_gaps};
 
 /// The radii that leaves may have, samples: smaller ones take long to cover a target and show nothing.
 const MIN_LEAF_PX: f64 = 0.1;
@@ -305,6 +305,7 @@ impl Target {
         // White is a perfect diffuser.
         let mut notes = self.beyond_measured(grid, &illuminant);
         notes.extend(levels::unresolved(self));
+        notes.extend(note_of_gaps(self.name(), grid));
         let light = Some(SceneLight::new(illuminant, std::f64::consts::PI * self.luminance_cd_m2));
         Scene { light, notes, ..Scene::new(self.name(), radiance) }
             .or_flat_depth_m(self.distance_m)?

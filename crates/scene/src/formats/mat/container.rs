@@ -10,7 +10,7 @@ use flate2::read::ZlibDecoder;
 use super::{
     super::unusable::{TRUNCATED, check_memory, unreadable},
     elements::{self, LIMIT_ARRAYS, LIMIT_DEPTH, Listed},
-    hdf5::Hdf5,
+    hdf5::{Entry, Hdf5},
     packing::Attribute,
 };
 use crate::SceneError;
@@ -39,8 +39,20 @@ pub(super) struct MatFile {
     pub(super) listed: Vec<Listed>,
     /// What is stated of those of HDF5 besides their numbers.
     attributes: Vec<(String, Vec<Attribute>)>,
-    /// What those of HDF5 are in words, and the names of their axes.
-    words: Vec<(String, String, Vec<String>)>,
+    /// What is said of those of HDF5.
+    said: Vec<Said>,
+}
+
+/// What is said of a variable besides its numbers and attributes.
+#[derive(Debug)]
+struct Said {
+    name: String,
+    /// What it is in words.
+    words: String,
+    /// The names of its axes.
+    axes: Vec<String>,
+    /// The paths of the scales of each.
+    scales: Vec<Vec<String>>,
 }
 
 /// An array: its sides, and what it holds.
@@ -108,9 +120,15 @@ impl MatFile {
         }
         let own = entries.iter().map(|entry| (entry.listed.name.clone(), entry.attributes.clone()));
         let attributes = std::iter::once((WHOLE.to_owned(), file.attributes())).chain(own).collect();
-        let words = entries.iter().map(|own| (own.listed.name.clone(), own.words.clone(), own.axes.clone())).collect();
+        let said = |own: &Entry| Said {
+            name: own.listed.name.clone(),
+            words: own.words.clone(),
+            axes: own.axes.clone(),
+            scales: own.scales.clone(),
+        };
+        let said = entries.iter().map(said).collect();
         let listed = entries.into_iter().map(|entry| entry.listed).collect();
-        Ok(Self { is_big_endian: false, is_row_major: !file.is_matlab, variables, listed, attributes, words })
+        Ok(Self { is_big_endian: false, is_row_major: !file.is_matlab, variables, listed, attributes, said })
     }
 
     fn parse(bytes: &[u8], wanted: &dyn Fn(&Listed) -> bool) -> Result<Self, String> {
@@ -137,7 +155,7 @@ impl MatFile {
             variables.extend(content.map(|content| (own.name.clone(), content)));
             listed.push(own);
         }
-        Ok(Self { is_big_endian, is_row_major: false, variables, listed, attributes: vec![], words: vec![] })
+        Ok(Self { is_big_endian, is_row_major: false, variables, listed, attributes: vec![], said: vec![] })
     }
 
     /// What is stated of a variable besides its numbers.
@@ -147,7 +165,12 @@ impl MatFile {
 
     /// Returns what a variable is called in words, and the names of its axes; both empty where nothing is stated.
     pub(super) fn words_of(&self, name: &str) -> (&str, &[String]) {
-        self.words.iter().find(|(own, ..)| own == name).map_or(("", &[]), |(_, words, axes)| (words, axes))
+        self.said.iter().find(|own| own.name == name).map_or(("", &[]), |own| (&own.words, &own.axes))
+    }
+
+    /// Returns the paths of the scales of each axis of a variable; several where nothing says which is its own.
+    pub(super) fn scales_of(&self, name: &str) -> &[Vec<String>] {
+        self.said.iter().find(|own| own.name == name).map_or(&[], |own| &own.scales)
     }
 
     /// Returns a variable, or a field of a structure as `data.cube`; `None` where the file has none of this name.
@@ -394,7 +417,7 @@ impl Header<'_> {
     fn listed(self) -> Listed {
         let has_numbers = (6..=15).contains(&self.class);
         let [is_numeric, is_complex] = [false, true].map(|is_complex| has_numbers && self.is_complex == is_complex);
-        Listed { name: self.name, sides: self.sides, is_numeric, is_complex }
+        Listed { name: self.name, sides: self.sides, is_numeric, is_complex, is_list: false }
     }
 }
 

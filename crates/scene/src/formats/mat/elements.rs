@@ -14,6 +14,8 @@ pub(super) struct Listed {
     pub(super) is_numeric: bool,
     /// Whether it is one of complex numbers.
     pub(super) is_complex: bool,
+    /// Whether it may be a list of wavelengths whatever its name: the scale of an axis of another, or one that is called so in words.
+    pub(super) is_list: bool,
 }
 
 /// Classes of arrays.

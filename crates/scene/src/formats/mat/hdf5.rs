@@ -39,13 +39,15 @@ pub(super) struct Entry {
     pub(super) words: String,
     /// The names of its axes, in the order of its sides; none where nothing is stated of them.
     pub(super) axes: Vec<String>,
+    /// The paths of the scales of each; several where nothing says which is its own.
+    pub(super) scales: Vec<Vec<String>>,
     dimensions: Dimensions,
 }
 
 impl Entry {
     fn without_content(listed: Listed, path: String, is_group: bool) -> Self {
-        let (attributes, words, axes, dimensions) = (vec![], String::new(), vec![], Dimensions::default());
-        Self { listed, path, is_group, n_bytes: 0, attributes, words, axes, dimensions }
+        let (attributes, words, axes, scales) = (vec![], String::new(), vec![], vec![]);
+        Self { listed, path, is_group, n_bytes: 0, attributes, words, axes, scales, dimensions: Dimensions::default() }
     }
 }
 
@@ -87,13 +89,16 @@ impl Hdf5 {
             .iter()
             .filter_map(|entry| Some((entry.listed.name.as_str(), one(entry)?, &entry.dimensions)))
             .collect();
-        let axes: Vec<_> = entries.iter().map(|entry| entry.dimensions.axes(&entry.listed.sides, &scales)).collect();
-        entries.iter_mut().zip(axes).for_each(|(entry, axes)| entry.axes = axes);
+        let own: Vec<_> = entries.iter().map(|entry| entry.dimensions.scales(&entry.listed.sides, &scales)).collect();
+        for (entry, scales) in entries.iter_mut().zip(own) {
+            entry.axes = entry.dimensions.axes(entry.listed.sides.len(), &scales);
+            entry.scales = scales;
+        }
         // What is but the name and the length of an axis.
         entries.retain(|entry| !entry.dimensions.is_bare);
         for (name, target) in &self.links {
             let name = format!("{name} (a link to {target})");
-            let listed = Listed { name, sides: vec![], is_numeric: false, is_complex: false };
+            let listed = Listed { name, sides: vec![], is_numeric: false, is_complex: false, is_list: false };
             entries.push(Entry::without_content(listed, String::new(), false));
         }
         Ok(entries)
@@ -107,7 +112,8 @@ impl Hdf5 {
             let path = format!("{before}{name}");
             // A link to what is not there, or not here, is known by its name alone.
             let Ok(dataset) = group.dataset(&name) else {
-                let listed = Listed { name: path.clone(), sides: vec![], is_numeric: false, is_complex: false };
+                let listed =
+                    Listed { name: path.clone(), sides: vec![], is_numeric: false, is_complex: false, is_list: false };
                 entries.push(Entry::without_content(listed, path, false));
                 continue;
             };
@@ -115,9 +121,10 @@ impl Hdf5 {
             let is_numeric = class_of(&dataset).is_ok_and(|class| class.is_some());
             let n_bytes = sides.iter().map(|side| *side as u64).fold(8, u64::saturating_mul);
             let is_complex = dataset.dtype().is_ok_and(|kind| is_complex(&kind));
-            let listed = Listed { name: path.clone(), sides, is_numeric, is_complex };
-            let attributes = telling(dataset.attrs(), dataset.attr_datatypes());
             let (words, dimensions) = (words_of(&dataset), Dimensions::of(&dataset));
+            let is_list = dimensions.is_scale || words.contains(RADIATION);
+            let listed = Listed { name: path.clone(), sides, is_numeric, is_complex, is_list };
+            let attributes = telling(dataset.attrs(), dataset.attr_datatypes());
             entries.push(Entry {
                 n_bytes,
                 attributes,
@@ -133,7 +140,13 @@ impl Hdf5 {
             }
             let path = format!("{before}{name}");
             if self.is_matlab {
-                let listed = Listed { name: path.clone(), sides: vec![1, 1], is_numeric: false, is_complex: false };
+                let listed = Listed {
+                    name: path.clone(),
+                    sides: vec![1, 1],
+                    is_numeric: false,
+                    is_complex: false,
+                    is_list: false,
+                };
                 entries.push(Entry::without_content(listed, path, true));
             } else {
                 let group = group.group(&name).map_err(broken)?;
@@ -206,6 +219,9 @@ impl Hdf5 {
         elements::stored(name, &sides, class, &numbers).ok_or_else(too_large)
     }
 }
+
+/// What standard names call wavelengths (Climate and Forecast, `standard_name` table).
+pub(super) const RADIATION: &str = "radiation_wavelength";
 
 /// Attributes that call an array something.
 pub(super) const NAMING: [&str; 2] = ["long_name", "standard_name"];

@@ -14,7 +14,7 @@ use super::{
         unusable::{unreadable, unwritable},
     },
     container::{MatArray, MatFile},
-    elements::{self, Listed},
+    elements,
     iset_kinds::{self, OPTICAL_IMAGES, structure_of},
     iset_write::{data, named, spectrum},
     isetcam::{Cube, ascending, light_of, white_of},
@@ -36,10 +36,14 @@ pub struct IsetIrradiance {
     pub notes: Vec<String>,
 }
 
-/// Whether a MATLAB file holds an optical image of `ISETCam`; not where it cannot be read.
-pub fn holds_iset_irradiance(path: &Path) -> bool {
-    let is_film = |own: &Listed| !own.is_numeric && OPTICAL_IMAGES.contains(&own.name.as_str());
-    MatFile::read(path, &|_| false).is_ok_and(|file| file.listed.iter().any(is_film))
+/// Whether a MATLAB file holds an optical image of `ISETCam`, of the name told or without a scene beside it; not where it cannot be read.
+pub fn holds_iset_irradiance(path: &Path, told: Option<&str>) -> bool {
+    let Ok(file) = MatFile::read(path, &|_| false) else { return false };
+    let has = |name: &str| file.listed.iter().any(|own| !own.is_numeric && own.name == name);
+    match told {
+        Some(told) => OPTICAL_IMAGES.contains(&told) && has(told),
+        None => OPTICAL_IMAGES.into_iter().any(has) && !has("scene"),
+    }
 }
 
 /// Reads an optical image of `ISETCam`.

@@ -21,6 +21,7 @@ use super::{
     },
     container::{Content, MatArray, MatFile, WHOLE},
     elements::Listed,
+    hdf5::RADIATION,
     iset_kinds,
     packing::{Nearness, Packing, Value, is_wave_unit, nearest_list, rank_of_waves},
 };
@@ -105,7 +106,7 @@ pub(in super::super) struct IsetScene {
 pub(in super::super) fn read_mat(path: &Path, reading: &FileReading) -> Result<MatScene, SceneError> {
     let told = reading.variable.as_deref();
     let is_cube = |own: &Listed| own.is_numeric && own.sides.len() == 3;
-    let is_list = |own: &Listed| rank_of_waves(last_part(&own.name)).is_some() && own.is_numeric;
+    let is_list = |own: &Listed| (own.is_list || rank_of_waves(last_part(&own.name)).is_some()) && own.is_numeric;
     let wanted = |own: &Listed| {
         let name = own.name.as_str();
         match told {
@@ -233,7 +234,8 @@ fn cube_of(path: &Path, file: &MatFile, name: &str, reading: &FileReading) -> Re
         format!("its '{name}' is {what}, expected numbers{way}")
     })?;
     let packing = Packing::of(file.attributes_of(name));
-    let waves = waves_of(file, name, &array.sides, reading.wavelengths_nm.is_some())?;
+    let (order, named) = axes::order(file.words_of(name).1, reading.axes.as_deref());
+    let waves = waves_of(file, name, &array.sides, order.as_deref(), reading.wavelengths_nm.is_some())?;
     // What is known by name gives way to what is told.
     let known = KNOWN
         .iter()
@@ -252,7 +254,6 @@ fn cube_of(path: &Path, file: &MatFile, name: &str, reading: &FileReading) -> Re
     let unit = UnitOf::read(packing.unit.as_deref());
     let packing = if matches!(unit, UnitOf::Light(..)) { packing } else { packing.of_reflectances() };
     let percent = if matches!(unit, UnitOf::Percent) && packing.white.is_none() { 0.01 } else { 1.0 };
-    let (order, named) = axes::order(file.words_of(name).1, reading.axes.as_deref());
     let planes = axes::planes(&array.sides, order.as_deref(), n_bands, file.is_row_major, |index| {
         (percent * packing.unpacked(numbers.at(index))) as f32
     })?;
@@ -324,8 +325,15 @@ struct Waves {
     left: Vec<String>,
 }
 
-/// Returns the list of wavelengths beside a cube of these sides; none where wavelengths are told and the list is no likely one.
-fn waves_of(file: &MatFile, cube: &str, sides: &[usize], is_told: bool) -> Result<Option<Waves>, String> {
+/// Returns the list of wavelengths beside a cube of these sides, whose axes are in this order where it is known; none where wavelengths are told
+/// and the list is no likely one.
+fn waves_of(
+    file: &MatFile,
+    cube: &str,
+    sides: &[usize],
+    order: Option<&str>,
+    is_told: bool,
+) -> Result<Option<Waves>, String> {
     // Those of the structure that the cube is in before all others.
     let inner = match cube.rsplit_once('.') {
         Some((outer, _)) => file.array(outer)?.map(|array| array.numeric_fields(outer)).unwrap_or_default(),
@@ -333,7 +341,25 @@ fn waves_of(file: &MatFile, cube: &str, sides: &[usize], is_told: bool) -> Resul
     };
     let names = inner.iter().map(|(name, _)| name).chain(file.listed.iter().map(|own| &own.name));
     let rank = |own: &&String| rank_of_waves(last_part(own).rsplit('.').next().unwrap_or_default());
-    let mut lists: Vec<&String> = names.filter(|own| *own != cube && rank(own).is_some()).collect();
+    let names: Vec<&String> = names.filter(|own| *own != cube).collect();
+    // What standard names call it, whatever its own.
+    let is_said = |own: &String| file.words_of(own).0.contains(RADIATION);
+    // The only scale of the axis of bands is one whatever it is called: of the axis that is named so, or that alone is as long as a list.
+    let n_of =
+        |own: &str| file.listed.iter().find(|listed| listed.name == own).map(|listed| listed.sides.iter().product());
+    let as_long = |own: &&String| {
+        let mut alike = (0..sides.len()).filter(|axis| Some(sides[*axis]) == n_of(own));
+        alike.next().filter(|_| alike.next().is_none())
+    };
+    let bands = order
+        .and_then(|order| order.find('b'))
+        .or_else(|| names.iter().filter(|own| rank(own).is_some() || is_said(own)).find_map(as_long));
+    let is_scale = |own: &String| {
+        let mut scales = file.scales_of(cube).iter().enumerate();
+        scales.any(|(axis, all)| all[..] == [own.as_str()] && bands == Some(axis))
+    };
+    let is_list = |own: &&String| rank(own).is_some() || is_scale(own) || is_said(own);
+    let mut lists: Vec<&String> = names.iter().copied().filter(is_list).collect();
     // Those along a dimension of the cube before others.
     let axes = file.words_of(cube).1;
     // As netCDF has them ("Climate and Forecast", 5).
@@ -342,11 +368,14 @@ fn waves_of(file: &MatFile, cube: &str, sides: &[usize], is_told: bool) -> Resul
         _ => None,
     });
     let nearness = |own: &String| {
-        let is_own = |axis: &String| axis.split(" or ").any(|name| name == last_part(own));
+        let is_own = || match file.scales_of(cube) {
+            [] => axes.iter().any(|axis| axis == last_part(own)),
+            scales => scales.iter().flatten().any(|scale| scale == own),
+        };
         let is_coordinate = || coordinates.is_some_and(|all| all.split_whitespace().any(|word| word == last_part(own)));
         let is_along = || file.words_of(own).1.iter().any(|axis| axes.contains(axis));
         Nearness::of(cube, own).with_axis(match () {
-            () if axes.iter().any(is_own) => 0,
+            () if is_own() => 0,
             () if is_coordinate() => 1,
             () if is_along() => 2,
             () => 3,
@@ -371,10 +400,9 @@ fn waves_of(file: &MatFile, cube: &str, sides: &[usize], is_told: bool) -> Resul
                 lefts.push(left);
                 found.push((own.clone(), nearness(own), nm));
             }
-            // A list that counts bands is none.
-            Ok(None) if found.is_empty() => return Ok(None),
+            // A list that counts bands is none, nor is a scale of other numbers.
             Err(_) if is_told && found.is_empty() => return Ok(None),
-            Err(reason) if found.is_empty() => return Err(reason),
+            Err(reason) if found.is_empty() && rank(&own).is_some() => return Err(reason),
             Ok(None) | Err(_) => {}
         }
     }

@@ -25,4 +25,4 @@ use isetcam::IsetScene;
 pub(super) use isetcam::{MatScene, UnitOf, read_mat};
 pub(super) use packing::{Nearness, nearest_list, rank_of_waves};
 pub use plane::read_mat_matrices;
-pub(super) use plane::{DEPTHS, Plane, read_plane};
+pub(super) use plane::{DEPTHS, Plane, has_variable, read_plane};

@@ -3,7 +3,7 @@
 use super::super::{
     depth_names::words_of,
     stated::short,
-    wavelength_unit::{in_nm, listed_nm, unit_in},
+    wavelength_unit::{listed_nm, unit_in},
 };
 
 /// Names of the list of wavelengths beside a cube, the likelier first.
@@ -41,7 +41,7 @@ impl Nearness {
         let group = if of_cube.starts_with(&of_list) { of_cube.len() - of_list.len() } else { ELSEWHERE };
         let own = words_of(&cube);
         let is_plain =
-            |word: &String| word.contains("wave") || PLAIN.contains(&word.as_str()) || in_nm(word, &[]).is_some();
+            |word: &String| word.contains("wave") || PLAIN.contains(&word.as_str()) || unit_in(word).is_some();
         let rest: Vec<String> = words_of(&list).into_iter().filter(|word| !is_plain(word)).collect();
         let words = match rest.iter().all(|word| own.contains(word)) {
             true if !rest.is_empty() => 0,

@@ -36,6 +36,11 @@ pub(in super::super) struct Plane {
     pub(in super::super) words: String,
 }
 
+/// Whether a MATLAB or HDF5 file has a variable of this name, of whatever kind; not where it cannot be read.
+pub(in super::super) fn has_variable(path: &Path, name: &str) -> bool {
+    MatFile::read(path, &|_| false).is_ok_and(|file| file.listed.iter().any(|own| own.name == name))
+}
+
 /// Returns the real matrices of these names that a MATLAB or HDF5 file has, with their names.
 ///
 /// # Errors
@@ -81,13 +86,15 @@ pub(in super::super) fn read_plane(path: &Path, told: Option<&str>) -> Result<No
             }
         }
     }
-    // Those of the file itself first.
-    arrays.sort_by_key(|(name, _)| name.contains('.'));
     let planes: Vec<&(String, Vec<usize>)> = arrays.iter().filter(|(_, sides)| are_plane(sides)).collect();
     let last = |name: &str| name.rsplit(['/', '.']).next().unwrap_or_default().to_lowercase();
     let named = match told {
         Some(told) => planes.iter().find(|(name, _)| name == told),
-        None => DEPTHS.iter().find_map(|wanted| planes.iter().find(|(name, _)| is_called(&last(name), wanted))),
+        // Those of the file itself before those in its structures.
+        None => [false, true].into_iter().find_map(|is_inner| {
+            let own = planes.iter().filter(|(name, _)| name.contains('.') == is_inner).collect::<Vec<_>>();
+            DEPTHS.iter().find_map(|wanted| own.iter().copied().find(|(name, _)| is_called(&last(name), wanted)))
+        }),
     };
     let (chosen, sides) = match (named, &planes[..]) {
         (Some(named), _) => named,

@@ -1,0 +1,221 @@
+//! Files of lights: tables of two columns, and those of `ISETCam`.
+
+use std::path::Path;
+
+use dioptric_files::text;
+use dioptric_spectrum::{Illuminant, Spectrum};
+
+use super::{
+    contents::is_of,
+    mat::{has_variable, read_mat_matrices},
+    unusable::unreadable,
+    wavelength_unit::{comments_of, wavelengths_of_column},
+};
+use crate::SceneError;
+
+/// Whether a text is the name of the file of a light, by its ending or because it is there and no light is called so.
+pub fn is_light_file(path: &Path) -> bool {
+    let is_light = || path.to_str().is_some_and(|text| Illuminant::parse(text).is_ok());
+    let is_there = || path.is_file() && (path.extension().is_some() || !is_light());
+    is_of(path, &["csv"]) || is_there()
+}
+
+/// Reads the spectrum of a light: a table of two columns, wavelengths in nm and spectral power, or a MATLAB file as `ISETCam` has lights.
+///
+/// # Errors
+/// When it is none, or there can be no such light.
+pub fn read_light(path: &Path) -> Result<Illuminant, SceneError> {
+    let unreadable = |reason: String| unreadable(path, reason);
+    if is_of(path, &["mat"]) {
+        return of_iset(path);
+    }
+    let text = text::read(path).map_err(|e| unreadable(e.to_string()))?;
+    let text = text::with_commas(&text);
+    let text = text.lines().map(with_comma).collect::<Vec<_>>().join("\n");
+    let mut reader = csv::ReaderBuilder::new()
+        .has_headers(false)
+        .flexible(true)
+        .comment(Some(b'#'))
+        .trim(csv::Trim::All)
+        .from_reader(text.as_bytes());
+    let has = |text: &str, words: &[&str]| words.iter().any(|of| text.to_lowercase().contains(of));
+    let (mut names, mut wavelengths_nm, mut values) = (Vec::<String>::new(), Vec::new(), Vec::new());
+    for (number, record) in reader.records().enumerate() {
+        let record = record.map_err(|e| unreadable(e.to_string()))?;
+        let line = record.position().map_or(number as u64 + 1, csv::Position::line);
+        if record.len() > 2 {
+            let n = record.len();
+            return Err(unreadable(format!(
+                "line {line} has {n} columns, expected a wavelength in nm and one power: of several lights a file each"
+            )));
+        }
+        let number_at = |column: usize| record.get(column).and_then(|text| text.parse::<f64>().ok());
+        match (number_at(0), number_at(1)) {
+            (Some(nm), Some(value)) => {
+                wavelengths_nm.push(nm);
+                values.push(value);
+            }
+            _ if number == 0 => names = record.iter().map(str::to_owned).collect(),
+            _ => return Err(unreadable(format!("line {line} is not a wavelength in nm and a power"))),
+        }
+    }
+    let first = names.first().map_or("", String::as_str);
+    let line = names.join(" ");
+    let comments = comments_of(&text).chain([line.trim_start_matches([';', '%', '/', ' '])]);
+    let wavelengths_nm = wavelengths_of_column(first, &wavelengths_nm, comments).map_err(unreadable)?;
+    // Of a line of names that is not told apart, all of it.
+    let of_power = names.get(1).or(names.first());
+    let counts_photons = of_power.is_some_and(|name| has(name, &["photon", "quant", "mol", "pfd", "einstein"]));
+    let is_comment = |line: &&str| line.starts_with('#') && has(line, &["photon", "quanta"]);
+    if let Some(comment) = text.lines().find(is_comment).filter(|_| !counts_photons) {
+        return Err(unreadable(format!(
+            "it says '{}': expected the name of its second column to say whether its numbers are photons or watts",
+            comment.trim_start_matches('#').trim()
+        )));
+    }
+    if values.is_empty() {
+        return Err(unreadable("it has no line of a wavelength in nm and a power".to_owned()));
+    }
+    // A power a frequency, or in decibels, is none a nanometre.
+    let is_other = |name: &String| {
+        let lower = name.to_lowercase();
+        let has_word = |of: &str| lower.split(|c: char| !c.is_alphabetic()).any(|word| word == of);
+        ["db", "dbm", "decibel", "decibels", "log", "logarithm", "fnu"].into_iter().any(has_word)
+            || ["absor", "transmi", "reflectance", "wavenumber", "cm-1"].iter().any(|of| lower.contains(of))
+            || ["%t", "%r"].contains(&lower.trim())
+            || lower.ends_with("hz")
+            || lower.contains("hz-1")
+            || lower.contains("hz^-1")
+    };
+    if let Some(name) = of_power.filter(|name| is_other(name)) {
+        return Err(unreadable(format!(
+            "its column '{name}' is no power a nanometre, expected such (W/nm) or photons"
+        )));
+    }
+    if counts_photons {
+        values.iter_mut().zip(&wavelengths_nm).for_each(|(value, nm)| *value /= nm);
+    }
+    light_of(&wavelengths_nm, &values).map_err(unreadable)
+}
+
+fn light_of(wavelengths_nm: &[f64], values: &[f64]) -> Result<Illuminant, String> {
+    let mut order: Vec<usize> = (0..values.len()).collect();
+    order.sort_by(|a, b| wavelengths_nm[*a].total_cmp(&wavelengths_nm[*b]));
+    let sorted = |list: &[f64]| order.iter().map(|at| list[*at]).collect();
+    let light = Spectrum::new(sorted(wavelengths_nm), sorted(values)).map(Illuminant::Spectrum);
+    light.and_then(|light| light.check().map(|()| light)).map_err(|error| error.to_string())
+}
+
+/// Reads a light of `ISETCam`: `wavelength`, nm, and `data`, energy, as `ieReadSpectra.m` has them.
+fn of_iset(path: &Path) -> Result<Illuminant, SceneError> {
+    const WAVES: [&str; 2] = ["wavelength", "wave"];
+    if let Some(name) = ["units", "unit"].into_iter().find(|name| has_variable(path, name)) {
+        let reason = format!("its '{name}' is not read: expected energy a nanometre, and none");
+        return Err(unreadable(path, reason));
+    }
+    let matrices = read_mat_matrices(path, &["wavelength", "wave", "data"])?;
+    let of = |names: &[&str]| matrices.iter().find(|(name, _)| names.contains(&name.as_str())).map(|(_, own)| own);
+    let (Some(waves), Some(data)) = (of(&WAVES), of(&["data"])) else {
+        return Err(unreadable(path, "it holds no light, expected 'wavelength' and 'data' as ISETCam has them"));
+    };
+    if data.len() != waves.len() {
+        let (rows, columns) = data.dim();
+        let reason = format!(
+            "its 'data' are {rows} × {columns} numbers of {} wavelengths: expected one light, of several a file each",
+            waves.len()
+        );
+        return Err(unreadable(path, reason));
+    }
+    let [waves, data] = [waves, data].map(|own| own.iter().copied().collect::<Vec<f64>>());
+    wavelengths_of_column("wavelength", &waves, [])
+        .and_then(|nm| light_of(&nm, &data))
+        .map_err(|reason| unreadable(path, reason))
+}
+
+/// Returns a line of two numbers, or of the names of two columns, with a comma in place of the gap between them.
+fn with_comma(line: &str) -> String {
+    let words: Vec<&str> = line.split_whitespace().collect();
+    // A unit in brackets belongs to the name before it.
+    let n_first = 1 + words.get(1).map_or(0, |word| usize::from(word.starts_with(['(', '['])));
+    match (&words[..], line.contains([',', '#', '"'])) {
+        ([first, _, ..], false) if words.len() == 2 || first.parse::<f64>().is_err() => {
+            let (first, second) = words.split_at(n_first.min(words.len() - 1));
+            format!("{},{}", first.join(" "), second.join(" "))
+        }
+        _ => line.to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{
+        super::mat::fixtures::{mat_file, variable_of},
+        *,
+    };
+
+    #[test]
+    fn tables_of_one_light_in_nanometres_are_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("light.csv");
+        let read = |text: &str| {
+            std::fs::write(&path, text).unwrap();
+            read_light(&path)
+        };
+        let light = read("nm, power\n400, 1\n500, 2\n800, 1\n").unwrap();
+        for text in [
+            "µm;W/nm\n0,4;1\n0,5;2\n0,8;1\n",
+            "cm^-1\tpower\n12500\t1\n20000\t2\n25000\t1\n",
+            "nm, photons/s\n400, 400\n500, 1000\n800, 800\n",
+            "400 1\n500   2\n800 1\n",
+            "nm photons\n400 400\n500 1000\n800 800\n",
+            "Wavelength (Å)  Power [W/nm]\n4000 1\n5000 2\n8000 1\n",
+            "wavelength in Angstroms\n4000 1\n5000 2\n8000 1\n",
+            "% Angstrom power\n4000 1\n5000 2\n8000 1\n",
+            "# Wavelength (Angstroms), flux\n4000 1\n5000 2\n8000 1\n",
+            "nm, quantum flux\n400, 400\n500, 1000\n800, 800\n",
+            "nm, PPFD\n400, 400\n500, 1000\n800, 800\n",
+            "\u{feff}Å, W\n4000, 1\n5000, 2\n8000, 1\n",
+        ] {
+            assert_eq!(read(text).unwrap(), light, "{text}");
+        }
+        for (text, word) in [
+            ("nm, a, b\n400, 1, 2\n700, 1, 2\n", "3 columns"),
+            ("waves (zorp), a\n400, 1\n700, 1\n", "'zorp'"),
+            ("400, 1\n500; 2\n", "line 2"),
+            ("nm,dBm\n400, -1\n500, -2\n", "'dBm' is no power"),
+            ("nm,absorbance\n400, 1\n500, 2\n", "'absorbance' is no power"),
+            ("nm,%T\n400, 1\n500, 2\n", "'%T' is no power"),
+            ("nm,dB\n400, -1\n500, -2\n", "'dB' is no power"),
+            ("nm,absolute log irradiance\n400, -1\n500, -2\n", "irradiance' is no power"),
+            ("nm,W m-2 Hz-1\n400, 1\n500, 2\n", "Hz-1' is no power"),
+            ("Light in photons\nnm, a\n400, 1\n500, 2\n", "photons"),
+            ("400, 1\n400, 2\n", "400"),
+            ("4000, 1\n7000, 2\n", "may be nm or Å"),
+        ] {
+            let message = read(text).unwrap_err().to_string();
+            assert!(message.contains(word) && message.contains("light.csv"), "{message}");
+        }
+    }
+
+    #[test]
+    fn lights_of_isetcam_are_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("lamp.mat");
+        let write = |columns: usize| {
+            let nm = [400.0, 500.0, 800.0];
+            let data: Vec<f64> = [1.0, 2.0, 1.0].repeat(columns);
+            let waves = variable_of("wavelength", &[3, 1], 6, &nm);
+            std::fs::write(&path, mat_file(&[waves, variable_of("data", &[3, columns], 6, &data)])).unwrap();
+        };
+        write(1);
+        let light = Spectrum::new(vec![400.0, 500.0, 800.0], vec![1.0, 2.0, 1.0]).unwrap();
+        assert_eq!(read_light(&path), Ok(Illuminant::Spectrum(light)));
+        let all = std::fs::read(&path).unwrap();
+        std::fs::write(&path, [all, variable_of("units", &[1, 1], 6, &[1.0])].concat()).unwrap();
+        assert!(read_light(&path).unwrap_err().to_string().contains("'units' is not read"));
+        write(2);
+        assert!(read_light(&path).unwrap_err().to_string().contains("expected one light"));
+        std::fs::write(&path, mat_file(&[variable_of("x", &[3, 1], 6, &[1.0, 2.0, 3.0])])).unwrap();
+        assert!(read_light(&path).unwrap_err().to_string().contains("'wavelength' and 'data'"));
+    }
+}
