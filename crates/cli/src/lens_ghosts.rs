@@ -65,6 +65,8 @@ pub(crate) fn run(arguments: &LensGhostsArgs, common: &Common) -> anyhow::Result
         film_distance_mm,
         film_mm,
         n_rays: arguments.n_rays,
+        bounces: arguments.bounces,
+        film_reflectance: arguments.film_reflectance,
     };
     let table = request.compute(&used.lens)?;
     if let Some(out) = &arguments.out {
@@ -87,10 +89,19 @@ fn film_size(text: &str) -> anyhow::Result<[f64; 2]> {
         .ok_or_else(|| anyhow::anyhow!("--film-size-mm is '{text}', expected WxH in mm, as 36x24"))
 }
 
+/// Returns the surfaces that reflect light in turn.
+fn way_in_words(first: usize, second: usize, then: &[usize]) -> String {
+    let way: Vec<String> = [first, second].iter().chain(then).map(usize::to_string).collect();
+    way.join(", ")
+}
+
 fn in_words(table: &GhostTable) -> anyhow::Result<String> {
     let mut text = format!(
-        "{}: light that two surfaces reflect, on a film of {} x {} mm\n",
-        table.lens, table.film_mm[0], table.film_mm[1]
+        "{}: light that {} reflect, on a film of {} x {} mm\n",
+        table.lens,
+        if table.bounces == 2 { "two surfaces".to_owned() } else { format!("2 to {} surfaces", table.bounces) },
+        table.film_mm[0],
+        table.film_mm[1]
     );
     for field in &table.fields {
         let veil = field
@@ -104,6 +115,20 @@ fn in_words(table: &GhostTable) -> anyhow::Result<String> {
             100.0 * field.image.power,
             field.image.y_mm
         )?;
+        let percent = |share: f64| format!("{:.3} %", 100.0 * share);
+        let [film, beside_film, reflected, glass, coatings, clipped, beyond] = field.account.shares();
+        writeln!(
+            text,
+            "on the film {} of it, beside it {}; out in front {}; in glass {}, coatings {}; ended by rims {}; reflected more often \
+             {beyond:.1e}",
+            percent(film),
+            percent(beside_film),
+            percent(reflected),
+            percent(glass),
+            // Series of coatings that take nothing end a little above or below.
+            percent(coatings.max(0.0)),
+            percent(clipped)
+        )?;
         writeln!(
             text,
             "{:>13} {:>12} {:>14} {:>10} {:>10} {:>10} {:>9}",
@@ -113,7 +138,7 @@ fn in_words(table: &GhostTable) -> anyhow::Result<String> {
             writeln!(
                 text,
                 "{:>13} {:>12.3e} {:>14.3e} {:>10.3} {:>10.3} {:>10.3} {:>9.3}",
-                format!("{}, {}", row.first, row.second),
+                way_in_words(row.first, row.second, &row.then),
                 row.relative_power,
                 row.relative_irradiance_per_mm2,
                 row.landing.x_mm,
@@ -124,16 +149,16 @@ fn in_words(table: &GhostTable) -> anyhow::Result<String> {
         }
         let more = field.ghosts.len().saturating_sub(MOST_ROWS);
         if more > 0 {
-            writeln!(text, "{:>13} pairs more (--json has all)", more)?;
+            writeln!(text, "{:>13} more (--json has all)", more)?;
         }
     }
     if let Some(worst) = table.pairs.first() {
         writeln!(
             text,
-            "\n{} pairs; the brightest, surfaces {} and {}, has {:.3e} of the image at {} degrees and {} nm",
+            "\n{} {}; the brightest, surfaces {}, has {:.3e} of the image at {} degrees and {} nm",
             table.pairs.len(),
-            worst.first,
-            worst.second,
+            if table.bounces == 2 { "pairs" } else { "ways" },
+            way_in_words(worst.first, worst.second, &worst.then),
             worst.relative_power,
             worst.worst_field_deg,
             worst.worst_wavelength_nm

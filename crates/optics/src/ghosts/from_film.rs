@@ -3,7 +3,8 @@
 use glam::{DVec2, DVec3};
 
 use crate::{
-    MonoLens, OpticsError, RayBatchF32, ReversedLens, rays::RaySlices, trace::GhostTree, transmission::GHOST_TERMS,
+    MirrorFilm, MonoLens, OpticsError, RayBatchF32, ReversedLens, ghosts::PAIR, rays::RaySlices, trace::GhostTree,
+    transmission::GHOST_TERMS,
 };
 
 /// A lens at one wavelength, for rays from the film that two of its surfaces reflect.
@@ -24,17 +25,17 @@ pub struct GhostRay {
 }
 
 impl ReversedLens {
-    /// Returns the ghosts of the lens as they are met from the film.
+    /// Returns the ghosts of the lens as they are met from a film.
     ///
     /// # Errors
-    /// When the lens is tilted or decentered or has mirrors or gratings.
-    pub fn ghosts(&self) -> Result<FilmGhosts, OpticsError> {
+    /// When the lens is tilted or decentered or has mirrors or gratings, or the film reflects and is curved.
+    pub fn ghosts(&self, film: &MirrorFilm) -> Result<FilmGhosts, OpticsError> {
         let lens = self.forward();
-        // The film may be curved: rays come from any place.
-        if lens.placements().is_some() {
-            lens.check_ghosts(0.0)?;
+        // One that reflects nothing may be curved: rays come from any place.
+        if lens.placements().is_some() || film.reflectance != 0.0 {
+            lens.check_ghosts(film)?;
         }
-        Ok(FilmGhosts { tree: lens.ghost_tree(0.0, true, GHOST_TERMS) })
+        Ok(FilmGhosts { tree: lens.ghost_tree(film, true, GHOST_TERMS) })
     }
 }
 
@@ -74,8 +75,8 @@ impl FilmGhosts {
         flip(&mut slices);
         let mut numbers = drawn.to_vec();
         let mut ways: Vec<Option<GhostRay>> = vec![None; numbers.len()];
-        self.tree.trace(&slices, &mut |pair, start, [x, y, l, m, n], shares| {
-            if pair.is_none() {
+        let mut draw = |way: &[u16], start: usize, [x, y, l, m, n]: [&[f32]; 5], shares: &[f64]| {
+            if way.is_empty() {
                 return;
             }
             let lit = shares.iter().enumerate().filter(|(_, share)| **share > 0.0);
@@ -96,7 +97,8 @@ impl FilmGhosts {
                     }
                 }
             }
-        });
+        };
+        self.tree.trace(&slices, PAIR, &mut draw);
         flip(&mut slices);
         ways
     }

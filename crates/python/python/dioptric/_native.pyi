@@ -121,7 +121,7 @@ class Camera:
         psfs: _Path | None = ...,
         blur: str | None = ...,
         border: str | None = ...,
-        lens_reflections: Literal["off", "ghosts"] | None = ...,
+        lens_reflections: Literal["off", "ghosts"] | str | None = ...,
         bank: Any = ...,
         bank_error: Any = ...,
         scene: Scene | _Path | None = ...,

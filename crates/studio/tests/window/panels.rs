@@ -78,6 +78,7 @@ const PANELS: &[(&str, &[&str])] = &[
     ("diffraction", &["Camera.diffraction", "Diffraction.Hurb"]),
     ("gamma", &["Diffraction.Hurb.gamma"]),
     ("reflections", &["Camera.lens_reflections"]),
+    ("film reflectance", &["LensReflections.Film"]),
     ("blur", &["Camera.blur"]),
     ("views", &["BlurSpec.Views"]),
     ("bands", &["Camera.wavelengths", "WavelengthSpec.Range"]),
