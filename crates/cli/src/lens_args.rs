@@ -198,7 +198,7 @@ pub(crate) struct LensReadingArgs {
     /// Makes the lens so many times as large in all its lengths, as 25.4 for a file in inches that says millimetres [default: 1]
     #[arg(long, value_name = "K")]
     pub(crate) lens_scale: Option<f64>,
-    /// What covers all surfaces between air and glass: bare, mgf2, vcoat, bbar, a file (.csv, .ron), or ideal for no loss of light
+    /// What covers all surfaces between air and glass: bare, mgf2, vcoat, bbar, a file (.csv, .ron, COATING.DAT:NAME), or ideal for no loss of light
     /// at all [default: the file's own, else mgf2]
     #[arg(long, value_name = "COATING")]
     pub(crate) coating: Option<String>,
