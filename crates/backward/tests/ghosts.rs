@@ -7,7 +7,7 @@ use dioptric_backward::{
     BandSampling, Bands, Camera, LensCamera, LensCameraSettings, LensOrigin, LightPaths, PixelGrid, Placement,
     RenderSettings, Renderer,
 };
-use dioptric_optics::{Coating, CoordinateBreak, Film, Glass, Interface, Lens, Surface, glam::DVec2};
+use dioptric_optics::{Coating, CoordinateBreak, Film, Glass, Interface, Lens, MirrorFilm, Surface, glam::DVec2};
 use dioptric_spectrum::{Cancel, WavelengthGrid};
 use dioptric_world::{Light, SpectralCurve, WorldBuilder};
 
@@ -29,12 +29,12 @@ fn plate() -> Lens {
 }
 
 fn camera(lens: &Lens, bands: &Bands) -> LensCamera {
-    camera_of(lens, bands, 1e-3)
+    camera_of(lens, bands, 1e-3, FILM_MM)
 }
 
-fn camera_of(lens: &Lens, bands: &Bands, film_width_mm: f64) -> LensCamera {
+fn camera_of(lens: &Lens, bands: &Bands, film_width_mm: f64, film_distance_mm: f64) -> LensCamera {
     let settings = LensCameraSettings {
-        film_distance_mm: FILM_MM,
+        film_distance_mm,
         film_size_mm: DVec2::splat(film_width_mm),
         pixels: PixelGrid::new(8, 8),
         placement: Placement::IDENTITY,
@@ -95,6 +95,21 @@ fn a_plates_ghosts_of_the_sky_are_those_of_fresnel() {
     assert!((ghosts / expected(2) - 1.0).abs() < 0.02, "{ghosts} {} {error}", expected(2));
 }
 
+/// Veiling glare of a whole lens: what even light from all sides adds in the middle of the film.
+#[test]
+fn veiling_glare_of_a_lens_is_that_of_rendered_ghosts() {
+    let film_mm = 37.0;
+    let bands = Bands { grid: WavelengthGrid::new(vec![NM]).unwrap(), sampling: BandSampling::Center };
+    let lens = Lens::built_in("dgauss-50mm").unwrap().with_light_loss(Some(Coating::Bare)).unwrap();
+    let expected =
+        lens.at(NM).unwrap().veiling_glare(DVec2::ZERO, &MirrorFilm::dark(film_mm), 100_000).unwrap().unwrap();
+    let camera = || camera_of(&lens, &bands, 1e-3, film_mm);
+    let (direct, _) = irradiance(camera(), &bands);
+    let (with_ghosts, error) = irradiance(camera().with_ghosts(0.0).unwrap(), &bands);
+    let (found, noise) = (with_ghosts / direct - 1.0, error / direct);
+    assert!(noise < 0.05 * expected && (found - expected).abs() < 2.5 * noise, "{found} {expected} {noise}");
+}
+
 /// A film that reflects: what the plate sends back to it of an even sky, by rays that go straight through the plate unfolded.
 #[test]
 fn a_films_ghosts_are_those_of_unfolded_rays() {
@@ -103,7 +118,7 @@ fn a_films_ghosts_are_those_of_unfolded_rays() {
     let bands = Bands { grid: WavelengthGrid::new(vec![NM]).unwrap(), sampling: BandSampling::Center };
     let lens = plate();
     let of = |reflectance: f64| {
-        let camera = camera_of(&lens, &bands, WIDTH_MM).with_ghosts(reflectance).unwrap();
+        let camera = camera_of(&lens, &bands, WIDTH_MM, FILM_MM).with_ghosts(reflectance).unwrap();
         irradiance(camera, &bands)
     };
     let ((dark, _), (bright, error)) = (of(0.0), of(REFLECTANCE));

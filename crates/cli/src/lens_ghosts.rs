@@ -107,6 +107,10 @@ fn in_words(table: &GhostTable) -> anyhow::Result<String> {
         let veil = field
             .veil
             .map_or_else(|| "the image is beside the film".to_owned(), |veil| format!("veil {veil:.3e} of the image"));
+        let glare = field.veiling_glare.map_or_else(String::new, |share| {
+            format!("veiling glare there of even light from all sides: {:.3} %\n", 100.0 * share)
+        });
+        let glare = glare.as_str();
         writeln!(
             text,
             "\nfield {} degrees, {} nm: {:.2} % of the light on the front rim arrives, at y {:.3} mm; {veil}",
@@ -119,7 +123,7 @@ fn in_words(table: &GhostTable) -> anyhow::Result<String> {
         let [film, beside_film, reflected, glass, coatings, clipped, beyond] = field.account.shares();
         writeln!(
             text,
-            "on the film {} of it, beside it {}; out in front {}; in glass {}, coatings {}; ended by rims {}; reflected more often \
+            "{glare}on the film {} of it, beside it {}; out in front {}; in glass {}, coatings {}; ended by rims {}; reflected more often \
              {beyond:.1e}",
             percent(film),
             percent(beside_film),

@@ -305,7 +305,7 @@ impl MonoLens {
 
     fn traced<T: Traced, const IS_ACCOUNT: bool>(&self, tree: &GhostTree<T>, request: &GhostRequest) -> Totals {
         let is_half = self.is_rotational() && lies_along_y(&request.point);
-        let targets = self.front_targets(request, is_half);
+        let targets = on_disc(self.semi_aperture_mm(0), request.n_rays, is_half);
         let weight = |target: &DVec2| match request.point {
             ObjectPoint::Infinite(_) => 1.0,
             ObjectPoint::Finite(place) => {
@@ -331,19 +331,6 @@ impl MonoLens {
             totals.account.iter_mut().zip(shares).for_each(|(sum, share)| *sum += share);
         }
         totals
-    }
-
-    /// Returns places of a square grid over the front rim's circle; of half the circle at x > 0 where the other half is its mirror image.
-    fn front_targets(&self, request: &GhostRequest, is_half: bool) -> Vec<DVec2> {
-        let radius_mm = self.semi_aperture_mm(0);
-        let n_across = (2.0 * (request.n_rays.max(1) as f64 / std::f64::consts::PI).sqrt()).ceil().max(2.0) as usize;
-        let n_across = n_across.next_multiple_of(2);
-        let at = |i: usize| radius_mm * ((2 * i + 1) as f64 / n_across as f64 - 1.0);
-        let columns = if is_half { n_across / 2..n_across } else { 0..n_across };
-        (0..n_across)
-            .flat_map(|row| columns.clone().map(move |column| DVec2::new(at(column), at(row))))
-            .filter(|place| place.length() <= radius_mm)
-            .collect()
     }
 
     /// Returns how many times as far from the axis as the image a ghost's middle lies on the film: along the paraxial ray through the
@@ -501,6 +488,18 @@ impl Traced for f32 {
     fn with_slices(rays: &RayBatch, work: impl FnOnce(RaySlices<'_, Self>)) {
         work(RayBatchF32::from(rays).slices());
     }
+}
+
+/// Returns about so many places of a square grid over a circle; of half of it at x > 0 where the other half is its mirror image.
+fn on_disc(radius_mm: f64, n: usize, is_half: bool) -> Vec<DVec2> {
+    let n_across = (2.0 * (n.max(1) as f64 / std::f64::consts::PI).sqrt()).ceil().max(2.0) as usize;
+    let n_across = n_across.next_multiple_of(2);
+    let at = |i: usize| radius_mm * ((2 * i + 1) as f64 / n_across as f64 - 1.0);
+    let columns = if is_half { n_across / 2..n_across } else { 0..n_across };
+    (0..n_across)
+        .flat_map(|row| columns.clone().map(move |column| DVec2::new(at(column), at(row))))
+        .filter(|place| place.length() <= radius_mm)
+        .collect()
 }
 
 /// Whether a point lies in the y–z plane.

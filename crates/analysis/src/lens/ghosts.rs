@@ -4,7 +4,7 @@ use std::{collections::BTreeMap, f64::consts::TAU};
 
 use dioptric_forward::{Film, GhostFilm, GhostSources};
 use dioptric_optics::{
-    Ghost, GhostLight, GhostRequest, Lens, LightAccount, MOST_BOUNCES, MonoLens, ObjectPoint,
+    Ghost, GhostLight, GhostRequest, Lens, LightAccount, MOST_BOUNCES, MirrorFilm, MonoLens, ObjectPoint,
     glam::{DVec2, DVec3},
 };
 use dioptric_pipeline::PipelineError;
@@ -66,6 +66,9 @@ pub struct GhostField {
     pub image: Landing,
     /// The light of all ghosts on the film over that of the image there.
     pub veil: Option<f64>,
+    /// What surfaces reflect twice to the place of the image of even light from all sides, over what the lens images there of it: the veiling glare
+    /// of a small black spot (ISO 9358); null where the image is beside the film.
+    pub veiling_glare: Option<f64>,
     /// Where all of the light goes, by 4,000 rays at most.
     pub account: LightAccount,
     /// All ghosts, the brightest first.
@@ -247,6 +250,16 @@ impl GhostTableRequest {
             most_bounces: self.bounces,
         };
         let found = mono.ghosts(&request)?;
+        let film = MirrorFilm {
+            distance_mm: self.film_distance_mm,
+            reflectance: self.film_reflectance,
+            half_mm: 0.5 * DVec2::from_array(self.film_mm),
+            center_mm: DVec2::ZERO,
+        };
+        let veiling_glare = match found.direct.power_on_film > 0.0 {
+            true => mono.veiling_glare(found.direct.centroid_mm, &film, self.n_rays.min(GLARE_RAYS))?,
+            false => None,
+        };
         let row = |ghost: &Ghost| {
             let landing = Landing::of(&ghost.light);
             let relative_power = ghost.light.power / found.direct.power;
@@ -266,6 +279,7 @@ impl GhostTableRequest {
             wavelength_nm: mono.wavelength_nm(),
             image: Landing::of(&found.direct),
             veil: Some(found.veil()).filter(|veil| veil.is_finite()),
+            veiling_glare,
             account: mono.light_account(&GhostRequest { n_rays: self.n_rays.min(ACCOUNT_RAYS), ..request })?,
             ghosts: found.pairs.iter().map(row).collect(),
         })
@@ -274,6 +288,8 @@ impl GhostTableRequest {
 
 /// The most rays of an account.
 const ACCOUNT_RAYS: usize = 4000;
+/// The most rays from a place of the film.
+const GLARE_RAYS: usize = 20_000;
 /// The largest number of rays.
 const MOST_RAYS: usize = 100_000_000;
 

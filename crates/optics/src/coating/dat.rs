@@ -75,6 +75,10 @@ pub(super) fn parse(text: &str, name: Option<&str>) -> Result<Coating, String> {
         return Err(format!("has the coatings {}: expected one of them, as in COATING.DAT:NAME", names()));
     };
     let coating = match entry.kind.to_ascii_uppercase().as_str() {
+        "COAT" if entry.lines.is_empty() && share_of_name(name).is_some() => {
+            let t = share_of_name(name).unwrap_or(1.0);
+            even(t, 1.0 - t).map(Coating::Table)
+        }
         "COAT" => layers(&entry.lines, &materials).map(Coating::Layers),
         "TABLE" => table(&entry.lines).map(Coating::Table),
         _ => ideal(&entry.lines).map(Coating::Table),
@@ -154,8 +158,18 @@ fn ideal(lines: &[(usize, Vec<&str>)]) -> Result<ReflectanceTable, String> {
     let &[t, r, ..] = numbers.as_slice() else {
         return Err("expected the shares transmitted and reflected behind IDEAL and the name".to_owned());
     };
-    let rows = FAR_NM.iter().flat_map(|&nm| [0.0, 90.0].map(|deg| [nm, deg, r, r, t, t])).collect();
-    table_of(rows, true)
+    even(t, r)
+}
+
+/// Returns the share that a coating transmits whose name says it, as I.95 does.
+fn share_of_name(name: &str) -> Option<f64> {
+    let digits = name.strip_prefix("I.").or_else(|| name.strip_prefix("i."))?;
+    format!("0.{digits}").parse().ok()
+}
+
+/// Returns the table of shares transmitted and reflected that are the same everywhere.
+fn even(t: f64, r: f64) -> Result<ReflectanceTable, String> {
+    table_of(FAR_NM.iter().flat_map(|&nm| [0.0, 90.0].map(|deg| [nm, deg, r, r, t, t])).collect(), true)
 }
 
 #[cfg(test)]
@@ -189,6 +203,7 @@ WAVE 0.40 .35 .25 .5 .5
 WAVE 0.70 .2 .2 .8 .81
 IDEAL GRAY 0.6 0.3
 IDEAL BRIGHT 0.8 0.3
+COAT I.95
 TAPR EDGE
 1 2
 ";
@@ -214,6 +229,9 @@ TAPR EDGE
         let Coating::Table(table) = parse(FILE, Some("GRAY")).unwrap() else { panic!("a table") };
         table.check().unwrap();
         assert_eq!(table.at(633.0).unwrap()[0].1, [0.3, 0.3, 0.6, 0.6]);
+        let Coating::Table(table) = parse(FILE, Some("I.95")).unwrap() else { panic!("a table") };
+        let row = table.at(500.0).unwrap()[0].1;
+        assert!((row[0] - 0.05).abs() < 1e-12 && (row[2] - 0.95).abs() < 1e-12, "{row:?}");
         let message = |name: &str| parse(FILE, Some(name)).unwrap().check().unwrap_err().to_string();
         assert!(message("BRIGHT").contains("0.3 reflected and 0.8 transmitted"));
         assert!(message("HALF").contains("0.2 reflected and 0.81 transmitted at 700 nm and 45 degrees"));

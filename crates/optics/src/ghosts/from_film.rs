@@ -3,7 +3,10 @@
 use glam::{DVec2, DVec3};
 
 use crate::{
-    MirrorFilm, MonoLens, OpticsError, RayBatchF32, ReversedLens, ghosts::PAIR, rays::RaySlices, trace::GhostTree,
+    MirrorFilm, MonoLens, OpticsError, RayBatchF32, ReversedLens,
+    ghosts::{PAIR, on_disc},
+    rays::RaySlices,
+    trace::GhostTree,
     transmission::GHOST_TERMS,
 };
 
@@ -40,6 +43,33 @@ impl ReversedLens {
 }
 
 impl MonoLens {
+    /// Returns the veiling glare of even light from all sides: what surfaces reflect twice to a place of the film, mm in the lens frame, over what
+    /// the lens images there, as in the middle of a small black spot and beside it (ISO 9358). `None` where no light comes there, or the film
+    /// reaches into the hollow of the last surface.
+    ///
+    /// # Errors
+    /// As [`ghosts`](Self::ghosts).
+    pub fn veiling_glare(&self, place_mm: DVec2, film: &MirrorFilm, n_rays: usize) -> Result<Option<f64>, OpticsError> {
+        self.check_ghosts(film)?;
+        let Some(radius_mm) = self.rear_circle_mm(film.distance_mm, place_mm.length()) else { return Ok(None) };
+        let tree = self.ghost_tree::<f32>(film, true, GHOST_TERMS);
+        // The frame is mirrored: light runs towards +z, from a film before the lens.
+        let (mut rays, mut weights) = (RayBatchF32::default(), Vec::new());
+        for target_mm in on_disc(radius_mm, n_rays, false) {
+            let way = (target_mm - place_mm).extend(film.distance_mm);
+            rays.push(target_mm.extend(-self.last_vertex_z_mm()), way.normalize());
+            weights.push((film.distance_mm / way.length_squared()).powi(2));
+        }
+        let mut sums = [0.0; 2];
+        let mut sum = |way: &[u16], start: usize, _: [&[f32]; 5], shares: &[f64]| {
+            let lit = shares.iter().enumerate().filter(|(_, share)| **share > 0.0);
+            sums[usize::from(!way.is_empty())] += lit.map(|(i, share)| share * weights[start + i]).sum::<f64>();
+        };
+        tree.trace(&rays.slices(), PAIR, &mut sum);
+        let [direct, ghosts] = sums;
+        Ok((direct > 0.0).then(|| ghosts / direct))
+    }
+
     /// Returns the radius of a circle in the last vertex plane that all rays cross which come to the last surface from film places up to
     /// `reach_mm` from the axis, so far behind the vertex; `None` where the film reaches into the hollow of that surface.
     pub fn rear_circle_mm(&self, film_distance_mm: f64, reach_mm: f64) -> Option<f64> {

@@ -2,8 +2,8 @@
 
 use dioptric_golden::needs_shared;
 use dioptric_optics::{
-    Aperture, Coating, CoatingLayer, Film, Ghost, GhostRequest, Glass, Interface, Iris, Lens, ObjectPoint, Outline,
-    Surface,
+    Aperture, Coating, CoatingLayer, Film, Ghost, GhostRequest, Glass, Interface, Iris, Lens, MirrorFilm, ObjectPoint,
+    Outline, Surface,
     glam::{DVec2, DVec3},
 };
 use num_complex::Complex64;
@@ -308,6 +308,31 @@ fn the_account_of_a_lens_closes() {
     // By the first surface, by the second, back at the first, and at the second again.
     let expected = taken + front.t_s * taken_back * (1.0 + back.r_s + back.r_s.powi(2));
     assert!((found.coatings - expected).abs() < 1e-9, "{found:?} {expected}");
+}
+
+/// The glare of a plate under an even sky: integrals over the angle of rays that cross it once and three times, as far as its rims let them.
+#[test]
+fn veiling_glare_of_a_plate_is_that_of_fresnel() {
+    let (index, thickness_mm, rim_mm, film_mm) = (1.5, 3.0, 10.0, 9.0);
+    let plate = lens_of_plate().at(NM).unwrap();
+    let found = plate.veiling_glare(DVec2::ZERO, &MirrorFilm::dark(film_mm), 200_000).unwrap().unwrap();
+    let light = |n_reflections: i32| {
+        let n = 20_000;
+        let term = |i: usize| {
+            let sine2 = (i as f64 + 0.5) / f64::from(n);
+            let (angle, inside) = (sine2.sqrt().asin(), (sine2.sqrt() / index).asin());
+            let reached_mm = film_mm * angle.tan() + f64::from(1 + n_reflections) * thickness_mm * inside.tan();
+            let before = Film::new(1.0, &[], index.into(), NM).shares(angle.cos());
+            let behind = Film::new(index, &[], 1.0.into(), NM).shares(inside.cos());
+            let s = before.t_s * behind.r_s.powi(n_reflections) * behind.t_s;
+            let p = before.t_p * behind.r_p.powi(n_reflections) * behind.t_p;
+            if reached_mm > rim_mm { 0.0 } else { s + p }
+        };
+        (0..n as usize).map(term).sum::<f64>()
+    };
+    let expected = light(2) / light(0);
+    // Squares of the grid at rims.
+    assert!((found / expected - 1.0).abs() < 2e-3, "{found} {expected}");
 }
 
 #[test]
