@@ -149,13 +149,14 @@ fn tables(analysis: &LensAnalysis) -> Result<String, std::fmt::Error> {
 /// Returns the part about the whole lens.
 fn head(analysis: &LensAnalysis) -> Result<String, std::fmt::Error> {
     let LensAnalysis { lens, efl_mm, f_number, film_distance_mm, film, .. } = analysis;
+    let t_number = analysis.t_number.map_or_else(String::new, |t| format!(", T/{t:.3}"));
     let mut text = match &analysis.afocal {
         Some(view) => format!(
             "{lens}: afocal, exit pupil {:.4} mm across, {:.4} mm behind the last vertex\n",
             view.exit_pupil_diameter_mm, view.exit_pupil_z_mm
         ),
         None => format!(
-            "{lens}: f = {efl_mm:.4} mm, f/{f_number:.3}, film {film_distance_mm:.4} mm behind the last vertex: {film}\n"
+            "{lens}: f = {efl_mm:.4} mm, f/{f_number:.3}{t_number}, film {film_distance_mm:.4} mm behind the last vertex: {film}\n"
         ),
     };
     if let Some(x) = analysis.x_plane {

@@ -266,8 +266,8 @@ pub(crate) struct RunArgs {
     /// Point spread functions of a file (.npz) in place of those of the lens, as `psf LENS -o F.npz` writes them; 'none' for the lens's own
     #[arg(long, value_name = "F.npz", help_heading = heading::SIMULATION)]
     pub(crate) psfs: Option<PathBuf>,
-    /// Light that surfaces of the lens reflect: 'off', it is left out; 'ghosts', what two of them reflect, once each, falls on the film
-    /// [default: off]
+    /// Light that surfaces of the lens reflect: 'off', it is left out; 'ghosts', what two of them reflect, once each, falls on the film;
+    /// 'film:0.1', the film is one of them, a mirror of 10 % [default: off]
     #[arg(long, value_name = "KIND", help_heading = heading::SIMULATION)]
     pub(crate) lens_reflections: Option<LensReflections>,
     /// Of older command lines, ignored: point spreads are no longer sampled

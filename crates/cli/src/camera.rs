@@ -134,21 +134,22 @@ pub(crate) fn write_new(path: Option<&Path>, text: &str, common: &Common) -> any
 fn check(path: &Path, common: &Common) -> anyhow::Result<()> {
     let camera = Camera::read(path)?;
     let lens = KeptCamera::new(camera.clone()).check()?;
-    let first = lens.reference.first_order();
+    let (first, t_number) = (lens.reference.first_order(), lens.reference.t_number(f64::INFINITY));
     if common.json {
         return print_json(&json!({
             "camera": camera.name, "lens": lens.lens.name(), "efl_mm": first.efl_mm, "f_number": first.f_number,
-            "notes": lens.notes,
+            "t_number": t_number, "notes": lens.notes,
         }));
     }
     lens.notes.iter().for_each(|note| remark(common.quiet, note));
     print(&format!(
-        "{}: {}: {}, f = {:.3} mm, f/{:.2}\n",
+        "{}: {}: {}, f = {:.3} mm, f/{:.2}{}\n",
         path.display(),
         camera.name,
         lens.lens.name(),
         first.efl_mm,
-        first.f_number
+        first.f_number,
+        t_number.map_or_else(String::new, |t| format!(", T/{t:.2}"))
     ))
 }
 

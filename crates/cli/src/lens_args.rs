@@ -198,7 +198,7 @@ pub(crate) struct LensReadingArgs {
     /// Makes the lens so many times as large in all its lengths, as 25.4 for a file in inches that says millimetres [default: 1]
     #[arg(long, value_name = "K")]
     pub(crate) lens_scale: Option<f64>,
-    /// What covers all surfaces between air and glass: bare, mgf2, vcoat, bbar, a file (.csv, .ron), or ideal for no loss of light
+    /// What covers all surfaces between air and glass: bare, mgf2, vcoat, bbar, a file (.csv, .ron, COATING.DAT:NAME), or ideal for no loss of light
     /// at all [default: the file's own, else mgf2]
     #[arg(long, value_name = "COATING")]
     pub(crate) coating: Option<String>,
@@ -388,7 +388,13 @@ pub(crate) struct LensGhostsArgs {
     /// Rays over the rim of the first surface
     #[arg(long, value_name = "N", default_value_t = 20_000)]
     pub(crate) n_rays: usize,
-    /// Also writes a picture of all ghosts of the source on that film, without its image (.png): of one field; at 420 to 680 nm unless
+    /// How often surfaces reflect light at most: 2, 4 and so on, up to 12; ways below 1e-10 of the light are left out from the third on
+    #[arg(long, value_name = "N", default_value_t = 2)]
+    pub(crate) bounces: usize,
+    /// The share of the light on the film that it sends back to the lens, as a mirror does
+    #[arg(long, value_name = "R", default_value_t = 0.0)]
+    pub(crate) film_reflectance: f64,
+    /// Also writes a picture of all ghosts of the source on that film, without its image (.png): of two reflections and one field; at 420 to 680 nm unless
     /// wavelengths are given
     #[arg(long, short, value_name = "F.png")]
     pub(crate) out: Option<PathBuf>,

@@ -66,6 +66,8 @@ pub(crate) fn run(arguments: &LensGhostsArgs, common: &Common) -> anyhow::Result
         film_distance_mm,
         film_mm,
         n_rays: arguments.n_rays,
+        bounces: arguments.bounces,
+        film_reflectance: arguments.film_reflectance,
     };
     let table = request.compute(&used.lens)?;
     if let Some(out) = &arguments.out {
@@ -88,15 +90,28 @@ fn film_size(text: &str) -> anyhow::Result<[f64; 2]> {
         .ok_or_else(|| anyhow::anyhow!("--film-size-mm is '{text}', expected WxH in mm, as 36x24"))
 }
 
+/// Returns the surfaces that reflect light in turn.
+fn way_in_words(first: usize, second: usize, then: &[usize]) -> String {
+    let way: Vec<String> = [first, second].iter().chain(then).map(usize::to_string).collect();
+    way.join(", ")
+}
+
 fn in_words(table: &GhostTable) -> anyhow::Result<String> {
     let mut text = format!(
-        "{}: light that two surfaces reflect, on a film of {} x {} mm\n",
-        table.lens, table.film_mm[0], table.film_mm[1]
+        "{}: light that {} reflect, on a film of {} x {} mm\n",
+        table.lens,
+        if table.bounces == 2 { "two surfaces".to_owned() } else { format!("2 to {} surfaces", table.bounces) },
+        table.film_mm[0],
+        table.film_mm[1]
     );
     for field in &table.fields {
         let veil = field
             .veil
             .map_or_else(|| "the image is beside the film".to_owned(), |veil| format!("veil {veil:.3e} of the image"));
+        let glare = field.veiling_glare.map_or_else(String::new, |share| {
+            format!("veiling glare there of even light from all sides: {:.3} %\n", 100.0 * share)
+        });
+        let glare = glare.as_str();
         writeln!(
             text,
             "\nfield {} degrees, {} nm: {:.2} % of the light on the front rim arrives, at y {:.3} mm; {veil}",
@@ -104,6 +119,20 @@ fn in_words(table: &GhostTable) -> anyhow::Result<String> {
             field.wavelength_nm,
             100.0 * field.image.power,
             field.image.y_mm
+        )?;
+        let percent = |share: f64| format!("{:.3} %", 100.0 * share);
+        let [film, beside_film, reflected, glass, coatings, clipped, beyond] = field.account.shares();
+        writeln!(
+            text,
+            "{glare}on the film {} of it, beside it {}; out in front {}; in glass {}, coatings {}; ended by rims {}; reflected more often \
+             {beyond:.1e}",
+            percent(film),
+            percent(beside_film),
+            percent(reflected),
+            percent(glass),
+            // Series of coatings that take nothing end a little above or below.
+            percent(coatings.max(0.0)),
+            percent(clipped)
         )?;
         writeln!(
             text,
@@ -114,7 +143,7 @@ fn in_words(table: &GhostTable) -> anyhow::Result<String> {
             writeln!(
                 text,
                 "{:>13} {:>12.3e} {:>14.3e} {:>10.3} {:>10.3} {:>10.3} {:>9.3}",
-                format!("{}, {}", row.first, row.second),
+                way_in_words(row.first, row.second, &row.then),
                 row.relative_power,
                 row.relative_irradiance_per_mm2,
                 row.landing.x_mm,
@@ -125,16 +154,16 @@ fn in_words(table: &GhostTable) -> anyhow::Result<String> {
         }
         let more = field.ghosts.len().saturating_sub(MOST_ROWS);
         if more > 0 {
-            writeln!(text, "{:>13} pairs more (--json has all)", more)?;
+            writeln!(text, "{:>13} more (--json has all)", more)?;
         }
     }
     if let Some(worst) = table.pairs.first() {
         writeln!(
             text,
-            "\n{} pairs; the brightest, surfaces {} and {}, has {:.3e} of the image at {} degrees and {} nm",
+            "\n{} {}; the brightest, surfaces {}, has {:.3e} of the image at {} degrees and {} nm",
             table.pairs.len(),
-            worst.first,
-            worst.second,
+            if table.bounces == 2 { "pairs" } else { "ways" },
+            way_in_words(worst.first, worst.second, &worst.then),
             worst.relative_power,
             worst.worst_field_deg,
             worst.worst_wavelength_nm

@@ -79,9 +79,9 @@ pub(crate) fn run(arguments: &RenderArgs, common: &Common) -> anyhow::Result<()>
         let grid = camera.wavelengths.grid()?.map_or_else(|| WavelengthGrid::uniform(400.0, 700.0, 10.0), Ok)?;
         let (first_nm, last_nm) = grid.range_nm();
         tell(&world.note_on_bands(first_nm, last_nm).into_iter().collect::<Vec<_>>(), common);
-        if arguments.lens_reflections == Some(LensReflections::Ghosts) {
+        if let Some(reflections @ (LensReflections::Ghosts | LensReflections::Film(_))) = arguments.lens_reflections {
             bail!(
-                "--lens-reflections ghosts is of a lens, expected --lens or --camera: the camera of the world's file has none"
+                "--lens-reflections {reflections} is of a lens, expected --lens or --camera: the camera of the world's file has none"
             );
         }
         let render = WorldRender::of_own_camera(world.clone(), &own, &spec, grid)?;

@@ -64,8 +64,8 @@ pub(crate) struct RenderArgs {
     /// Diffraction at the stop [default: the camera's]
     #[arg(long, value_name = "KIND", value_enum, help_heading = "Simulation")]
     pub(crate) diffraction: Option<RayDiffraction>,
-    /// Light that surfaces of the lens reflect: 'off', it is left out; 'ghosts', what two of them reflect, once each, falls on the film
-    /// [default: the camera's]
+    /// Light that surfaces of the lens reflect: 'off', it is left out; 'ghosts', what two of them reflect, once each, falls on the film;
+    /// 'film:0.1', the film is one of them, a mirror of 10 % [default: the camera's]
     #[arg(long, value_name = "KIND", help_heading = "Simulation")]
     pub(crate) lens_reflections: Option<LensReflections>,
     #[command(flatten)]

@@ -1,5 +1,6 @@
 //! The film and the settings of a forward rendering.
 
+use dioptric_optics::MirrorFilm;
 use glam::DVec2;
 
 use crate::ForwardError;
@@ -23,6 +24,12 @@ impl Film {
     /// Returns a film with the optical axis in its middle.
     pub fn centered(rows: usize, columns: usize, pitch_um: f64) -> Self {
         Self { rows, columns, pitch_um, center_mm: DVec2::ZERO }
+    }
+
+    /// Returns the film as a mirror at this distance behind the last vertex of a lens, which reflects this share of the light.
+    pub fn as_mirror(&self, distance_mm: f64, reflectance: f64) -> MirrorFilm {
+        // The picture is the film turned by 180°.
+        MirrorFilm { distance_mm, reflectance, half_mm: self.half_size_mm(), center_mm: -self.center_mm }
     }
 
     /// Whether the optical axis passes through its middle.

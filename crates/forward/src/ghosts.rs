@@ -8,7 +8,7 @@
 mod canvas;
 mod sources;
 
-use dioptric_optics::{GhostBeams, MonoLens, ObjectPoint};
+use dioptric_optics::{GhostBeams, MirrorFilm, MonoLens, ObjectPoint};
 use dioptric_spectrum::{Cancel, Cancelled};
 use glam::{DVec2, DVec3};
 use ndarray::Array2;
@@ -53,9 +53,9 @@ pub struct GhostSources {
 pub struct GhostFilm<'a> {
     /// The lens at the wavelength of the band.
     pub lens: &'a MonoLens,
-    /// From its last vertex to the film, mm.
-    pub film_distance_mm: f64,
-    /// The film.
+    /// Where the film lies behind it, and what that reflects.
+    pub mirror: MirrorFilm,
+    /// The film, or the part of it that the picture is of.
     pub film: Film,
 }
 
@@ -104,7 +104,7 @@ impl GhostSources {
     /// # Errors
     /// When the lens is one whose ghosts are not followed, or the work is cancelled.
     pub fn irradiance(&self, band: usize, on: &GhostFilm<'_>, cancel: &Cancel) -> Result<Array2<f32>, ForwardError> {
-        let beams = on.lens.ghost_beams(on.film_distance_mm)?;
+        let beams = on.lens.ghost_beams(&on.mirror)?;
         let tasks: Vec<Task<'_>> = self
             .points
             .iter()

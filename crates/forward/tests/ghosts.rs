@@ -3,7 +3,7 @@
 
 use dioptric_forward::{Film, GhostFilm, GhostSources};
 use dioptric_optics::{
-    Coating, GhostRequest, Glass, Interface, Lens, MonoLens, ObjectPoint, Surface,
+    Coating, GhostRequest, Glass, Interface, Lens, MirrorFilm, MonoLens, ObjectPoint, Surface,
     glam::{DVec2, DVec3},
 };
 use dioptric_spectrum::Cancel;
@@ -30,7 +30,11 @@ fn double_gauss() -> MonoLens {
 }
 
 fn drawn(sources: &GhostSources, lens: &MonoLens, film_distance_mm: f64, film: Film) -> Array2<f32> {
-    sources.irradiance(0, &GhostFilm { lens, film_distance_mm, film }, &Cancel::new()).unwrap()
+    drawn_on(sources, lens, MirrorFilm::dark(film_distance_mm), film)
+}
+
+fn drawn_on(sources: &GhostSources, lens: &MonoLens, mirror: MirrorFilm, film: Film) -> Array2<f32> {
+    sources.irradiance(0, &GhostFilm { lens, mirror, film }, &Cancel::new()).unwrap()
 }
 
 /// Light in all over the light of a point of irradiance or intensity 1, in mm² or sr, and the middle of it on the film, mm.
@@ -52,13 +56,16 @@ fn light_and_middle(picture: &Array2<f32>, film: Film) -> (f64, DVec2) {
 fn light_of_all_pairs_is_that_of_the_table() {
     let lens = double_gauss();
     let (film_distance_mm, n_rays) = (37.3768, 20_000);
-    let film = Film::centered(600, 700, 200.0);
     let (radius_mm, rim_z_mm) = (lens.semi_aperture_mm(0), lens.front_rim_z_mm());
-    for (field_tan, depth_m) in [
-        (DVec2::ZERO, f64::INFINITY),
-        (DVec2::new(0.12, -0.1), f64::INFINITY),
-        (DVec2::new(-0.05, 0.2), 0.7),
-        (DVec2::new(0.0, 0.2), f64::INFINITY),
+    let all_of_it = Film::centered(600, 700, 200.0);
+    let small = Film::centered(240, 360, 100.0);
+    for (field_tan, depth_m, film, film_reflectance) in [
+        (DVec2::ZERO, f64::INFINITY, all_of_it, 0.0),
+        (DVec2::new(0.12, -0.1), f64::INFINITY, all_of_it, 0.0),
+        (DVec2::new(-0.05, 0.2), 0.7, all_of_it, 0.0),
+        (DVec2::new(0.0, 0.2), f64::INFINITY, all_of_it, 0.0),
+        (DVec2::new(0.12, -0.1), f64::INFINITY, small, 0.3),
+        (DVec2::new(-0.05, 0.2), 0.7, small, 0.3),
     ] {
         let per_cos = (1.0 + field_tan.length_squared()).sqrt();
         let (point, all) = if depth_m.is_finite() {
@@ -76,10 +83,13 @@ fn light_of_all_pairs_is_that_of_the_table() {
             (ObjectPoint::Infinite(direction), per_cos.recip())
         };
         let film_half_mm = Some(film.half_size_mm());
-        let table = lens.ghosts(&GhostRequest { point, film_distance_mm, n_rays, rim_z_mm, film_half_mm }).unwrap();
+        let request =
+            GhostRequest { point, film_distance_mm, n_rays, rim_z_mm, film_half_mm, film_reflectance, most_bounces: 2 };
+        let table = lens.ghosts(&request).unwrap();
         let expected: f64 = table.pairs.iter().map(|ghost| ghost.light.power_on_film).sum();
         let source = GhostSources::of_point(field_tan, depth_m, 1, n_rays);
-        let (light, _) = light_and_middle(&drawn(&source, &lens, film_distance_mm, film), film);
+        let (light, _) =
+            light_and_middle(&drawn_on(&source, &lens, film.as_mirror(film_distance_mm, film_reflectance), film), film);
         let share = light / (all * std::f64::consts::PI * radius_mm * radius_mm);
         // Squares of the grid that the circle cuts, and beams that the film's edges cut.
         assert!((share / expected - 1.0).abs() < 3e-3, "{field_tan} {depth_m}: {share} {expected}");
@@ -155,7 +165,7 @@ fn threads_change_no_bit() {
 fn lenses_whose_ghosts_are_not_followed_are_refused_in_words() {
     let lens = Lens::built_in("dgauss-50mm").unwrap().with_light_loss(Some(Coating::Bare)).unwrap();
     let curved = lens.clone().with_image_surface(dioptric_optics::ImageSurface { curvature_per_mm: -0.01, conic: 0.0 });
-    let message = curved.unwrap().at(NM).unwrap().ghost_beams(37.0).unwrap_err().to_string();
+    let message = curved.unwrap().at(NM).unwrap().ghost_beams(&MirrorFilm::dark(37.0)).unwrap_err().to_string();
     assert!(message.contains("flat films alone"), "{message}");
     let lossless = lens.with_light_loss(None).unwrap().at(NM).unwrap();
     let source = GhostSources::of_point(DVec2::ZERO, 1.0, 1, 1000);

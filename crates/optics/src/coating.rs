@@ -1,5 +1,6 @@
 //! Coatings: what surfaces are covered with, and how that becomes a thin film at a wavelength.
 
+mod dat;
 mod file;
 mod film;
 mod table;
@@ -9,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{Glass, OpticsError};
 
-pub(crate) use self::table::share_between;
+pub(crate) use self::table::{TableRow, share_between};
 pub use self::{
     film::{Amplitudes, Film, Shares},
     table::ReflectanceTable,
@@ -59,7 +60,7 @@ pub enum Coating {
     },
     /// Layers as stated.
     Layers(Vec<CoatingLayer>),
-    /// Reflectances as measured; what is not reflected goes on.
+    /// Reflectances as measured; what is not reflected goes on, unless it is stated how much does.
     Table(ReflectanceTable),
     /// Of mirrors alone: layers on a metal.
     Metal {

@@ -62,7 +62,10 @@ pub use film_cone::FilmCone;
 pub use film_site::FilmSite;
 pub use formats::{Configuration, Field, LensFile, Microlens, MissingGlass, ReadOptions, SeqNumbers};
 pub use frame::{FilmPoint, StopPoint};
-pub use ghosts::{FilmGhosts, Ghost, GhostBeam, GhostBeams, GhostLight, GhostRay, GhostRequest, Ghosts};
+pub use ghosts::{
+    FilmGhosts, Ghost, GhostBeam, GhostBeams, GhostLight, GhostRay, GhostRequest, Ghosts, LightAccount, MOST_BOUNCES,
+    MirrorFilm,
+};
 pub use glam;
 pub use glass::{C_LINE_NM, CatalogueGlass, D_LINE_NM, ExtendedIndex, F_LINE_NM, Glass, GlassCatalogue, GlassRange};
 pub use layout::{Layout, wavelength_color};

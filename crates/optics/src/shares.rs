@@ -39,6 +39,24 @@ impl MonoLens {
         Some(self.mean_share(&region, &point, AXIAL_RINGS))
     }
 
+    /// Returns the f-number of the round beam with as much light, of a lens whose pupil is no whole disc: with openings of other shapes or
+    /// obscurations, tilted or decentered; that of first-order optics for others.
+    pub fn f_number_by_area(&self) -> f64 {
+        let f_number = self.first_order().f_number;
+        let has_odd_apertures = !self.is_rotational() || self.n_obscurations() > 0;
+        // Of a stop that is no circle, by how its area compares with that of the round axial beam.
+        match (has_odd_apertures.then(|| self.f_number_of_light()).flatten(), self.real_f_number()) {
+            (Some(of_light), Some(real)) => f_number * (of_light / real),
+            (of_light, _) => of_light.unwrap_or(f_number),
+        }
+    }
+
+    /// Returns the T-number: the f-number, by area, of a lens without losses that has as much light, for a point on the axis at this distance. `None`
+    /// where no light gets through the rims.
+    pub fn t_number(&self, object_distance_mm: f64) -> Option<f64> {
+        self.axial_transmission(object_distance_mm).map(|share| self.f_number_by_area() / share.sqrt())
+    }
+
     /// Returns the mean share of a point's light that the lens lets through, over a region of its pupil.
     pub(crate) fn mean_share(&self, region: &PupilRegion, point: &ObjectPoint, n_rings: usize) -> f64 {
         if self.is_lossless() {

@@ -37,7 +37,7 @@ pub(crate) use self::{
     },
     plan::Plan,
     real::Real,
-    tree::{GhostTree, SideLight},
+    tree::{GhostTree, LightSink, Loss, SideLight},
 };
 use crate::{Aperture, RayFate, rays::RaySlices, toric::Toric};
 

@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use crate::{
     Coating, DiffractiveSurface, Film, Lens, OpticsError,
-    coating::{absorbing_index, share_between},
+    coating::{TableRow, absorbing_index, share_between},
     trace::{Argument, LightPass, Lights, Real},
 };
 
@@ -17,12 +17,12 @@ pub(crate) enum SurfaceLoss {
     Film(Film),
     /// The same whatever the angle, that of light that falls straight on it: at gratings, which turn light by no law of Snell's.
     Straight(Film),
-    /// What a table at one wavelength reflects, between media of these indices.
-    Table(Vec<(f64, [f64; 2])>, [f64; 2]),
+    /// What a table at one wavelength does not transmit, between media of these indices.
+    Table(Vec<TableRow>, [f64; 2]),
     /// What the film of a mirror does not reflect.
     MirrorFilm(Film),
     /// What a table of a mirror does not reflect.
-    MirrorTable(Vec<(f64, [f64; 2])>),
+    MirrorTable(Vec<TableRow>),
 }
 
 /// Points at which a surface is looked at to begin with, and how often they are doubled at most where series of as many terms have not
@@ -127,7 +127,7 @@ impl SurfaceLoss {
             let [of_s, of_p] = film.power_of_squares(cos);
             terms(found.t_s * of_s.sqrt(), found.t_p * of_p.sqrt())
         };
-        let left = |[r_s, r_p]: [f64; 2]| terms((1.0 - r_s).sqrt().into(), (1.0 - r_p).sqrt().into());
+        let left = |[_, _, t_s, t_p]: [f64; 4]| terms(t_s.sqrt().into(), t_p.sqrt().into());
         match self {
             Self::None => [1.0, 0.0, 1.0, 0.0],
             Self::Straight(film) => transmitted(film, 1.0),
@@ -141,7 +141,7 @@ impl SurfaceLoss {
                 terms(found.r_s, -found.r_p)
             }
             Self::MirrorTable(table) => {
-                let [r_s, r_p] = share_between(table, product);
+                let [r_s, r_p, ..] = share_between(table, product);
                 terms(r_s.sqrt().into(), r_p.sqrt().into())
             }
         }
@@ -180,7 +180,7 @@ impl SurfaceLoss {
             Self::Table(table, [before, after]) => {
                 let indices = if is_from_behind { [*after, *before] } else { [*before, *after] };
                 let of_low = |low: f64| {
-                    let [r_s, r_p] = share_between(table, low);
+                    let [r_s, r_p, ..] = share_between(table, low);
                     terms(r_s.sqrt().into(), r_p.sqrt().into())
                 };
                 (indices, Box::new(of_low))

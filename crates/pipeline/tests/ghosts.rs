@@ -7,7 +7,7 @@ use dioptric_pipeline::{Camera, KeptCamera, LensReflections, RenderEffort, Rende
 use dioptric_spectrum::{Bands, Cancel};
 use ndarray::Array2;
 
-/// A disc that shines, 2 m before the camera and to the upper left of its axis.
+/// A disc that shines, 2 m before the camera.
 const WORLD: &str = r#"
 Film "rgb" "integer xresolution" 96 "integer yresolution" 64
 LookAt 0 0 0  0 0 1  0 1 0
@@ -15,7 +15,7 @@ Camera "perspective" "float fov" 34
 WorldBegin
 AttributeBegin
 AreaLightSource "diffuse" "spectrum L" [ 300 1000 900 1000 ] "bool twosided" true
-Translate 0.45 0.25 2
+Translate PLACE 2
 Shape "disk" "float radius" 0.2
 AttributeEnd
 "#;
@@ -33,9 +33,13 @@ const CAMERA: &str = r#"(
     wavelengths: ListNm([470.0, 600.0]),
 )"#;
 
-fn kept() -> (tempfile::TempDir, KeptCamera) {
+/// To the upper left of the axis, and near it.
+const ASIDE: &str = "0.45 0.25";
+const NEAR: &str = "0.1 0.06";
+
+fn kept(place: &str) -> (tempfile::TempDir, KeptCamera) {
     let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("lamp.pbrt"), WORLD).unwrap();
+    fs::write(folder.path().join("lamp.pbrt"), WORLD.replace("PLACE", place)).unwrap();
     let camera = Camera::parse(CAMERA, &folder.path().join("camera.ron")).unwrap();
     (folder, KeptCamera::new(camera))
 }
@@ -53,10 +57,25 @@ fn sum(plane: &Array2<f32>, is_counted: impl Fn((usize, usize)) -> bool, power: 
     plane.indexed_iter().filter(|(at, _)| is_counted(*at)).map(|(_, value)| f64::from(*value).powi(power)).sum()
 }
 
-/// Both ways away from the lamp: in all, and quarter by quarter of the film.
 #[test]
 fn ghosts_of_a_lamp_are_alike_both_ways() {
-    let (_folder, kept) = kept();
+    let share = alike_both_ways(ASIDE, LensReflections::Ghosts);
+    assert!((1e-4..0.2).contains(&share), "{share}");
+}
+
+/// Of a lamp far from the axis a film sends all light past the lens.
+#[test]
+fn ghosts_of_a_film_that_reflects_are_alike_both_ways() {
+    let share = alike_both_ways(NEAR, LensReflections::Film(0.5));
+    let (_folder, kept) = kept(NEAR);
+    let pairs = by(&kept, RenderMethod::Forward, LensReflections::Ghosts).irradiance(&Silent, &Cancel::new()).unwrap();
+    let of_pairs = pairs.summary.ghost_share.unwrap();
+    assert!(share > 1.5 * of_pairs, "{share} {of_pairs}");
+}
+
+/// Checks both ways away from the lamp: in all, and quarter by quarter of the film. Returns the share of ghosts in all light.
+fn alike_both_ways(place: &str, reflections: LensReflections) -> f64 {
+    let (_folder, kept) = kept(place);
     let rendered = |reflections| {
         let render = by(&kept, RenderMethod::Backward, reflections).world_render(&Silent, &Cancel::new()).unwrap();
         let mut renderer = render.renderer().unwrap();
@@ -64,10 +83,10 @@ fn ghosts_of_a_lamp_are_alike_both_ways() {
         render.refine(&mut renderer, effort, &Silent, &Cancel::new(), &mut |_| Ok(true)).unwrap();
         renderer.rendering()
     };
-    let (without, with) = (rendered(LensReflections::Off), rendered(LensReflections::Ghosts));
+    let (without, with) = (rendered(LensReflections::Off), rendered(reflections));
     let blurred =
         |reflections| by(&kept, RenderMethod::Forward, reflections).irradiance(&Silent, &Cancel::new()).unwrap();
-    let (dark, ghosts) = (blurred(LensReflections::Off), blurred(LensReflections::Ghosts));
+    let (dark, ghosts) = (blurred(LensReflections::Off), blurred(reflections));
     for band in 0..2 {
         let image = &without.picture.planes()[band];
         let off = dark.band(band).unwrap();
@@ -85,15 +104,14 @@ fn ghosts_of_a_lamp_are_alike_both_ways() {
         compare(&is_beside, 0.01);
         (0..4).for_each(|quarter| compare(&|at| is_beside(at) && in_quarter(quarter)(at), 0.03));
     }
-    let share = ghosts.summary.ghost_share.unwrap();
-    assert!((1e-4..0.2).contains(&share), "{share}");
     assert_eq!(dark.summary.ghost_share, None);
+    ghosts.summary.ghost_share.unwrap()
 }
 
 /// Ghosts add light and change nothing else, and half of them falls on each of two photodiodes.
 #[test]
 fn photodiodes_share_ghosts() {
-    let (_folder, kept) = kept();
+    let (_folder, kept) = kept(ASIDE);
     let kept = by(&kept, RenderMethod::Forward, LensReflections::Ghosts);
     let whole = kept.irradiance(&Silent, &Cancel::new()).unwrap();
     let halves = kept.with(|camera| camera.dual_pixel = Some("left-right:0:0.01".parse().unwrap()));

@@ -144,8 +144,9 @@ impl Camera {
     ///     Layers of depth; each sample on its own, as in the paper; layers through N parts of the pupil.
     /// border : {"hold", "mirror", "black"}
     ///     What the lens sees beyond the ends of the scene: the samples at its border, the scene mirrored, or nothing.
-    /// lens_reflections : {"off", "ghosts"}
-    ///     Light that surfaces of the lens reflect: left out, or what two of them reflect falls on the film.
+    /// lens_reflections : {"off", "ghosts", "film:R"}
+    ///     Light that surfaces of the lens reflect: left out, or what two of them reflect falls on the film; the film one of them, a mirror that
+    ///     reflects the share R of its light.
     /// scene : Scene or path
     /// fov_deg, depth_m, width_mm, distance_mm, fill_depth, hidden, points, white_level, quantity, unit, scale, scene_wavelengths_nm, variable,
     /// axes, no_data, depth, depth_unit, depth_kind, depth_variable, view, panorama

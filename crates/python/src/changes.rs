@@ -345,7 +345,7 @@ fn set_imaging(camera: &mut Camera, key: &str, value: &Bound<'_, PyAny>) -> PyRe
         "lens_reflections" => {
             let found = word(key, value)?;
             camera.lens_reflections =
-                found.parse().map_err(|_| wrong(key, format!("'{found}'"), "'off' or 'ghosts'"))?;
+                found.parse().map_err(|_| wrong(key, format!("'{found}'"), "'off', 'ghosts' or 'film:0.1'"))?;
         }
         // Of older programs; the report notes it.
         "bank" | "bank_error" => camera.bank = RetiredBank::STATED,

@@ -397,6 +397,12 @@ impl Lens {
         guarded(|| Ok(self.mono(self.wavelength_or_usual(None))?.first_order().f_number))
     }
 
+    /// f-number of a lens without losses that has as much light for a far object, at the wavelength of `efl_mm`; None where no light gets through.
+    #[getter]
+    fn t_number(&self) -> PyResult<Option<f64>> {
+        guarded(|| Ok(self.mono(self.wavelength_or_usual(None))?.t_number(f64::INFINITY)))
+    }
+
     /// Returns first-order data and third-order sums: focal lengths, principal planes, pupils, f-number, Seidel sums.
     ///
     /// Parameters

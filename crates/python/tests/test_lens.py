@@ -246,6 +246,7 @@ def test_lens_of_rows_has_the_power_of_the_lens_maker() -> None:
     assert lens.with_surface(0, medium=(1.5168, 64.17)).surfaces()[0]["medium"] == {"NdVd": {"nd": 1.5168, "vd": 64.17}}
     stopped = lens.with_stop(f_number=10).with_surface(1, radius_mm=-90)
     assert stopped.with_stop(f_number=5).f_number == pytest.approx(5) and 10 < stopped.f_number < 12
+    assert stopped.f_number < stopped.t_number < 1.05 * stopped.f_number
     asphere = lens.with_surface(0, coefficients=[1e-6, 0, 2e-10])
     assert asphere.surfaces()[0]["coefficients"] == [1e-6, 0, 2e-10]
 

@@ -81,6 +81,7 @@ fn whole(both: [ComparedLens<'_>; 2]) -> Vec<ComparisonRow> {
         row("object before the first vertex, mm", of(&|a| Some(a.distance_mm))),
         row("focal length, mm", of(&|a| Some(a.efl_mm))),
         row("f-number", of(&|a| Some(a.f_number))),
+        row("T-number", of(&|a| a.t_number)),
         row("f-number at this object", of(&|a| Some(a.working_f_number))),
         row("magnification", both.map(magnification)),
         row("numerical aperture at the object", of(&|a| a.object_na)),

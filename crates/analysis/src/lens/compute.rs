@@ -237,6 +237,7 @@ impl Bench {
             film_radius_mm: (film_curvature != 0.0).then(|| 1.0 / film_curvature),
             efl_mm: first.efl_mm,
             f_number: first.f_number,
+            t_number: self.reference().t_number(request.distance_mm),
             working_f_number: self.reference().working_f_number(request.distance_mm),
             film_distance_mm: self.film_distance_mm,
             film: film.origin,

@@ -1,10 +1,10 @@
 //! Ghosts of a lens as a table: what pairs of surfaces send to the film.
 
-use std::f64::consts::TAU;
+use std::{collections::BTreeMap, f64::consts::TAU};
 
 use dioptric_forward::{Film, GhostFilm, GhostSources};
 use dioptric_optics::{
-    Ghost, GhostLight, GhostRequest, Lens, MonoLens, ObjectPoint,
+    Ghost, GhostLight, GhostRequest, Lens, LightAccount, MOST_BOUNCES, MirrorFilm, MonoLens, ObjectPoint,
     glam::{DVec2, DVec3},
 };
 use dioptric_pipeline::PipelineError;
@@ -26,6 +26,10 @@ pub struct GhostTableRequest {
     pub film_mm: [f64; 2],
     /// Rays over the front rim.
     pub n_rays: usize,
+    /// How often light is reflected at most: 2, 4 and so on.
+    pub bounces: usize,
+    /// The share of the light on the film that it reflects, as a mirror does.
+    pub film_reflectance: f64,
 }
 
 /// The ghosts of a lens.
@@ -41,6 +45,10 @@ pub struct GhostTable {
     pub distance_mm: f64,
     /// Rays over the front rim.
     pub n_rays: usize,
+    /// How often light is reflected at most.
+    pub bounces: usize,
+    /// The share of the light on the film that it reflects.
+    pub film_reflectance: f64,
     /// By fields, and for each by wavelengths.
     pub fields: Vec<GhostField>,
     /// All pairs that send light anywhere, with what each does at worst; the brightest first.
@@ -58,6 +66,11 @@ pub struct GhostField {
     pub image: Landing,
     /// The light of all ghosts on the film over that of the image there.
     pub veil: Option<f64>,
+    /// What surfaces reflect twice to the place of the image of even light from all sides, over what the lens images there of it: the veiling glare
+    /// of a small black spot (ISO 9358); null where the image is beside the film.
+    pub veiling_glare: Option<f64>,
+    /// Where all of the light goes, by 4,000 rays at most.
+    pub account: LightAccount,
     /// All ghosts, the brightest first.
     pub ghosts: Vec<GhostRow>,
 }
@@ -78,12 +91,15 @@ pub struct Landing {
 }
 
 /// A ghost at one field and wavelength.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct GhostRow {
-    /// The surface that reflects first, counted from 0.
+    /// The surface that reflects first, counted from 0; the film is the one behind the last.
     pub first: usize,
     /// The one before it that reflects then.
     pub second: usize,
+    /// Those that reflect after these two; left out where none does.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub then: Vec<usize>,
     /// Where it lands.
     #[serde(flatten)]
     pub landing: Landing,
@@ -95,13 +111,16 @@ pub struct GhostRow {
     pub magnification: f64,
 }
 
-/// A pair of surfaces, at its worst.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+/// A pair of surfaces, or a longer way, at its worst.
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct GhostPair {
     /// The surface that reflects first, counted from 0.
     pub first: usize,
     /// The one before it that reflects then.
     pub second: usize,
+    /// Those that reflect after these two; left out where none does.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub then: Vec<usize>,
     /// Its light over the image's, where that is most.
     pub relative_power: f64,
     /// That field, degrees above the axis.
@@ -118,7 +137,7 @@ impl GhostTableRequest {
     pub fn compute(&self, lens: &Lens) -> Result<GhostTable, PipelineError> {
         self.check()?;
         let mut fields = Vec::new();
-        let mut pairs: Vec<GhostPair> = Vec::new();
+        let mut worst: BTreeMap<Vec<usize>, GhostPair> = BTreeMap::new();
         for &wavelength_nm in &self.wavelengths_nm {
             let mono = lens.at(wavelength_nm)?;
             for &field_deg in &self.fields_deg {
@@ -127,26 +146,38 @@ impl GhostTableRequest {
                     let here = GhostPair {
                         first: row.first,
                         second: row.second,
+                        then: row.then.clone(),
                         relative_power: row.relative_power,
                         worst_field_deg: field_deg,
                         worst_wavelength_nm: wavelength_nm,
                     };
-                    match pairs.iter_mut().find(|pair| (pair.first, pair.second) == (row.first, row.second)) {
-                        Some(pair) if pair.relative_power < here.relative_power => *pair = here,
-                        Some(_) => {}
-                        None => pairs.push(here),
+                    let way = [&[row.first, row.second], row.then.as_slice()].concat();
+                    if worst.get(&way).is_none_or(|pair| pair.relative_power < here.relative_power) {
+                        worst.insert(way, here);
                     }
                 }
                 fields.push(field);
             }
         }
         fields.sort_by(|a, b| a.field_deg.total_cmp(&b.field_deg).then(a.wavelength_nm.total_cmp(&b.wavelength_nm)));
+        let mut pairs: Vec<GhostPair> = worst.into_values().collect();
         pairs.sort_by(|a, b| b.relative_power.total_cmp(&a.relative_power));
-        let Self { distance_mm, film_distance_mm, film_mm, n_rays, .. } = *self;
-        Ok(GhostTable { lens: lens.name().to_owned(), film_distance_mm, film_mm, distance_mm, n_rays, fields, pairs })
+        let Self { distance_mm, film_distance_mm, film_mm, n_rays, bounces, film_reflectance, .. } = *self;
+        let lens = lens.name().to_owned();
+        Ok(GhostTable {
+            lens,
+            film_distance_mm,
+            film_mm,
+            distance_mm,
+            n_rays,
+            bounces,
+            film_reflectance,
+            fields,
+            pairs,
+        })
     }
 
-    /// Returns a picture of all ghosts of the source, whose image is left out: spectral irradiance on a film of so many columns, W m⁻² nm⁻¹, for a far
+    /// Returns a picture of all ghosts of the source that two surfaces reflect, whose image is left out: spectral irradiance on a film of so many columns, W m⁻² nm⁻¹, for a far
     /// source that brings 1 W m⁻² nm⁻¹ to a surface facing it, or a near one of 1 W sr⁻¹ nm⁻¹.
     ///
     /// # Errors
@@ -167,7 +198,8 @@ impl GhostTableRequest {
             let lens = lens.at(wavelength_nm)?;
             let depth_m = 1e-3 * (self.distance_mm + lens.projection_center_z_mm());
             let source = GhostSources::of_point(DVec2::new(0.0, tan), depth_m, grid.len(), self.n_rays);
-            let on = GhostFilm { lens: &lens, film_distance_mm: self.film_distance_mm, film };
+            let mirror = film.as_mirror(self.film_distance_mm, self.film_reflectance);
+            let on = GhostFilm { lens: &lens, mirror, film };
             planes.push(source.irradiance(band, &on, &Cancel::new())?);
         }
         Ok(SpectralImage::new(Quantity::Irradiance, grid, planes)?.with_pitch_um(film.pitch_um))
@@ -187,6 +219,12 @@ impl GhostTableRequest {
         if !self.film_mm.iter().all(|mm| *mm > 0.0 && mm.is_finite()) {
             return wrong("film_size_mm", format!("{:?}", self.film_mm), "a width and a height above 0");
         }
+        if !(2..=MOST_BOUNCES).contains(&self.bounces) || self.bounces % 2 == 1 {
+            return wrong("bounces", self.bounces.to_string(), &format!("an even number from 2 to {MOST_BOUNCES}"));
+        }
+        if !(0.0..=1.0).contains(&self.film_reflectance) {
+            return wrong("film_reflectance", self.film_reflectance.to_string(), "0 to 1");
+        }
         if !(1..=MOST_RAYS).contains(&self.n_rays) {
             return wrong("n_rays", self.n_rays.to_string(), "1 to 100000000");
         }
@@ -202,13 +240,26 @@ impl GhostTableRequest {
                 ObjectPoint::Finite(DVec3::new(0.0, field.tan() * (self.distance_mm + pupil_z_mm), -self.distance_mm))
             }
         };
-        let found = mono.ghosts(&GhostRequest {
+        let request = GhostRequest {
             point,
             film_distance_mm: self.film_distance_mm,
             n_rays: self.n_rays,
             rim_z_mm: mono.front_rim_z_mm(),
             film_half_mm: Some(0.5 * DVec2::from_array(self.film_mm)),
-        })?;
+            film_reflectance: self.film_reflectance,
+            most_bounces: self.bounces,
+        };
+        let found = mono.ghosts(&request)?;
+        let film = MirrorFilm {
+            distance_mm: self.film_distance_mm,
+            reflectance: self.film_reflectance,
+            half_mm: 0.5 * DVec2::from_array(self.film_mm),
+            center_mm: DVec2::ZERO,
+        };
+        let veiling_glare = match found.direct.power_on_film > 0.0 {
+            true => mono.veiling_glare(found.direct.centroid_mm, &film, self.n_rays.min(GLARE_RAYS))?,
+            false => None,
+        };
         let row = |ghost: &Ghost| {
             let landing = Landing::of(&ghost.light);
             let relative_power = ghost.light.power / found.direct.power;
@@ -216,6 +267,7 @@ impl GhostTableRequest {
             GhostRow {
                 first: ghost.first,
                 second: ghost.second,
+                then: ghost.then.clone(),
                 landing,
                 relative_power,
                 relative_irradiance_per_mm2: relative_power / area_mm2,
@@ -227,11 +279,17 @@ impl GhostTableRequest {
             wavelength_nm: mono.wavelength_nm(),
             image: Landing::of(&found.direct),
             veil: Some(found.veil()).filter(|veil| veil.is_finite()),
+            veiling_glare,
+            account: mono.light_account(&GhostRequest { n_rays: self.n_rays.min(ACCOUNT_RAYS), ..request })?,
             ghosts: found.pairs.iter().map(row).collect(),
         })
     }
 }
 
+/// The most rays of an account.
+const ACCOUNT_RAYS: usize = 4000;
+/// The most rays from a place of the film.
+const GLARE_RAYS: usize = 20_000;
 /// The largest number of rays.
 const MOST_RAYS: usize = 100_000_000;
 

@@ -43,6 +43,8 @@ pub struct LensAnalysis {
     pub efl_mm: f64,
     /// f-number for a far object.
     pub f_number: f64,
+    /// The f-number of a lens without losses that has as much light; none where no light of the axis gets through.
+    pub t_number: Option<f64>,
     /// f-number of the cone at the image of this object.
     pub working_f_number: f64,
     /// The first order of the x–z plane, where it is not that of the y–z plane, which the numbers above are of.

@@ -253,19 +253,13 @@ impl LensData {
         let has_odd_apertures = !lens.is_rotational() || mono.n_obscurations() > 0;
         let f_number_of_light = has_odd_apertures.then(|| mono.f_number_of_light()).flatten();
         let transmission = mono.axial_transmission(object_distance_mm);
-        // Of a stop that is no circle, by how its area compares with that of the round axial beam.
-        let real_f_number = mono.real_f_number();
-        let f_number_by_area = match (f_number_of_light, real_f_number) {
-            (Some(of_light), Some(real)) => first.f_number * (of_light / real),
-            (of_light, _) => of_light.unwrap_or(first.f_number),
-        };
-        let t_number = transmission.map(|share| f_number_by_area / share.sqrt());
+        let t_number = transmission.map(|share| mono.f_number_by_area() / share.sqrt());
         let [half_light_field_deg, last_light_field_deg] = field_limits_deg(&mono, [0.5, 0.01]);
         Ok(Self {
             lens: lens.name().to_owned(),
             configurations: Vec::new(),
             first_order: first,
-            real_f_number,
+            real_f_number: mono.real_f_number(),
             f_number_of_light,
             transmission,
             t_number,

@@ -157,8 +157,10 @@ impl ReflectionData {
     pub fn in_words(&self) -> Option<String> {
         let percent = |share: f64| format!("{:.2} %", 100.0 * share);
         match (self.lens_reflections, self.share, self.veil) {
-            (LensReflections::Ghosts, Some(share), _) => Some(format!("ghosts {} of the light", percent(share))),
-            (LensReflections::Ghosts, None, Some(veil)) => {
+            (LensReflections::Ghosts | LensReflections::Film(_), Some(share), _) => {
+                Some(format!("ghosts {} of the light", percent(share)))
+            }
+            (LensReflections::Ghosts | LensReflections::Film(_), None, Some(veil)) => {
                 Some(format!("ghosts, about {} of the light", percent(veil)))
             }
             (LensReflections::Off, _, Some(veil)) if veil > 0.0 => {

@@ -5,7 +5,10 @@
 //! that way counts for all. The mean is that of all ways, without bias. Since all pairs take as long as ten rays straight through, a sample follows one
 //! of its eight wavelengths, which counts for all of them. Light that surfaces reflect four times and more is left out.
 
-use dioptric_optics::{FilmGhosts, RayBatchF32, glam::DVec3};
+use dioptric_optics::{
+    FilmGhosts, MirrorFilm, RayBatchF32,
+    glam::{DVec2, DVec3},
+};
 
 use super::LensCamera;
 use crate::{
@@ -28,13 +31,14 @@ pub(super) struct Ghosts {
 const WAY_PAIR: u32 = u32::MAX - 2;
 
 impl LensCamera {
-    /// Returns the camera with the light that two surfaces of its lens reflect to the film. A lens that loses no light at surfaces has none.
+    /// Returns the camera with the light that two surfaces of its lens reflect to the film, which itself reflects a share of its light as a mirror
+    /// does. A lens that loses no light at surfaces has none.
     ///
     /// Such light is not diffracted.
     ///
     /// # Errors
     /// When the lens is tilted or decentered or has mirrors or gratings, the film reaches into the last surface, or there is an array before the film.
-    pub fn with_ghosts(self) -> Result<Self, BackwardError> {
+    pub fn with_ghosts(self, film_reflectance: f64) -> Result<Self, BackwardError> {
         let wrong = |found: &str, expected| Err(BackwardError::setting("the reflections of the lens", found, expected));
         if self.micro_array.is_some() {
             return wrong("ghosts behind an array before the film", "none");
@@ -43,8 +47,14 @@ impl LensCamera {
         if lens.is_lossless() {
             return Ok(self);
         }
+        let film = MirrorFilm {
+            distance_mm: self.settings.film_distance_mm,
+            reflectance: film_reflectance,
+            half_mm: 0.5 * self.settings.film_size_mm,
+            center_mm: DVec2::ZERO,
+        };
         let lenses: Vec<FilmGhosts> =
-            self.lenses.iter().map(|lens| Ok(lens.ghosts()?)).collect::<Result<_, BackwardError>>()?;
+            self.lenses.iter().map(|lens| Ok(lens.ghosts(&film)?)).collect::<Result<_, BackwardError>>()?;
         let reach_mm = 0.5 * self.settings.film_size_mm.length();
         let Some(radius_mm) = lens.rear_circle_mm(self.settings.film_distance_mm, reach_mm) else {
             return wrong("a film within the hollow of the last surface", "a film behind that surface");

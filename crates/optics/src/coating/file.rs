@@ -1,23 +1,25 @@
-//! Coatings as files: tables of reflectance as CSV, anything else as RON.
+//! Coatings as files: tables of reflectance as CSV, coating files of Zemax, anything else as RON.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use super::{Coating, ReflectanceTable};
+use super::{Coating, ReflectanceTable, dat};
 use crate::OpticsError;
 
 /// The largest file that is read, bytes.
 const MOST_BYTES: u64 = 16 << 20;
 
 impl Coating {
-    /// Reads a coating: a table of reflectance (`.csv` with the columns `wavelength_nm`, `angle_deg`, and `r` or both of `r_s` and `r_p`), or
-    /// a coating as lens files have it (`.ron`).
+    /// Reads a coating: a table of reflectance (`.csv` with the columns `wavelength_nm`, `angle_deg`, and `r` or both of `r_s` and `r_p`; `t`,
+    /// or `t_s` and `t_p`, where it absorbs), one of a coating file of Zemax (`COATING.DAT:NAME`), or a coating as lens files have it (`.ron`).
     ///
     /// # Errors
     /// When the file cannot be read, is neither, or makes no sense.
     pub fn read(path: &Path) -> Result<Self, OpticsError> {
+        let (file, name) = named_in_file(path);
+        let path = file.as_path();
         let failed = |reason: String| OpticsError::Io { path: path.to_owned(), reason };
         if path.extension().is_none() && !path.exists() {
-            let known = format!("coatings are {}, or a file (.csv, .ron)", Self::WORDS.join(", "));
+            let known = format!("coatings are {}, or a file (.csv, .ron, .dat:NAME)", Self::WORDS.join(", "));
             return Err(OpticsError::Unknown { kind: "coating", name: path.display().to_string(), known });
         }
         let size = std::fs::metadata(path).map_err(|error| failed(format!("cannot be read: {error}")))?.len();
@@ -28,14 +30,28 @@ impl Coating {
         let is = |extension: &str| path.extension().is_some_and(|found| found.eq_ignore_ascii_case(extension));
         let coating = if is("csv") {
             table_from_csv(&text).map(Self::Table)
+        } else if is("dat") {
+            dat::parse(&text, name.as_deref())
         } else if is("ron") {
             dioptric_files::ron::from_text(&text).map_err(|error| error.to_string())
         } else {
-            Err(format!("has no ending of a coating, expected .csv or .ron (or one of {})", Self::WORDS.join(", ")))
+            Err(format!(
+                "has no ending of a coating, expected .csv, .ron or .dat (or one of {})",
+                Self::WORDS.join(", ")
+            ))
         };
         let coating = coating.map_err(failed)?;
         coating.check().map_err(|error| failed(error.to_string()))?;
         Ok(coating)
+    }
+}
+
+/// Returns the file of a path, and what stands behind a colon at its end where it is one of Zemax.
+fn named_in_file(path: &Path) -> (PathBuf, Option<String>) {
+    let words = path.to_string_lossy();
+    match words.rsplit_once(':') {
+        Some((file, name)) if file.to_ascii_lowercase().ends_with(".dat") => (file.into(), Some(name.to_owned())),
+        _ => (path.to_owned(), None),
     }
 }
 
@@ -47,9 +63,11 @@ fn table_from_csv(text: &str) -> Result<ReflectanceTable, String> {
     let (_, header) = lines.next().ok_or("is empty, expected wavelength_nm,angle_deg,r or r_s,r_p")?;
     let names: Vec<String> =
         header.split(',').map(|name| name.trim().trim_matches('"').trim().to_lowercase()).collect();
-    const KNOWN: [&str; 5] = ["wavelength_nm", "angle_deg", "r", "r_s", "r_p"];
+    const KNOWN: [&str; 8] = ["wavelength_nm", "angle_deg", "r", "r_s", "r_p", "t", "t_s", "t_p"];
     if let Some(unknown) = names.iter().find(|name| !KNOWN.contains(&name.as_str())) {
-        return Err(format!("column '{unknown}' is unknown, expected wavelength_nm, angle_deg and r, or r_s and r_p"));
+        return Err(format!(
+            "column '{unknown}' is unknown, expected wavelength_nm, angle_deg and r, or r_s and r_p, and t, or t_s and t_p"
+        ));
     }
     if let Some(twice) = names.iter().enumerate().find(|(i, name)| names[..*i].contains(name)) {
         return Err(format!("has the column {} twice", twice.1));
@@ -62,7 +80,13 @@ fn table_from_csv(text: &str) -> Result<ReflectanceTable, String> {
         (None, Some(s), Some(p)) => [s, p],
         _ => return Err("needs either the column r or both of r_s and r_p".to_owned()),
     };
-    let mut rows: Vec<[f64; 4]> = Vec::new();
+    let transmittances = match (column("t"), column("t_s"), column("t_p")) {
+        (None, None, None) => None,
+        (Some(t), None, None) => Some([t, t]),
+        (None, Some(s), Some(p)) => Some([s, p]),
+        _ => return Err("has a part of t, or of t_s and t_p, expected either the one or both of the others".to_owned()),
+    };
+    let mut rows: Vec<[f64; 6]> = Vec::new();
     for (line, text) in lines {
         let cells: Vec<&str> = text.split(',').map(str::trim).collect();
         if cells.len() != names.len() {
@@ -75,8 +99,15 @@ fn table_from_csv(text: &str) -> Result<ReflectanceTable, String> {
                 .filter(|v| v.is_finite())
                 .ok_or(format!("line {line}: '{}' is no number", cells[i]))
         };
-        rows.push([number(nm)?, number(deg)?, number(reflectances[0])?, number(reflectances[1])?]);
+        let [s, p] = reflectances;
+        let [t_s, t_p] = transmittances.unwrap_or(reflectances);
+        rows.push([number(nm)?, number(deg)?, number(s)?, number(p)?, number(t_s)?, number(t_p)?]);
     }
+    table_of(rows, transmittances.is_some())
+}
+
+/// Returns the table of rows: wavelength, nm, angle, degrees, shares reflected of s and p, and those transmitted, if these count.
+pub(super) fn table_of(mut rows: Vec<[f64; 6]>, transmits: bool) -> Result<ReflectanceTable, String> {
     let distinct = |k: usize| {
         let mut list: Vec<f64> = rows.iter().map(|row| row[k]).collect();
         list.sort_by(f64::total_cmp);
@@ -96,9 +127,12 @@ fn table_from_csv(text: &str) -> Result<ReflectanceTable, String> {
     if let Some(twice) = rows.windows(2).find(|two| two[0][..2] == two[1][..2]) {
         return Err(format!("states {} nm at {} degrees twice", twice[0][0], twice[0][1]));
     }
-    let values = |k: usize| rows.chunks(angles_deg.len()).map(|row| row.iter().map(|r| r[k]).collect()).collect();
+    let values = |k: usize| -> Vec<Vec<f64>> {
+        rows.chunks(angles_deg.len()).map(|row| row.iter().map(|r| r[k]).collect()).collect()
+    };
     let (r_s, r_p) = (values(2), values(3));
-    Ok(ReflectanceTable { wavelengths_nm, angles_deg, r_s, r_p })
+    let [t_s, t_p] = if transmits { [values(4), values(5)] } else { Default::default() };
+    Ok(ReflectanceTable { wavelengths_nm, angles_deg, r_s, r_p, t_s, t_p })
 }
 
 #[cfg(test)]
@@ -120,9 +154,19 @@ mod tests {
     }
 
     #[test]
+    fn what_is_transmitted_may_be_stated() {
+        let table = table_from_csv("wavelength_nm,angle_deg,r,t\n500,0,.1,.7\n").unwrap();
+        assert_eq!((table.t_s.clone(), table.t_p.clone()), (vec![vec![0.7]], vec![vec![0.7]]));
+        table.check().unwrap();
+        let much = table_from_csv("wavelength_nm,angle_deg,r,t_s,t_p\n500,0,.1,.7,.95\n").unwrap();
+        assert!(much.check().unwrap_err().to_string().contains("0.1 reflected and 0.95 transmitted at 500 nm"));
+    }
+
+    #[test]
     fn what_is_wrong_is_said() {
         let message = |text: &str| table_from_csv(text).unwrap_err();
-        assert!(message("wavelength_nm,angle_deg,t\n").contains("column 't' is unknown"));
+        assert!(message("wavelength_nm,angle_deg,x\n").contains("column 'x' is unknown"));
+        assert!(message("wavelength_nm,angle_deg,r,t_s\n").contains("a part of t"));
         assert!(message("wavelength_nm,angle_deg,r_s\n500,0,.1").contains("r_s and r_p"));
         assert!(message("wavelength_nm,angle_deg,r\n500,0,x").contains("line 2: 'x' is no number"));
         assert!(message("wavelength_nm,angle_deg,r\n500,0,.1\n600,10,.1").contains("2 rows"));

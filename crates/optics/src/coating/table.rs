@@ -1,14 +1,14 @@
-//! Reflectances as measured, by wavelength and angle.
+//! Reflectances and transmittances as measured, by wavelength and angle.
 
 use serde::{Deserialize, Serialize};
 
 use crate::OpticsError;
 
-/// What a coating reflects, by wavelength and by the angle of incidence in the medium of lower index, air as a rule.
+/// What a coating reflects and transmits, by wavelength and by the angle of incidence in the medium of lower index, air as a rule.
 ///
 /// Between wavelengths it is interpolated along straight lines, between angles by monotone cubics. Before the first angle it is as there.
 /// Beyond the last it rises to 1 at 90° as the reflectance of surfaces does, `R + (1 − R) (1 − cos θ / cos θ_last)⁵` (Schlick, *An
-/// Inexpensive BRDF Model for Physically-based Rendering*, 1994).
+/// Inexpensive BRDF Model for Physically-based Rendering*, 1994), and what is transmitted falls as what is not reflected.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ReflectanceTable {
@@ -20,6 +20,12 @@ pub struct ReflectanceTable {
     pub r_s: Vec<Vec<f64>>,
     /// The same of light whose field is in that plane.
     pub r_p: Vec<Vec<f64>>,
+    /// The shares transmitted of both, where the coating absorbs: what is left out goes on. Both or neither.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub t_s: Vec<Vec<f64>>,
+    /// The second of them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub t_p: Vec<Vec<f64>>,
 }
 
 /// The largest angle that may stand for light that falls straight on a surface, degrees: instruments measure at 5 to 12.
@@ -48,7 +54,9 @@ impl ReflectanceTable {
                  {STRAIGHT_ON_DEG}) to at most 90"
             ));
         }
-        for (what, rows) in [("r_s", &self.r_s), ("r_p", &self.r_p)] {
+        let has_none = self.t_s.is_empty() && self.t_p.is_empty();
+        let all = [("r_s", &self.r_s), ("r_p", &self.r_p), ("t_s", &self.t_s), ("t_p", &self.t_p)];
+        for (what, rows) in all.into_iter().take(if has_none { 2 } else { 4 }) {
             let is_full =
                 rows.len() == self.wavelengths_nm.len() && rows.iter().all(|row| row.len() == self.angles_deg.len());
             if !is_full {
@@ -62,14 +70,26 @@ impl ReflectanceTable {
                 return wrong(format!("{what} of a table of reflectance is {found}, expected 0 to 1"));
             }
         }
+        for (r, t) in [(&self.r_s, &self.t_s), (&self.r_p, &self.t_p)] {
+            for ((nm, r), t) in self.wavelengths_nm.iter().zip(r).zip(t) {
+                for ((deg, r), t) in self.angles_deg.iter().zip(r).zip(t) {
+                    if r + t > 1.0 + ROUNDING {
+                        return wrong(format!(
+                            "a table of reflectance has {r} reflected and {t} transmitted at {nm} nm and {deg} degrees, \
+                             expected 1 at most together"
+                        ));
+                    }
+                }
+            }
+        }
         Ok(())
     }
 
-    /// Returns the table at a wavelength: for each angle, degrees, the shares reflected of s and p.
+    /// Returns the table at a wavelength: for each angle, degrees, the shares reflected of s and p, and those transmitted.
     ///
     /// # Errors
     /// Beyond the table's wavelengths.
-    pub(crate) fn at(&self, wavelength_nm: f64) -> Result<Vec<(f64, [f64; 2])>, OpticsError> {
+    pub(crate) fn at(&self, wavelength_nm: f64) -> Result<Vec<TableRow>, OpticsError> {
         let list = &self.wavelengths_nm;
         let (first, last) = (list[0], list[list.len() - 1]);
         if !(first..=last).contains(&wavelength_nm) {
@@ -84,13 +104,25 @@ impl ReflectanceTable {
             step => (wavelength_nm - list[below]) / step,
         };
         let between = |rows: &[Vec<f64>], j: usize| rows[below][j] + share * (rows[above][j] - rows[below][j]);
-        let angle = |(j, &deg): (usize, &f64)| (deg, [between(&self.r_s, j), between(&self.r_p, j)]);
+        let angle = |(j, &deg): (usize, &f64)| {
+            let [r_s, r_p] = [between(&self.r_s, j), between(&self.r_p, j)];
+            match self.t_s.is_empty() {
+                true => (deg, [r_s, r_p, 1.0 - r_s, 1.0 - r_p]),
+                false => (deg, [r_s, r_p, between(&self.t_s, j), between(&self.t_p, j)]),
+            }
+        };
         Ok(self.angles_deg.iter().enumerate().map(angle).collect())
     }
 }
 
-/// Returns the shares of s and p reflected at a cosine of incidence, of a table at one wavelength.
-pub(crate) fn share_between(table: &[(f64, [f64; 2])], cos: f64) -> [f64; 2] {
+/// An angle, degrees, and the shares reflected of s and p and transmitted of both.
+pub(crate) type TableRow = (f64, [f64; 4]);
+
+/// By how much shares of a file may exceed 1 together: they have six digits.
+const ROUNDING: f64 = 1e-5;
+
+/// Returns the shares of s and p reflected at a cosine of incidence, and those transmitted, of a table at one wavelength.
+pub(crate) fn share_between(table: &[TableRow], cos: f64) -> [f64; 4] {
     let deg = cos.clamp(0.0, 1.0).acos().to_degrees();
     let above = table.partition_point(|(at, _)| *at <= deg);
     let last = table.len() - 1;
@@ -100,7 +132,9 @@ pub(crate) fn share_between(table: &[(f64, [f64; 2])], cos: f64) -> [f64; 2] {
     let (from_deg, from_r) = table[above - 1];
     if above > last {
         let rise = (1.0 - cos.max(0.0) / from_deg.to_radians().cos()).clamp(0.0, 1.0).powi(5);
-        return if from_deg < 90.0 { from_r.map(|r| r + (1.0 - r) * rise) } else { from_r };
+        let [r_s, r_p, t_s, t_p] = from_r;
+        let risen = [r_s + (1.0 - r_s) * rise, r_p + (1.0 - r_p) * rise, t_s * (1.0 - rise), t_p * (1.0 - rise)];
+        return if from_deg < 90.0 { risen } else { from_r };
     }
     let (to_deg, to_r) = table[above];
     let step = to_deg - from_deg;
@@ -115,7 +149,7 @@ pub(crate) fn share_between(table: &[(f64, [f64; 2])], cos: f64) -> [f64; 2] {
 
 /// Returns the slope of a share per degree at an angle of a table: the harmonic mean of those beside it, so that no cubic leaves the range
 /// of its ends (Fritsch & Butland 1984); level at the first, as what is even about 0° is.
-fn slope_at(table: &[(f64, [f64; 2])], i: usize, k: usize) -> f64 {
+fn slope_at(table: &[TableRow], i: usize, k: usize) -> f64 {
     let secant = |i: usize| (table[i + 1].1[k] - table[i].1[k]) / (table[i + 1].0 - table[i].0);
     if i == 0 {
         return 0.0;
@@ -138,14 +172,17 @@ mod tests {
             angles_deg: vec![0.0, 30.0],
             r_s: vec![vec![0.01, 0.03], vec![0.02, 0.04]],
             r_p: vec![vec![0.01, 0.0], vec![0.02, 0.01]],
+            t_s: Vec::new(),
+            t_p: Vec::new(),
         }
     }
 
     #[test]
     fn cubics_lie_between_points_and_a_rise_beyond() {
         let at = table().at(500.0).unwrap();
-        let close = |found: [f64; 2], expected: [f64; 2]| {
+        let close = |found: [f64; 4], expected: [f64; 2]| {
             assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{found:?} {expected:?}");
+            assert!((0..2).all(|k| (found[k] + found[k + 2] - 1.0).abs() < 1e-12), "{found:?}");
         };
         // Halfway with slopes of 0 and of the secant: less than the mean by an eighth of the step.
         close(share_between(&at, 15f64.to_radians().cos()), [0.025 - 0.02 / 8.0, 0.01 + 0.01 / 8.0]);
@@ -154,7 +191,7 @@ mod tests {
         close(share_between(&at, 0.0), [1.0, 1.0]);
         // Catalogues state one angle, instruments measure at 8°: at small angles that is what a coating reflects.
         for deg in [0.0, 8.0] {
-            let single = [(deg, [0.01, 0.01])];
+            let single = [(deg, [0.01, 0.01, 0.99, 0.99])];
             close(share_between(&single, 1.0), [0.01, 0.01]);
             assert!(share_between(&single, 20f64.to_radians().cos())[0] < 0.0101);
         }
@@ -177,6 +214,12 @@ mod tests {
         );
         assert!(message(ReflectanceTable { r_p: vec![vec![0.1; 2]], ..table() }).contains("needs 2 rows"));
         assert!(message(ReflectanceTable { angles_deg: vec![25.0, 30.0], ..table() }).contains("25 to 30 degrees"));
+        let gray = |t: f64| ReflectanceTable { t_s: vec![vec![t; 2]; 2], t_p: vec![vec![t; 2]; 2], ..table() };
+        assert!(message(gray(0.98)).contains("0.03 reflected and 0.98 transmitted at 400 nm and 30 degrees"));
+        assert!(message(ReflectanceTable { t_p: Vec::new(), ..gray(0.5) }).contains("t_p of a table"));
+        let half = share_between(&gray(0.5).at(400.0).unwrap(), 60f64.to_radians().cos());
+        let rise = (1.0 - 0.5 / 30f64.to_radians().cos()).powi(5);
+        assert!((half[2] - 0.5 * (1.0 - rise)).abs() < 1e-12, "{half:?}");
         assert!(table().at(700.0).unwrap_err().to_string().contains("from 400 to 600 nm"));
     }
 }

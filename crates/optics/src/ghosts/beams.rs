@@ -4,13 +4,17 @@ use std::ops::Range;
 
 use glam::{DMat2, DVec2, DVec3};
 
-use crate::{MonoLens, ObjectPoint, OpticsError, RayBatchF32, trace::GhostTree, transmission::GHOST_TERMS};
+use crate::{
+    MirrorFilm, MonoLens, ObjectPoint, OpticsError, RayBatchF32, ghosts::PAIR, trace::GhostTree,
+    transmission::GHOST_TERMS,
+};
 
 /// A lens at one wavelength, of which the light of points that two surfaces reflect is followed to a film.
 #[derive(Clone, Debug)]
 pub struct GhostBeams {
     lens: MonoLens,
     tree: GhostTree<f32>,
+    is_rotational: bool,
 }
 
 /// The light of a point that falls on a small square before the lens, as one pair of surfaces sends it to the film.
@@ -38,13 +42,15 @@ struct Grid {
 type Landing = [f32; 3];
 
 impl MonoLens {
-    /// Returns the lens for drawing ghosts on a film so far behind the last vertex.
+    /// Returns the lens for drawing ghosts on a film.
     ///
     /// # Errors
     /// When the lens is tilted or decentered or has mirrors or gratings, or the film is curved or at no finite distance.
-    pub fn ghost_beams(&self, film_distance_mm: f64) -> Result<GhostBeams, OpticsError> {
-        self.check_ghosts(film_distance_mm)?;
-        Ok(GhostBeams { lens: self.clone(), tree: self.ghost_tree(film_distance_mm, false, GHOST_TERMS) })
+    pub fn ghost_beams(&self, film: &MirrorFilm) -> Result<GhostBeams, OpticsError> {
+        self.check_ghosts(film)?;
+        // A film with ends is no body of revolution.
+        let is_rotational = self.is_rotational() && film.reflectance == 0.0;
+        Ok(GhostBeams { lens: self.clone(), tree: self.ghost_tree(film, false, GHOST_TERMS), is_rotational })
     }
 }
 
@@ -66,24 +72,26 @@ impl GhostBeams {
     ) {
         assert!(part < of, "part {part} of {of}");
         // A lens of revolution is met in the plane of the point, half of it.
-        let (point, turn) = if self.lens.is_rotational() { in_plane(point) } else { (*point, DMat2::IDENTITY) };
+        let (point, turn) = if self.is_rotational { in_plane(point) } else { (*point, DMat2::IDENTITY) };
         let (radius_mm, rim_z_mm) = (self.lens.semi_aperture_mm(0), self.lens.front_rim_z_mm());
-        let grid = Grid::new(radius_mm, n_rays, self.lens.is_rotational());
+        let grid = Grid::new(radius_mm, n_rays, self.is_rotational);
         let rows = grid.n_across * part / of..grid.n_across * (part + 1) / of;
         let around = rows.start.saturating_sub(1)..(rows.end + 1).min(grid.n_across);
         let (cells, at) = grid.cells(around.clone());
         let targets_mm: Vec<DVec2> = cells.iter().map(|&cell| grid.middle_mm(cell)).collect();
         let mut rays = RayBatchF32::from(&self.lens.rays_towards(&point, &targets_mm, rim_z_mm, 0.0));
-        let n = self.lens.n_surfaces();
+        // The film may be one of both.
+        let n = self.lens.n_surfaces() + 1;
         let mut landings: Vec<Vec<Landing>> = vec![Vec::new(); n * n];
-        self.tree.trace(&rays.slices(), &mut |pair, start, [x, y, ..], shares| {
-            let Some([first, second]) = pair else { return };
-            let list = &mut landings[first * n + second];
+        let mut land = |way: &[u16], start: usize, [x, y, ..]: [&[f32]; 5], shares: &[f64]| {
+            let &[first, second] = way else { return };
+            let list = &mut landings[usize::from(first) * n + usize::from(second)];
             list.resize(cells.len(), [0.0; 3]);
             for (i, landing) in list.iter_mut().skip(start).take(shares.len()).enumerate() {
                 *landing = [x[i], y[i], shares[i] as f32];
             }
-        });
+        };
+        self.tree.trace(&rays.slices(), PAIR, &mut land);
         let neighbor = |row: usize, column: usize| {
             let is_there = around.contains(&row) && column < grid.n_across;
             is_there.then(|| at[(row - around.start) * grid.n_across + column]).filter(|&i| i != NONE)

@@ -3,7 +3,11 @@
 use glam::{DVec2, DVec3};
 
 use crate::{
-    MonoLens, OpticsError, RayBatchF32, ReversedLens, rays::RaySlices, trace::GhostTree, transmission::GHOST_TERMS,
+    MirrorFilm, MonoLens, OpticsError, RayBatchF32, ReversedLens,
+    ghosts::{PAIR, on_disc},
+    rays::RaySlices,
+    trace::GhostTree,
+    transmission::GHOST_TERMS,
 };
 
 /// A lens at one wavelength, for rays from the film that two of its surfaces reflect.
@@ -24,21 +28,48 @@ pub struct GhostRay {
 }
 
 impl ReversedLens {
-    /// Returns the ghosts of the lens as they are met from the film.
+    /// Returns the ghosts of the lens as they are met from a film.
     ///
     /// # Errors
-    /// When the lens is tilted or decentered or has mirrors or gratings.
-    pub fn ghosts(&self) -> Result<FilmGhosts, OpticsError> {
+    /// When the lens is tilted or decentered or has mirrors or gratings, or the film reflects and is curved.
+    pub fn ghosts(&self, film: &MirrorFilm) -> Result<FilmGhosts, OpticsError> {
         let lens = self.forward();
-        // The film may be curved: rays come from any place.
-        if lens.placements().is_some() {
-            lens.check_ghosts(0.0)?;
+        // One that reflects nothing may be curved: rays come from any place.
+        if lens.placements().is_some() || film.reflectance != 0.0 {
+            lens.check_ghosts(film)?;
         }
-        Ok(FilmGhosts { tree: lens.ghost_tree(0.0, true, GHOST_TERMS) })
+        Ok(FilmGhosts { tree: lens.ghost_tree(film, true, GHOST_TERMS) })
     }
 }
 
 impl MonoLens {
+    /// Returns the veiling glare of even light from all sides: what surfaces reflect twice to a place of the film, mm in the lens frame, over what
+    /// the lens images there, as in the middle of a small black spot and beside it (ISO 9358). `None` where no light comes there, or the film
+    /// reaches into the hollow of the last surface.
+    ///
+    /// # Errors
+    /// As [`ghosts`](Self::ghosts).
+    pub fn veiling_glare(&self, place_mm: DVec2, film: &MirrorFilm, n_rays: usize) -> Result<Option<f64>, OpticsError> {
+        self.check_ghosts(film)?;
+        let Some(radius_mm) = self.rear_circle_mm(film.distance_mm, place_mm.length()) else { return Ok(None) };
+        let tree = self.ghost_tree::<f32>(film, true, GHOST_TERMS);
+        // The frame is mirrored: light runs towards +z, from a film before the lens.
+        let (mut rays, mut weights) = (RayBatchF32::default(), Vec::new());
+        for target_mm in on_disc(radius_mm, n_rays, false) {
+            let way = (target_mm - place_mm).extend(film.distance_mm);
+            rays.push(target_mm.extend(-self.last_vertex_z_mm()), way.normalize());
+            weights.push((film.distance_mm / way.length_squared()).powi(2));
+        }
+        let mut sums = [0.0; 2];
+        let mut sum = |way: &[u16], start: usize, _: [&[f32]; 5], shares: &[f64]| {
+            let lit = shares.iter().enumerate().filter(|(_, share)| **share > 0.0);
+            sums[usize::from(!way.is_empty())] += lit.map(|(i, share)| share * weights[start + i]).sum::<f64>();
+        };
+        tree.trace(&rays.slices(), PAIR, &mut sum);
+        let [direct, ghosts] = sums;
+        Ok((direct > 0.0).then(|| ghosts / direct))
+    }
+
     /// Returns the radius of a circle in the last vertex plane that all rays cross which come to the last surface from film places up to
     /// `reach_mm` from the axis, so far behind the vertex; `None` where the film reaches into the hollow of that surface.
     pub fn rear_circle_mm(&self, film_distance_mm: f64, reach_mm: f64) -> Option<f64> {
@@ -74,8 +105,8 @@ impl FilmGhosts {
         flip(&mut slices);
         let mut numbers = drawn.to_vec();
         let mut ways: Vec<Option<GhostRay>> = vec![None; numbers.len()];
-        self.tree.trace(&slices, &mut |pair, start, [x, y, l, m, n], shares| {
-            if pair.is_none() {
+        let mut draw = |way: &[u16], start: usize, [x, y, l, m, n]: [&[f32]; 5], shares: &[f64]| {
+            if way.is_empty() {
                 return;
             }
             let lit = shares.iter().enumerate().filter(|(_, share)| **share > 0.0);
@@ -96,7 +127,8 @@ impl FilmGhosts {
                     }
                 }
             }
-        });
+        };
+        self.tree.trace(&slices, PAIR, &mut draw);
         flip(&mut slices);
         ways
     }

@@ -45,6 +45,12 @@ impl<T: Real> LightPass<T> {
     pub(crate) const NOTHING: Self =
         Self { argument: Argument::Product, scale: T::ONE, offset: T::ZERO, series: None, per_mm: T::ZERO };
 
+    /// A surface that leaves this share of light, however polarized.
+    pub(crate) fn constant(share: T) -> Self {
+        let series = Some([vec![share], Vec::new(), vec![share], Vec::new()]);
+        Self { series, ..Self::NOTHING }
+    }
+
     pub(super) fn is_nothing(&self) -> bool {
         self.series.is_none() && self.per_mm == T::ZERO
     }
@@ -256,6 +262,11 @@ impl<T: Real, const N: usize> Lane<T, N> {
     pub(super) fn share(&self, i: usize) -> f64 {
         let (power, depth) = (self.power[i].to_f64(), self.depth[i].to_f64());
         if depth == 0.0 { power } else { power * (-depth).exp() }
+    }
+
+    /// Returns the share of a ray's light that media have left since it was as before.
+    pub(super) fn clear_since(&self, before: &Self, i: usize) -> f64 {
+        (before.depth[i] - self.depth[i]).to_f64().exp()
     }
 
     /// Sees the light in a frame mirrored at the plane z = 0, in which U and V turn the other way.

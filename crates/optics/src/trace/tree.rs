@@ -1,7 +1,7 @@
-//! Light that is reflected twice on its way through centered surfaces: all pairs of surfaces at once.
+//! Light that is reflected on its way through centered surfaces: all ways of two reflections at once, of four, and of more.
 //!
-//! Blocks go forward through the lens once. From each surface they go back, and from each that they meet on the way forward again; so what
-//! pairs have in common is traced once. Behind a reflection the frame is mirrored at the vertex plane of the surface, so that light always
+//! Blocks go forward through the lens. From each surface they go back, and from each that they meet on the way forward again; so what
+//! ways have in common is traced once. Behind a reflection the frame is mirrored at the vertex plane of the surface, so that light always
 //! runs towards +z and the kernels do the work; behind the second it is the frame of the lens again.
 
 use super::{
@@ -17,6 +17,9 @@ use crate::rays::RaySlices;
 /// Blocks that go through the tree together.
 const TREE_BLOCKS: usize = 4;
 
+/// Light below this share of that of the source is followed no further once it has been reflected twice.
+const LEAST_SHARE: f64 = 1e-10;
+
 /// What a surface does to light that comes one way: lets it on, or sends it back.
 #[derive(Clone, Debug)]
 struct Side<T> {
@@ -24,9 +27,11 @@ struct Side<T> {
     on_light: LightPass<T>,
     back: Pass<T>,
     back_light: Option<LightPass<T>>,
+    /// Whether it is the film, where light ends: what it sends back it has got.
+    is_film: bool,
 }
 
-/// The surfaces of a lens for light that turns back twice.
+/// The surfaces of a lens for light that turns back.
 #[derive(Clone, Debug)]
 pub(crate) struct GhostTree<T> {
     forward: Vec<Side<T>>,
@@ -55,18 +60,23 @@ struct Lit<T: Real> {
 
 impl<T: Real> GhostTree<T> {
     /// Prepares these steps, as light meets them forward and, mirrored, backward (both in the order from the first surface), for a film so
-    /// far behind the last vertex.
+    /// far behind the last vertex; the step that is the film itself, if one is, sends back what falls within its openings.
     pub(crate) fn new(
         [forward, backward]: [&[Step]; 2],
         [forward_light, backward_light]: [Vec<SideLight<T>>; 2],
         film_mm: f64,
+        film_step: Option<usize>,
     ) -> Self {
         let side = |steps: &[Step], i: usize, light: SideLight<T>| {
             let pass = |is_mirror: bool| {
-                let step = Step { is_mirror: is_mirror || steps[i].is_mirror, ..steps[i].clone() };
+                let mut step = Step { is_mirror: is_mirror || steps[i].is_mirror, ..steps[i].clone() };
+                if film_step == Some(i) && !is_mirror {
+                    step.apertures.clear();
+                }
                 Plan::new(&[step], 0, Vignetting::On).passes.swap_remove(0)
             };
-            Side { on: pass(false), on_light: light.on, back: pass(true), back_light: light.back }
+            let is_film = film_step == Some(i);
+            Side { on: pass(false), on_light: light.on, back: pass(true), back_light: light.back, is_film }
         };
         let sides = |steps: &[Step], lights: Vec<SideLight<T>>| -> Vec<Side<T>> {
             let of = |(i, light)| side(steps, i, light);
@@ -90,74 +100,172 @@ impl<T: Real> GhostTree<T> {
         }
     }
 
-    /// Sends rays through the lens. `note` sees what reaches the film: the pair of surfaces that light comes back from, the first of them
-    /// the one that it meets first, or none of light that goes straight on; the number of the first ray; x and y on the film, mm, and the
-    /// directions there; and the shares of the light, 0 of rays that end.
-    pub(crate) fn trace(
-        &self,
-        rays: &RaySlices<'_, T>,
-        note: &mut impl FnMut(Option<[usize; 2]>, usize, [&[T]; 5], &[f64]),
-    ) {
-        let n = self.forward.len();
-        // Where the light is before each surface and behind the last, and room for what is on its way back and forward again.
-        let mut there = vec![Lit::EMPTY; n + 1];
-        let [mut back, mut back_on, mut again, mut again_on] = [const { Lit::EMPTY }; 4];
+    /// Sends rays through the lens, which surfaces reflect so often at most, an even number; `sink` sees what becomes of their light.
+    pub(crate) fn trace<S: LightSink<T>>(&self, rays: &RaySlices<'_, T>, most_bounces: usize, sink: &mut S) {
         for start in (0..rays.fate.len()).step_by(LANES * TREE_BLOCKS) {
-            there[0] = Lit::load(rays, start, self.first_z);
-            kernel::approach(self.index_before, &mut there[0].rays);
-            for (i, side) in self.forward.iter().enumerate() {
-                let (before, behind) = there.split_at_mut(i + 1);
-                side.pass_on(&before[i], &mut behind[0], side.on.shift);
+            let mut lit = Lit::load(rays, start, self.first_z);
+            kernel::approach(self.index_before, &mut lit.rays);
+            let mut walk = Walk { tree: self, way: Vec::with_capacity(most_bounces), most_bounces, start, sink };
+            walk.forward(lit, 0);
+        }
+    }
+}
+
+/// What becomes of light in a lens.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Loss {
+    /// A rim, an iris or an obscuration ends it, or it misses a surface.
+    Clipped,
+    /// Glass absorbs it.
+    Glass,
+    /// A coating absorbs it, or a surface reflects it whose reflections are not followed.
+    Coating,
+    /// It comes out of the first surface.
+    Reflected,
+    /// It is reflected more often than is followed.
+    Beyond,
+    /// The film, on which it is counted, sends it back.
+    OffFilm,
+}
+
+/// What looks on where light goes.
+pub(crate) trait LightSink<T> {
+    /// Whether [`lost`](Self::lost) is to be told.
+    const IS_ACCOUNT: bool = false;
+
+    /// Notes light on the film: the surfaces that have reflected it, in turn; the number of the first ray; x and y on the film, mm, and the
+    /// directions there; and the shares of the light, 0 of rays that end.
+    fn on_film(&mut self, way: &[u16], start: usize, rays: [&[T]; 5], shares: &[f64]);
+
+    /// Notes light that goes elsewhere.
+    fn lost(&mut self, _loss: Loss, _start: usize, _shares: &[f64]) {}
+}
+
+impl<T, F: FnMut(&[u16], usize, [&[T]; 5], &[f64])> LightSink<T> for F {
+    fn on_film(&mut self, way: &[u16], start: usize, rays: [&[T]; 5], shares: &[f64]) {
+        self(way, start, rays, shares);
+    }
+}
+
+/// Blocks on their way through the tree.
+struct Walk<'a, T, S> {
+    tree: &'a GhostTree<T>,
+    /// The surfaces that have reflected them.
+    way: Vec<u16>,
+    most_bounces: usize,
+    start: usize,
+    sink: &'a mut S,
+}
+
+impl<T: Real, S: LightSink<T>> Walk<'_, T, S> {
+    /// Follows light that comes to a surface from before it, and on to the film.
+    fn forward(&mut self, mut lit: Lit<T>, from: usize) {
+        let (mut on, mut back) = (Lit::EMPTY, Lit::EMPTY);
+        let tree = self.tree;
+        for (j, side) in tree.forward.iter().enumerate().skip(from) {
+            if !lit.is_any_alive() {
+                return;
             }
-            self.note_on_film(None, start, &mut there[n].clone(), note);
-            for (j, first) in self.forward.iter().enumerate().skip(1) {
-                // Back from a surface …
-                if !first.send_back(&there[j], &mut back, first.back.shift) {
-                    continue;
-                }
-                for i in (0..j).rev() {
-                    if !back.is_any_alive() {
-                        break;
-                    }
-                    // The way from the surface behind is that to it.
-                    let (shift, side) = (self.forward[i + 1].on.shift, &self.backward[i]);
-                    // … and forward again from each before it.
-                    if side.send_back(&back, &mut again, shift) {
-                        for side in &self.forward[i + 1..] {
-                            if !again.is_any_alive() {
-                                break;
-                            }
-                            side.pass_on(&again, &mut again_on, side.on.shift);
-                            std::mem::swap(&mut again, &mut again_on);
-                        }
-                        self.note_on_film(Some([j, i]), start, &mut again, note);
-                    }
-                    if i > 0 {
-                        side.pass_on(&back, &mut back_on, shift);
-                        std::mem::swap(&mut back, &mut back_on);
-                    }
-                }
+            // What the first surface sends back meets no other.
+            let is_followed = self.way.len() < self.most_bounces && j > 0;
+            let comes_back = (is_followed || S::IS_ACCOUNT) && side.send_back(&lit, &mut back, side.back.shift);
+            side.pass_on(&lit, &mut on, side.on.shift);
+            if side.is_film && comes_back {
+                self.lose(Loss::OffFilm, &back);
+            } else {
+                self.account(&lit, &on, comes_back.then_some(&back));
+            }
+            if comes_back && j == 0 {
+                self.lose(Loss::Reflected, &back);
+            } else if comes_back && !(is_followed && self.is_worth(&back)) {
+                self.lose(Loss::Beyond, &back);
+            } else if comes_back {
+                self.way.push(j as u16);
+                self.backward(back.clone(), j);
+                self.way.pop();
+            }
+            std::mem::swap(&mut lit, &mut on);
+        }
+        self.note_on_film(&mut lit);
+    }
+
+    /// Follows light that a surface has sent back, out of the lens.
+    fn backward(&mut self, mut lit: Lit<T>, from: usize) {
+        let (mut on, mut back) = (Lit::EMPTY, Lit::EMPTY);
+        let tree = self.tree;
+        for i in (0..from).rev() {
+            if !lit.is_any_alive() {
+                return;
+            }
+            // The way from the surface behind is that to it.
+            let (shift, side) = (tree.forward[i + 1].on.shift, &tree.backward[i]);
+            let comes_back = side.send_back(&lit, &mut back, shift);
+            let goes_on = i > 0 || S::IS_ACCOUNT;
+            if goes_on {
+                side.pass_on(&lit, &mut on, shift);
+                self.account(&lit, &on, comes_back.then_some(&back));
+            }
+            if comes_back && !self.is_worth(&back) {
+                self.lose(Loss::Beyond, &back);
+            } else if comes_back {
+                self.way.push(i as u16);
+                self.forward(back.clone(), i + 1);
+                self.way.pop();
+            }
+            std::mem::swap(&mut lit, &mut on);
+        }
+        self.lose(Loss::Reflected, &lit);
+    }
+
+    /// Whether there is light to follow.
+    fn is_worth(&self, lit: &Lit<T>) -> bool {
+        let least = if self.way.len() < 2 { 0.0 } else { LEAST_SHARE };
+        lit.is_any_alive() && (least == 0.0 || lit.brightest() > least)
+    }
+
+    fn note_on_film(&mut self, lit: &mut Lit<T>) {
+        if !lit.is_any_alive() {
+            return;
+        }
+        kernel::to_plane(self.tree.film_mm, self.tree.index_after, &mut lit.rays);
+        for (k, block) in lit.rays.iter().enumerate() {
+            let rays = [&block.x[..], &block.y, &block.l, &block.m, &block.n];
+            self.sink.on_film(&self.way, self.start + k * LANES, rays, &lit.shares(k));
+        }
+    }
+
+    fn lose(&mut self, loss: Loss, lit: &Lit<T>) {
+        if S::IS_ACCOUNT {
+            for k in 0..TREE_BLOCKS {
+                self.sink.lost(loss, self.start + k * LANES, &lit.shares(k));
             }
         }
     }
 
-    fn note_on_film(
-        &self,
-        pair: Option<[usize; 2]>,
-        start: usize,
-        lit: &mut Lit<T>,
-        note: &mut impl FnMut(Option<[usize; 2]>, usize, [&[T]; 5], &[f64]),
-    ) {
-        if !lit.is_any_alive() {
+    /// Accounts for what a surface, and the medium before it, have taken.
+    fn account(&mut self, before: &Lit<T>, on: &Lit<T>, back: Option<&Lit<T>>) {
+        if !S::IS_ACCOUNT {
             return;
         }
-        kernel::to_plane(self.film_mm, self.index_after, &mut lit.rays);
-        for (k, (block, lane)) in lit.rays.iter().zip(&lit.light).enumerate() {
-            let mut shares = [0.0; LANES];
-            for (i, share) in shares.iter_mut().enumerate().filter(|(i, _)| block.alive[*i] != T::NO) {
-                *share = lane.share(i);
+        for k in 0..TREE_BLOCKS {
+            let (came, went) = (before.shares(k), on.shares(k));
+            let returned = back.map_or([0.0; LANES], |back| back.shares(k));
+            let mut lost = [[0.0; LANES]; 3];
+            for i in 0..LANES {
+                let arrived = match (on.is_alive(k, i), back.is_some_and(|back| back.is_alive(k, i))) {
+                    (true, _) => came[i] * on.light[k].clear_since(&before.light[k], i),
+                    (false, true) => came[i] * back.map_or(1.0, |back| back.light[k].clear_since(&before.light[k], i)),
+                    (false, false) => {
+                        lost[0][i] = came[i];
+                        continue;
+                    }
+                };
+                lost[1][i] = came[i] - arrived;
+                lost[2][i] = arrived - went[i] - returned[i];
             }
-            note(pair, start + k * LANES, [&block.x, &block.y, &block.l, &block.m, &block.n], &shares);
+            for (loss, shares) in [Loss::Clipped, Loss::Glass, Loss::Coating].into_iter().zip(&lost) {
+                self.sink.lost(loss, self.start + k * LANES, shares);
+            }
         }
     }
 }
@@ -200,6 +308,20 @@ impl<T: Real> Lit<T> {
 
     fn is_any_alive(&self) -> bool {
         self.rays.iter().any(Block::is_any_alive)
+    }
+
+    fn is_alive(&self, block: usize, i: usize) -> bool {
+        self.rays[block].alive[i] != T::NO
+    }
+
+    /// Returns the shares of the light of a block, 0 of rays that have ended.
+    fn shares(&self, block: usize) -> [f64; LANES] {
+        std::array::from_fn(|i| if self.is_alive(block, i) { self.light[block].share(i) } else { 0.0 })
+    }
+
+    /// Returns the greatest of all shares.
+    fn brightest(&self) -> f64 {
+        (0..TREE_BLOCKS).flat_map(|k| self.shares(k)).fold(0.0, f64::max)
     }
 
     fn shade(&mut self, pass: &LightPass<T>, shift: T, from: &Self) {

@@ -360,6 +360,9 @@ impl Camera {
             checker.wrong(key, &found.to_string(), expected)?;
         }
         self.blur.check(self.diffraction, checker)?;
+        if let LensReflections::Film(reflectance) = self.lens_reflections {
+            checker.number("Film", reflectance)?;
+        }
         self.check_psfs(checker)?;
         self.exposure.check().map_err(|error| checker.of_sensor(error))?;
         self.processing.check().map_err(|error| checker.of_sensor(error))?;

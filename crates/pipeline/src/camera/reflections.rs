@@ -8,8 +8,8 @@ use crate::PipelineError;
 
 /// What becomes of the light that surfaces of the lens reflect. Pictures lose it either way.
 ///
-/// As a word it is `off` or `ghosts`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+/// As a word it is `off`, `ghosts` or `film:0.1`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub enum LensReflections {
     /// It is left out.
@@ -17,14 +17,28 @@ pub enum LensReflections {
     Off,
     /// What two surfaces reflect, once each, falls on the film: ghosts of what is bright, and veil.
     Ghosts,
+    /// That, and the film reflects this share of its light back to the lens, as a mirror does.
+    Film(f64),
+}
+
+impl LensReflections {
+    /// Returns the share that the film reflects, where light that surfaces reflect falls on it.
+    pub fn film_reflectance(self) -> Option<f64> {
+        match self {
+            Self::Off => None,
+            Self::Ghosts => Some(0.0),
+            Self::Film(reflectance) => Some(reflectance),
+        }
+    }
 }
 
 impl fmt::Display for LensReflections {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Off => "off",
-            Self::Ghosts => "ghosts",
-        })
+        match self {
+            Self::Off => f.write_str("off"),
+            Self::Ghosts => f.write_str("ghosts"),
+            Self::Film(reflectance) => write!(f, "film:{reflectance}"),
+        }
     }
 }
 
@@ -32,11 +46,13 @@ impl FromStr for LensReflections {
     type Err = PipelineError;
 
     fn from_str(text: &str) -> Result<Self, Self::Err> {
-        match text {
-            "off" => Ok(Self::Off),
-            "ghosts" => Ok(Self::Ghosts),
+        let reflectance = text.strip_prefix("film:").and_then(|share| share.parse().ok());
+        match (text, reflectance) {
+            ("off", _) => Ok(Self::Off),
+            ("ghosts", _) => Ok(Self::Ghosts),
+            (_, Some(reflectance)) if (0.0..=1.0).contains(&reflectance) => Ok(Self::Film(reflectance)),
             _ => {
-                let reason = format!("found '{text}', expected off or ghosts");
+                let reason = format!("found '{text}', expected off, ghosts or film:R, with R from 0 to 1");
                 Err(PipelineError::Unsuitable { what: "lens_reflections", reason })
             }
         }
@@ -49,9 +65,12 @@ mod tests {
 
     #[test]
     fn words_are_read_as_they_are_written() {
-        for reflections in [LensReflections::Off, LensReflections::Ghosts] {
+        for reflections in [LensReflections::Off, LensReflections::Ghosts, LensReflections::Film(0.12)] {
             assert_eq!(reflections.to_string().parse::<LensReflections>().unwrap(), reflections);
         }
-        assert!("all".parse::<LensReflections>().unwrap_err().to_string().contains("expected off or ghosts"));
+        for wrong in ["all", "film", "film:", "film:1.2", "film:nan"] {
+            let message = wrong.parse::<LensReflections>().unwrap_err().to_string();
+            assert!(message.contains("expected off, ghosts or film:R"), "{message}");
+        }
     }
 }

@@ -66,7 +66,8 @@ impl Capture {
     /// Returns about what two surfaces of the lens reflect to the film over what it images there, for far points of equal brightness in three
     /// fields, at three wavelengths; none where ghosts of the lens are not followed.
     pub fn veil(&self) -> Option<f64> {
-        ghosts::veil(&self.lens.lens, &self.place, self.grid().range_nm())
+        let film_reflectance = self.camera.lens_reflections.film_reflectance().unwrap_or(0.0);
+        ghosts::veil(&self.lens.lens, &self.place, film_reflectance, self.grid().range_nm())
     }
 
     /// What is white on the film.

@@ -33,7 +33,7 @@ use super::{
     unseen_points::UnseenPoints,
     world,
 };
-use crate::{BlurSpec, DualPixelSpec, LensReflections, PaintingFolder, PipelineError, Progress, Stage};
+use crate::{BlurSpec, DualPixelSpec, PaintingFolder, PipelineError, Progress, Stage};
 
 /// The stages in their order, each asking for the ones it needs.
 #[derive(Clone, Copy)]
@@ -187,11 +187,12 @@ impl Chain<'_> {
 
     /// Images the scene through the pupil, or the part of it that a photodiode sees.
     pub(super) fn imaged(&self, inputs: &IrradianceInputs) -> Result<Irradiance, PipelineError> {
-        if inputs.reflections == LensReflections::Ghosts {
+        let film_reflectance = inputs.reflections.film_reflectance();
+        if let Some(reflectance) = film_reflectance {
             // A lens whose ghosts are not followed is told before the work.
             let film = &inputs.plan.bank.film;
-            let film_distance_mm = self.film(film, &inputs.scene)?.film_distance_mm;
-            self.lens(&film.lens)?.reference.ghost_beams(film_distance_mm)?;
+            let mirror = self.film(film, &inputs.scene)?.mirror(reflectance);
+            self.lens(&film.lens)?.reference.ghost_beams(&mirror)?;
         }
         let plan = self.plan(&inputs.plan, &inputs.scene)?;
         let resolved = self.scene(&inputs.scene)?;
@@ -212,12 +213,12 @@ impl Chain<'_> {
             Some((_, number)) => folder.map(|folder| folder.of_photodiode(number)),
         };
         let keeping = Keeping { memory_bytes, folder: folder.as_ref() };
-        let ghosts = match inputs.reflections {
-            LensReflections::Off => None,
-            LensReflections::Ghosts => {
+        let ghosts = match film_reflectance {
+            None => None,
+            Some(reflectance) => {
                 let quality = inputs.plan.bank.film.geometry.quality;
                 let n_photodiodes = inputs.plan.photodiode.map_or(1, |(spec, _)| spec.photodiodes.names().len());
-                let behind = (self.lens(&inputs.plan.bank.film.lens)?, place.clone());
+                let behind = (self.lens(&inputs.plan.bank.film.lens)?, place.clone(), reflectance);
                 Some(Ghosts::of(&plan, scene, behind, (quality, n_photodiodes))?)
             }
         };

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 
 use dioptric_forward::Film;
-use dioptric_optics::{MonoLens, ObjectPoint, Vignetting, glam::DVec2, rays_towards};
+use dioptric_optics::{MirrorFilm, MonoLens, ObjectPoint, Vignetting, glam::DVec2, rays_towards};
 use dioptric_scene::{Scene, View, flat_size_of};
 use dioptric_spectrum::DepthMap;
 use serde::{Deserialize, Serialize};
@@ -111,6 +111,12 @@ impl FilmPlace {
     pub fn film(&self) -> Film {
         let center_mm = self.part.map(|part| part.center_mm((self.rows, self.columns), self.pitch_um));
         Film { center_mm: center_mm.unwrap_or_default(), ..Film::centered(self.rows, self.columns, self.pitch_um) }
+    }
+
+    /// Returns the whole film, of which this may be a part, as a mirror that reflects this share of its light.
+    pub(super) fn mirror(&self, reflectance: f64) -> MirrorFilm {
+        let (rows, columns) = self.part.map_or((self.rows, self.columns), |part| (part.of_rows, part.of_columns));
+        Film::centered(rows, columns, self.pitch_um).as_mirror(self.film_distance_mm, reflectance)
     }
 
     /// Returns the f-number of the cone of light that a lens sends to a point of this film that is in focus.

@@ -16,6 +16,7 @@ pub(super) struct Ghosts {
     sources: GhostSources,
     lens: Arc<ResolvedLens>,
     place: Arc<FilmPlace>,
+    film_reflectance: f64,
     /// The share of it that is counted: all, or that of a photodiode.
     share: f32,
 }
@@ -25,11 +26,11 @@ impl Ghosts {
     pub(super) fn of(
         plan: &ImagingPlan,
         scene: &Scene,
-        (lens, place): (Arc<ResolvedLens>, Arc<FilmPlace>),
+        (lens, place, film_reflectance): (Arc<ResolvedLens>, Arc<FilmPlace>, f64),
         (quality, n_photodiodes): (Quality, usize),
     ) -> Result<Self, PipelineError> {
         let sources = GhostSources::of_scene(plan, &Source::of_scene(scene)?, detail(quality))?;
-        Ok(Self { sources, lens, place, share: (n_photodiodes as f32).recip() })
+        Ok(Self { sources, lens, place, film_reflectance, share: (n_photodiodes as f32).recip() })
     }
 
     /// Adds those of a band to what the film gets; returns their mean.
@@ -40,7 +41,7 @@ impl Ghosts {
         cancel: &Cancel,
     ) -> Result<f64, PipelineError> {
         let lens = self.lens.lens.at(wavelength_nm)?;
-        let on = GhostFilm { lens: &lens, film_distance_mm: self.place.film_distance_mm, film: self.place.film() };
+        let on = GhostFilm { lens: &lens, mirror: self.place.mirror(self.film_reflectance), film: self.place.film() };
         let ghosts = self.sources.irradiance(band, &on, cancel)? * self.share;
         *plane += &ghosts;
         Ok(ghosts.iter().map(|value| f64::from(*value)).sum::<f64>() / ghosts.len() as f64)
@@ -64,7 +65,12 @@ const VEIL_PLACES: [f64; 3] = [0.0, 0.5, 0.9];
 
 /// Returns what surfaces reflect to a film over what the lens images there, for far points of equal brightness in three fields, at the wavelengths
 /// that halve the thirds of a range; none where ghosts of the lens are not followed.
-pub(super) fn veil(lens: &Lens, place: &FilmPlace, (first_nm, last_nm): (f64, f64)) -> Option<f64> {
+pub(super) fn veil(
+    lens: &Lens,
+    place: &FilmPlace,
+    film_reflectance: f64,
+    (first_nm, last_nm): (f64, f64),
+) -> Option<f64> {
     let half_diagonal_mm = place.film().half_diagonal_mm();
     // A square about the image wherever that lies.
     let film_half_mm = Some(DVec2::splat(half_diagonal_mm));
@@ -75,7 +81,15 @@ pub(super) fn veil(lens: &Lens, place: &FilmPlace, (first_nm, last_nm): (f64, f6
         for share in VEIL_PLACES {
             let angle_rad = (share * half_diagonal_mm / lens.first_order().efl_mm.abs()).atan();
             let point = ObjectPoint::far(angle_rad, DVec2::Y);
-            let request = GhostRequest { point, film_distance_mm, n_rays: VEIL_RAYS, rim_z_mm, film_half_mm };
+            let request = GhostRequest {
+                point,
+                film_distance_mm,
+                n_rays: VEIL_RAYS,
+                rim_z_mm,
+                film_half_mm,
+                film_reflectance,
+                most_bounces: 2,
+            };
             let found = lens.ghosts(&request).ok()?;
             sums[0] += found.pairs.iter().map(|ghost| ghost.light.power_on_film).fold(0.0, |sum, power| sum + power);
             sums[1] += found.direct.power;

@@ -24,8 +24,8 @@ use super::{
     world_view::{horizontal_fov_deg, placement, world_camera},
 };
 use crate::{
-    Diffraction, LensReflections, PaintingFolder, PipelineError, Progress, Quality, RenderEffort, RenderMethod,
-    SceneSource, Stage, WorldLamp, WorldSky, WorldSpec, gathered::GatheredPicture, still_life,
+    Diffraction, PaintingFolder, PipelineError, Progress, Quality, RenderEffort, RenderMethod, SceneSource, Stage,
+    WorldLamp, WorldSky, WorldSpec, gathered::GatheredPicture, still_life,
 };
 
 /// Samples of a pass: as many as spread well, and few enough for a first picture soon.
@@ -267,11 +267,14 @@ impl WorldRender {
         };
         let mut identity = format!("{} {:?} {settings:?}", fingerprint(&world, spec), lens.lens);
         let camera = LensCamera::new(&lens.lens, &bands, settings)?;
-        let camera = match inputs.reflections {
-            LensReflections::Off => camera,
-            LensReflections::Ghosts => {
+        let camera = match inputs.reflections.film_reflectance() {
+            None => camera,
+            Some(film) => {
                 identity += " with ghosts";
-                camera.with_ghosts()?
+                if film > 0.0 {
+                    identity += &format!(", {film} of the light on the film among them");
+                }
+                camera.with_ghosts(film)?
             }
         };
         let camera = Camera::Lens(Box::new(camera));

@@ -121,7 +121,7 @@ class Camera:
         psfs: _Path | None = ...,
         blur: str | None = ...,
         border: str | None = ...,
-        lens_reflections: Literal["off", "ghosts"] | None = ...,
+        lens_reflections: Literal["off", "ghosts"] | str | None = ...,
         bank: Any = ...,
         bank_error: Any = ...,
         scene: Scene | _Path | None = ...,
@@ -395,6 +395,8 @@ class Lens:
     def efl_mm(self) -> float: ...
     @property
     def f_number(self) -> float: ...
+    @property
+    def t_number(self) -> float | None: ...
     def info(
         self,
         wavelengths_nm: _Numbers | None = None,

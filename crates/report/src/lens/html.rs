@@ -106,7 +106,7 @@ impl LensPage<'_> {
 
     fn first_order(&self) -> String {
         let row = |(name, of): &Quantity| self.quantity(name, *of, |v| format!("{v:.4}"));
-        let quantities: [Quantity; 17] = [
+        let quantities: [Quantity; 19] = [
             ("focal length, mm", |d| Some(d.first_order.efl_mm)),
             ("back focal length, mm", |d| Some(d.first_order.bfl_mm)),
             ("front focal length, mm", |d| Some(d.first_order.ffl_mm)),
@@ -118,6 +118,8 @@ impl LensPage<'_> {
             ("its diameter, mm", |d| Some(d.first_order.exit_pupil_diameter_mm)),
             ("f-number", |d| Some(d.first_order.f_number)),
             ("f-number of the real beam", |d| d.real_f_number),
+            ("share of the light that gets through", |d| d.transmission),
+            ("T-number", |d| d.t_number),
             ("magnification", |d| d.image.map(|image| image.magnification)),
             ("working f-number", |d| d.image.map(|image| image.working_f_number)),
             ("Petzval radius, mm", |d| d.petzval_radius_mm),

@@ -169,6 +169,7 @@ impl AnalysisPlots<'_> {
             self.0.film_radius_mm.map_or(String::new(), |radius_mm| format!(", curved by R = {radius_mm:.2} mm"));
         let along_x =
             self.0.x_plane.map_or(String::new(), |x| format!(" (along x {:.3} mm · f/{:.2})", x.efl_mm, x.f_number));
+        let t_number = self.0.t_number.map_or(String::new(), |t| format!(" · T/{t:.2}"));
         let words = match self.0.afocal {
             Some(view) => format!(
                 "afocal{} · exit pupil {:.3} mm across, {:.3} mm behind the last vertex · {object}{medium} · as angles",
@@ -177,7 +178,7 @@ impl AnalysisPlots<'_> {
                 view.exit_pupil_z_mm
             ),
             None => format!(
-                "f = {:.3} mm · f/{:.2}{along_x}{aperture} · {object}{medium} · film {:.4} mm behind the last vertex{film}",
+                "f = {:.3} mm · f/{:.2}{t_number}{along_x}{aperture} · {object}{medium} · film {:.4} mm behind the last vertex{film}",
                 self.0.efl_mm, self.0.f_number, self.0.film_distance_mm
             ),
         };

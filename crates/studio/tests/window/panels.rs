@@ -4,8 +4,8 @@ use std::{collections::BTreeSet, sync::LazyLock, time::Duration};
 
 use dioptric_pipeline::{
     BlurSpec, CAMERA_SCHEMA, Camera, Crop, Diffraction, DualPixelSpec, FillDepth, FlatSize, FocusSpec, FramesSpec,
-    Iris, LensSpec, LightPaths, Photodiodes, RenderEffort, SceneSource, SceneSpec, StopSpec, SurfaceChange,
-    WavelengthSpec, WorldSpec, with_exposure_s,
+    Iris, LensReflections, LensSpec, LightPaths, Photodiodes, RenderEffort, SceneSource, SceneSpec, StopSpec,
+    SurfaceChange, WavelengthSpec, WorldSpec, with_exposure_s,
 };
 use dioptric_scene::{Pattern, Wave};
 use dioptric_sensor::{Brightness, ColorCorrection, LensShading, ToneCurve};
@@ -78,6 +78,7 @@ const PANELS: &[(&str, &[&str])] = &[
     ("diffraction", &["Camera.diffraction", "Diffraction.Hurb"]),
     ("gamma", &["Diffraction.Hurb.gamma"]),
     ("reflections", &["Camera.lens_reflections"]),
+    ("film reflectance", &["LensReflections.Film"]),
     ("blur", &["Camera.blur"]),
     ("views", &["BlurSpec.Views"]),
     ("bands", &["Camera.wavelengths", "WavelengthSpec.Range"]),
@@ -325,6 +326,7 @@ fn world(effort: RenderEffort) -> Camera {
 fn everything(camera: &mut Camera) {
     camera.crop = Some(Crop { x: 8, y: 8, columns: 32, rows: 24 });
     camera.blur = BlurSpec::Views(4);
+    camera.lens_reflections = LensReflections::Film(0.1);
     camera.diffraction = Diffraction::Hurb { gamma: 1.0 };
     camera.wavelengths = WavelengthSpec::Range { first_nm: 400.0, last_nm: 700.0, step_nm: 100.0 };
     camera.stop = StopSpec::DiameterMm(8.0);

@@ -52,7 +52,9 @@ pub(super) fn show(ui: &mut Ui, camera: &mut Camera, product: &Product, key: u64
     }
     let response = response.accessible_name("drawing of the lens");
     if held.is_none() {
-        response.on_hover_text(words(product));
+        response.on_hover_ui(|ui| {
+            ui.label(words(product));
+        });
     }
 }
 
@@ -225,12 +227,13 @@ fn words(product: &Product) -> String {
     let (lens, place) = (&product.capture.lens, &product.capture.place);
     let first = lens.reference.first_order();
     format!(
-        "{}: f = {:.2} mm, f/{:.2}, film {:.3} mm behind the last vertex{}\nrays of the axis, of 0.6 and of all of the corner's field\n\
+        "{}: f = {:.2} mm, f/{:.2}{}, film {:.3} mm behind the last vertex{}\nrays of the axis, of 0.6 and of all of the corner's field\n\
          drag the film to focus, a surface near its rim to bend it, near the axis to move it and what lies behind; the lens moves a tenth of what the \
          pointer does, the film a twentieth",
         lens.lens.name(),
         first.efl_mm,
         first.f_number,
+        lens.reference.t_number(f64::INFINITY).map_or_else(String::new, |t| format!(" (T/{t:.2})")),
         place.film_distance_mm,
         place.focus_distance_mm.map_or_else(String::new, |mm| format!(", focused on {mm:.0} mm"))
     )

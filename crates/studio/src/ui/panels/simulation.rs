@@ -27,9 +27,17 @@ pub(super) fn show(ui: &mut Ui, camera: &mut Camera, desk: &Desk<'_>) {
         let words = "Factor on HURB's spread: 1 as in the paper, 1.414 in later programs";
         NumberField::even("gamma", "×", 1e-3..=100.0, 0.1..=3.0, words).show(ui, gamma);
     }
-    let kinds = [(LensReflections::Off, "left out"), (LensReflections::Ghosts, "ghosts")];
+    let kinds = [
+        (LensReflections::Off, "left out"),
+        (LensReflections::Ghosts, "ghosts"),
+        (LensReflections::Film(0.1), "ghosts, film too"),
+    ];
     let words = "Light that surfaces of the lens reflect: ghosts are what two of them reflect";
     variant(ui, "reflections", words, &mut camera.lens_reflections, &kinds);
+    if let LensReflections::Film(reflectance) = &mut camera.lens_reflections {
+        let words = "The share of the light on the film that it sends back to the lens, as a mirror does";
+        NumberField::even("film reflectance", "", 0.0..=1.0, 0.0..=0.5, words).show(ui, reflectance);
+    }
     let blurs = [
         (BlurSpec::Layered, "layers of depth"),
         (BlurSpec::Views(16), "layers, from parts of the pupil"),

@@ -15,9 +15,11 @@ pub(in crate::ui) fn show(ui: &mut Ui, answer: &LensAnswer) {
     let analysis = &answer.analysis;
     ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
         ui.label(format!(
-            "{}: f = {} mm, working f/{}, film {:.3} mm behind the last vertex; blue, orange and green are {}",
+            "{}: f = {} mm, f/{}{}, working f/{}, film {:.3} mm behind the last vertex; blue, orange and green are {}",
             analysis.lens,
             three(analysis.efl_mm),
+            three(analysis.f_number),
+            analysis.t_number.map_or_else(String::new, |t| format!(", T/{}", three(t))),
             three(analysis.working_f_number),
             analysis.film_distance_mm,
             analysis.wavelengths_nm.iter().map(|nm| format!("{nm} nm")).collect::<Vec<_>>().join(", "),
