@@ -80,7 +80,7 @@ pub(super) fn read_chart(path: &Path) -> Result<Cube, SceneError> {
         "mu_a",
         "k/s",
     ];
-    const SHORT: [&str; 7] = ["od", "dn", "abs", "db", "log", "logr", "ln"];
+    const SHORT: [&str; 6] = ["dn", "abs", "db", "log", "logr", "ln"];
     const BESIDE: [&str; 9] = ["r", "t", "i", "a", "u", "sample", "reflectance", "transmittance", "value"];
     let is_other = |name: &&String| {
         let lower = name.to_lowercase();
@@ -88,7 +88,7 @@ pub(super) fn read_chart(path: &Path) -> Result<Cube, SceneError> {
         // Beside other words they are names of patches, as of log cabins.
         let is_short = words.iter().any(|word| SHORT.contains(word));
         OTHERS.iter().any(|other| lower.contains(other))
-            || words.iter().any(|word| word.starts_with("photon") && !word.starts_with("photonic"))
+            || words.iter().any(|word| *word == "od" || word.starts_with("photon") && !word.starts_with("photonic"))
             || is_short && words.iter().all(|word| SHORT.contains(word) || BESIDE.contains(word))
     };
     if let Some(other) = names.iter().find(is_other) {
@@ -186,6 +186,7 @@ mod tests {
             ("nm,absorption coefficient (1/cm)\n400,.2\n", "says that it holds no reflectances"),
             ("nm,W/m2/nm\n400,.2\n", "'W/m2/nm' says that it holds no reflectances"),
             ("nm,catalog red,Optical_Density\n400,.2,.3\n", "'Optical_Density' says that it holds no reflectances"),
+            ("nm,skin OD\n400,.2\n", "'skin OD' says that it holds no reflectances"),
             ("nm,logR\n400,.2\n", "'logR' says that it holds no reflectances"),
             ("nm,log(1/T)\n400,.2\n", "'log(1/T)' says that it holds no reflectances"),
             ("waves (zorp),a\n400,.2\n", "'zorp'"),

@@ -90,10 +90,14 @@ pub(in super::super) fn read_plane(path: &Path, told: Option<&str>) -> Result<No
     let last = |name: &str| name.rsplit(['/', '.']).next().unwrap_or_default().to_lowercase();
     let named = match told {
         Some(told) => planes.iter().find(|(name, _)| name == told),
-        // Those of the file itself before those in its structures.
-        None => [false, true].into_iter().find_map(|is_inner| {
-            let own = planes.iter().filter(|(name, _)| name.contains('.') == is_inner).collect::<Vec<_>>();
-            DEPTHS.iter().find_map(|wanted| own.iter().copied().find(|(name, _)| is_called(&last(name), wanted)))
+        // Depths before disparities, and those of the file itself before those in its structures.
+        None => [false, true].into_iter().find_map(|is_disparity| {
+            let names = DEPTHS.iter().filter(|name| (**name == "disparity") == is_disparity);
+            [false, true].into_iter().find_map(|is_inner| {
+                let is_own =
+                    |name: &str, wanted: &str| name.contains('.') == is_inner && is_called(&last(name), wanted);
+                names.clone().find_map(|wanted| planes.iter().find(|(name, _)| is_own(name, wanted)))
+            })
         }),
     };
     let (chosen, sides) = match (named, &planes[..]) {
