@@ -55,7 +55,8 @@ impl MonoLens {
         let tree = self.ghost_tree::<f32>(film, true, GHOST_TERMS);
         // The frame is mirrored: light runs towards +z, from a film before the lens.
         let (mut rays, mut weights) = (RayBatchF32::default(), Vec::new());
-        for target_mm in on_disc(radius_mm, n_rays, false) {
+        let is_half = self.is_rotational() && place_mm.x == 0.0 && film.center_mm.x == 0.0;
+        for target_mm in on_disc(radius_mm, n_rays, is_half) {
             let way = (target_mm - place_mm).extend(film.distance_mm);
             rays.push(target_mm.extend(-self.last_vertex_z_mm()), way.normalize());
             weights.push((film.distance_mm / way.length_squared()).powi(2));
