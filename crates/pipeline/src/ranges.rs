@@ -94,7 +94,7 @@ const RANGES: &[(Range, &[&str])] = &[
     (of(0.0, 1e5, "cycles/mm"), &["mtf_per_mm"]),
     (of(0.0, 1e12, ""), &["spectral_weights"]),
     (of(0.0, 1e3, ""), &["gamma"]),
-    (of(0.0, 1.0, ""), &["Film"]),
+    (of(0.0, 1.0, ""), &["Film", "film_reflectance"]),
     (of(1e-6, 1.0, ""), &["error", "bank_error"]),
     (of(2.0, 400.0, "rings"), &["rings"]),
     (of(1.0, 1e8, "rays"), &["n_rays"]),
