@@ -382,11 +382,13 @@ impl<'a> Seq<'a> {
                 };
                 let is_private = self.glasses.private.iter().any(|glass| glass.name.eq_ignore_ascii_case(word));
                 let found = self.glasses.find(if is_private { word } else { &name }, None);
-                found.map_err(|reason| command.wrong(reason))?.glass
+                let is_number = word.starts_with(|first: char| first.is_ascii_digit());
+                let expected = "an index is written as 1.5168, 1.5168:64.17, 517642 or 1.0001e4";
+                let hint = if is_number { format!("; {expected}") } else { String::new() };
+                found.map_err(|reason| command.wrong(format!("{reason}{hint}")))?.glass
             }
         };
-        let expected = "expected a glass, or an index with its Abbe number as 1.5168:64.17 or 517642";
-        glass.check().map_err(|error| command.wrong(format!("{error}; {expected}")))?;
+        glass.check().map_err(|error| command.wrong(error))?;
         Ok(Some(glass))
     }
 
@@ -545,8 +547,10 @@ fn mm_per_unit(command: &Command) -> Result<f64, TextError> {
 
 /// Returns the glass of a fictitious code: `1.5168:64.17`, `1.5168`, `517642`, `517.642` or `516800.641700`.
 fn code_of(word: &str) -> Option<Glass> {
-    if let Some((nd, vd)) = word.split_once(':') {
-        return Some(model(nd.parse().ok()?, vd.parse().ok()?));
+    // An index of a hundred or more, as that of a thin lens in place of a grating, is written with its exponent: digits alone are a code.
+    let index = |word: &str| word.parse().ok().filter(|index| *index < 100.0 || word.contains(['e', 'E']));
+    match word.split_once(':') {
+        Some((nd, vd)) => Some(model(index(nd)?, vd.parse().ok()?)),
+        None => glass_of_digits(word).or_else(|| index(word).map(constant)),
     }
-    glass_of_digits(word).or_else(|| word.parse().ok().map(constant))
 }

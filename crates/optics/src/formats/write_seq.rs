@@ -139,8 +139,14 @@ impl LensFile {
             words.push(match medium {
                 _ if place.is_some_and(|surface| lens.is_mirror(surface)) => "REFL".to_owned(),
                 Glass::Air => String::new(),
-                Glass::Constant { index } => format!("{index}"),
-                Glass::NdVd { nd, vd } => format!("{nd}:{vd}"),
+                Glass::Constant { index } => {
+                    if *index < 100.0 {
+                        format!("{index}")
+                    } else {
+                        format!("{index:e}")
+                    }
+                }
+                Glass::NdVd { nd, vd } => format!("{}:{vd}", index_word(*nd)),
                 Glass::Named(name) => catalogue_word(name)?,
                 Glass::Tabulated { wavelengths_nm, indices } => {
                     let table = (wavelengths_nm.as_slice(), indices.as_slice());
@@ -385,6 +391,11 @@ fn catalogue_word(name: &str) -> Result<String, OpticsError> {
     let maker = if glass.maker == "MISC" { "SPECIAL" } else { &glass.maker };
     let word = format!("{}_{maker}", glass.name);
     Ok(if word.contains(char::is_whitespace) { quoted(&word) } else { word })
+}
+
+/// Returns an index: of a hundred or more with its exponent, since digits alone are a code.
+fn index_word(index: f64) -> String {
+    if index < 100.0 { index.to_string() } else { format!("{index:e}") }
 }
 
 fn private_name(number: usize) -> String {
