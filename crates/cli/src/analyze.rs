@@ -22,7 +22,7 @@ const PNG_SCALE: f64 = 1.5;
 pub(crate) fn run(arguments: &LensAnalyzeArgs, common: &Common) -> anyhow::Result<()> {
     let used = arguments.lens.open(common)?;
     let request = request(&arguments.asked, &used, common)?;
-    let used = arguments.lens.state.apply(used, request.reference_nm(), common)?;
+    let used = arguments.lens.state.apply(used, &request.wavelengths_nm, common)?;
     // The place is tried before the work.
     let staged = arguments.out.as_ref().map(|path| Staged::folder(path)).transpose()?;
     let bar = Bar::new(common.quiet);

@@ -8,9 +8,7 @@ use dioptric_analysis::{
     built_in_lenses, convert_lens, ends_of, placement_lines, surface_rows,
 };
 use dioptric_files::{Staged, write};
-use dioptric_pipeline::{
-    LensReadOptions, PipelineError, REFERENCE_WAVELENGTH_NM, nearest_to_reference_nm, parse_directions, parse_numbers,
-};
+use dioptric_pipeline::{LensReadOptions, PipelineError, REFERENCE_WAVELENGTH_NM, parse_directions, parse_numbers};
 use dioptric_report::{LensDrawing, check_drawing_name, drawing_file};
 
 use crate::{
@@ -148,8 +146,7 @@ fn info(arguments: &LensInfoArgs, common: &Common) -> anyhow::Result<()> {
             wavelengths_nm
         }
     };
-    let wavelength_nm = nearest_to_reference_nm(&wavelengths_nm);
-    let used = arguments.lens.state.apply(used, wavelength_nm, common)?;
+    let used = arguments.lens.state.apply(used, &wavelengths_nm, common)?;
     tell(&used.lens.notes_on_ranges(&wavelengths_nm), common);
     let lens = &used.lens;
     tell(&Vec::from_iter(LensData::note_on_third_order(lens)), common);
@@ -337,8 +334,7 @@ fn draw(arguments: &LensDrawArgs, common: &Common) -> anyhow::Result<()> {
         (None, None) => vec![0.0, 10.0],
     };
     tell_taken(&taken, common);
-    let wavelength_nm = wavelengths_nm.first().copied().unwrap_or(REFERENCE_WAVELENGTH_NM);
-    let used = arguments.lens.state.apply(used, wavelength_nm, common)?;
+    let used = arguments.lens.state.apply(used, &wavelengths_nm, common)?;
     tell(&used.lens.notes_on_ranges(&wavelengths_nm), common);
     let focus_nm = if asked_nm.is_none() { used.wavelengths_or(&USUAL_NM) } else { wavelengths_nm.clone() };
     let weights = used.weights_of(&focus_nm);

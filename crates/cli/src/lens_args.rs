@@ -105,14 +105,15 @@ impl LensStateArgs {
         self.f_number.map(StopSpec::FNumber).or(self.stop_mm.map(StopSpec::DiameterMm))
     }
 
-    /// Returns the lens with its stop and its movements, and prints the notes on them; an f-number is that at this
-    /// wavelength, nm.
+    /// Returns the lens with its stop and its movements, and prints the notes on them; an f-number is that at the wavelength of the
+    /// focus, whatever wavelengths are looked at.
     pub(crate) fn apply(
         &self,
         used: LensDefaults,
-        wavelength_nm: f64,
+        wavelengths_nm: &[f64],
         common: &Common,
     ) -> anyhow::Result<LensDefaults> {
+        let wavelength_nm = used.focus_wavelength_nm(wavelengths_nm)?;
         let n_told = used.notes.len();
         let mut iris = used.lens.iris().copied();
         self.iris.change(&mut iris)?;

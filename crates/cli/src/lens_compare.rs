@@ -88,7 +88,7 @@ impl Analyzed {
                 ..first.request.clone()
             },
         };
-        let used = arguments.state.apply(used, request.reference_nm(), common)?;
+        let used = arguments.state.apply(used, &request.wavelengths_nm, common)?;
         let analysis = request.compute(&used.lens)?;
         let is_shown = arguments.out.is_some();
         let shown = is_shown.then(|| LensPageData::of(&request, &used, &analysis)).transpose()?;

@@ -42,7 +42,7 @@ pub(crate) fn run(arguments: &LensGhostsArgs, common: &Common) -> anyhow::Result
         (None, None) => USUAL_FIELDS_DEG.to_vec(),
     };
     tell_taken(&taken, common);
-    let used = arguments.lens.state.apply(used, reference_nm, common)?;
+    let used = arguments.lens.state.apply(used, &wavelengths_nm, common)?;
     tell(&used.lens.notes_on_ranges(&wavelengths_nm), common);
     let focus_nm = used.wavelengths_or(&USUAL_NM);
     let weights = used.weights_of(&focus_nm);

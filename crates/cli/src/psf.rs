@@ -46,8 +46,7 @@ pub(crate) fn run(arguments: &PsfArgs, common: &Common) -> anyhow::Result<()> {
         seed: common.seed.unwrap_or(SEED),
         spectral_weights,
     };
-    let reference_nm = request.reference_nm(&used.lens)?;
-    let lens = arguments.lens.state.apply(used, reference_nm, common)?.lens;
+    let lens = arguments.lens.state.apply(used, &request.wavelengths_nm, common)?.lens;
     let mut notes = lens.notes_on_ranges(&request.wavelengths_nm);
     notes.extend(stored.iter().filter_map(|file| file.note_on_ends(&request.fields_deg, &request.distances_mm)));
     notes.extend(stored.into_iter().flat_map(|file| file.notes));

@@ -15,7 +15,7 @@ use crate::{
 pub(crate) fn run(arguments: &TraceArgs, common: &Common) -> anyhow::Result<()> {
     let used = arguments.lens.open(common)?;
     let wavelength_nm = used.wavelength_or_usual();
-    let lens = arguments.lens.state.apply(used, wavelength_nm, common)?.lens;
+    let lens = arguments.lens.state.apply(used, &[wavelength_nm], common)?.lens;
     let rays = RayTable::open(&arguments.rays)?;
     tell(&lens.notes_on_ranges(&rays.wavelengths_nm()), common);
     let settings = TraceSettings { rims_clip: !arguments.no_clip, film_distance_mm: arguments.film_mm };

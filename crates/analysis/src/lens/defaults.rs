@@ -2,7 +2,7 @@
 
 use dioptric_optics::{Field, Iris, Lens, LensFile, glam::DVec2};
 
-use crate::{AnalysisFields, AnalysisFilm, ConfigurationData};
+use crate::{AnalysisFields, AnalysisFilm, ConfigurationData, FilmUse};
 use dioptric_pipeline::{
     LensReadOptions, LensSpec, Movements, PipelineError, REFERENCE_WAVELENGTH_NM, StopSpec, nearest_to_reference_nm,
     with_blades,
@@ -85,7 +85,7 @@ impl LensDefaults {
         Self {
             several,
             wavelength_weights,
-            reference_nm: file.reference_wavelength_nm.filter(|nm| wavelengths_nm.contains(nm)),
+            reference_nm: file.reference_wavelength_nm.filter(is_known),
             wavelengths_nm,
             distance_mm: file.object_distance_mm.unwrap_or(f64::INFINITY),
             surface_comments: file.surface_comments,
@@ -108,6 +108,15 @@ impl LensDefaults {
     /// Whether all media of the lens are known at a wavelength.
     pub fn is_known_at(&self, wavelength_nm: f64) -> bool {
         self.lens.at(wavelength_nm).is_ok()
+    }
+
+    /// Returns the wavelength of focus and f-number where these are looked at, nm, as [`FilmUse::reference`] has it.
+    ///
+    /// # Errors
+    /// When the lens is not known there.
+    pub fn focus_wavelength_nm(&self, wavelengths_nm: &[f64]) -> Result<f64, PipelineError> {
+        let of = FilmUse { main_nm: self.reference_nm, wavelengths_nm, weights: &[], distance_mm: self.distance_mm };
+        Ok(of.reference(&self.lens)?.wavelength_nm())
     }
 
     /// Returns the wavelengths that stand for those not asked for, nm: the file's; else the usual ones; else, of a lens

@@ -149,7 +149,7 @@ const USUAL_MAKER: &str = "SCHOTT";
 /// What Zemax writes as index and Abbe number of a glass of a catalogue, unless they are stored with the file: no data.
 const PLACEHOLDER: (f64, f64) = (1.5, 40.0);
 
-/// Returns the glass of the six digits by which makers code n_d − 1 and V_d: `517642`, `517.642` or, with more of them,
+/// Returns the glass of the six digits by which makers code an index less 1 and an Abbe number: `517642`, `517.642` or, with more of them,
 /// `516800.641700`. Of `003283` the index is 2.003, since no glass has less than 1.2.
 pub(super) fn glass_of_digits(word: &str) -> Option<Glass> {
     let (nd, vd) = match word.split_once('.') {

@@ -189,7 +189,13 @@ impl Zmx {
             "VDYN" | "ZVDY" => self.vignetting[1] = line.numbers()?,
             "VCXN" | "ZVCX" => self.vignetting[2] = line.numbers()?,
             "VCYN" | "ZVCY" => self.vignetting[3] = line.numbers()?,
-            "WAVM" => self.wavelengths_um.push((line.count(0)?, line.number(1)?, line.number_or(2, 1.0)?)),
+            "WAVM" => {
+                let stated = (line.count(0)?, line.number(1)?, line.number_or(2, 1.0)?);
+                match self.wavelengths_um.iter_mut().find(|known| known.0 == stated.0) {
+                    Some(known) => *known = stated,
+                    None => self.wavelengths_um.push(stated),
+                }
+            }
             // Older files name the lists of 24 wavelengths so, as `XFLN` those of fields.
             "WAVL" | "WAVN" => {
                 self.wavelengths_um = (1..).zip(line.numbers()?).map(|(number, um)| (number, um, 1.0)).collect()

@@ -364,6 +364,9 @@ fn words_of_older_files_and_flags_are_read_or_noted() {
     let file = read(&old).unwrap();
     assert_eq!((file.wavelengths_nm.len(), file.reference_wavelength_nm), (3, Some(587.6)));
     assert_eq!(file.wavelength_weights, [1.0, 2.0, 3.0]);
+    let both = "WAVM 1 0.4861 1\nWAVM 2 0.5876 1\nWAVM 3 0.6563 1\nPWAV 2";
+    let twice = read(&old.replace("PWAV 2", both)).unwrap();
+    assert_eq!((twice.wavelengths_nm, twice.reference_wavelength_nm), (file.wavelengths_nm, Some(587.6)));
     let note = |from: &str, to: &str, word: &str| {
         let file = read(&SINGLET.replace(from, to)).unwrap();
         assert!(file.notes.iter().any(|note| note.contains(word)), "{to}: {:?}", file.notes);
