@@ -49,7 +49,7 @@ const FISHEYES: [&str; 8] = [
     "KANNALABRANDT4",
     "KANNALABRANDT8",
 ];
-/// What they call polynomials that are another than OpenCV's, and the same where all coefficients are 0.
+/// What they call polynomials that are another than `OpenCV`'s, and the same where all coefficients are 0.
 const POLYNOMIALS_AT_0: [&str; 2] = ["INVERSE_BROWN_CONRADY", "MODIFIED_BROWN_CONRADY"];
 
 /// Returns whether a model is a fisheye, without distortion where all coefficients are 0; `None` of one that is not known.
