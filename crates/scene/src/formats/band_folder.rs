@@ -349,18 +349,67 @@ fn are_wavelengths(numbers: &[f64]) -> bool {
     numbers.iter().all(|number| (150.0..=20_000.0).contains(number))
 }
 
+/// Returns the wavelengths of a list, nm, in the order of pictures: of lines that name pictures each is that of its own; `None` where they count bands.
+fn listed(text: &str, pictures: &[Numbered]) -> Result<Option<Vec<f64>>, String> {
+    let is_separator = |c: char| c.is_whitespace() || c == ',' || c == ';';
+    let mut unit =
+        text.split(|c| "()[]#:=;,".contains(c) || char::is_whitespace(c)).find_map(unit_in).map(str::to_owned);
+    let (mut named, mut numbers, mut has_letter) = (vec![], vec![], false);
+    // Comments may tell the unit, their numbers are others.
+    for line in text.lines().map(|line| line.split('#').next().unwrap_or_default()) {
+        let found = named_in(line, pictures);
+        let rest = found.as_ref().map_or(line.to_owned(), |(_, name)| line.replacen(name, " ", 1));
+        let n_before = numbers.len();
+        for word in rest.split(is_separator) {
+            // A unit may stand behind a number without a gap.
+            let (number, behind) = word.split_at(word.trim_end_matches(char::is_alphabetic).len());
+            let own = unit_in(behind).filter(|_| !number.is_empty());
+            numbers.extend(own.map_or(word, |_| number).parse::<f64>().ok());
+            unit = unit.or(own.map(str::to_owned));
+            has_letter |= word == "A";
+        }
+        match (found, numbers.len() - n_before) {
+            (Some((index, _)), 1) => named.push(index),
+            (Some((_, name)), n) => return Err(format!("its line of '{name}' has {n} numbers, expected a wavelength")),
+            (None, _) => {}
+        }
+    }
+    // A single letter, behind every number, of which none is another's.
+    let is_letter = has_letter && numbers.iter().all(|own| *own >= 1500.0);
+    let own = listed_nm("wavelengths", unit.as_deref().or(is_letter.then_some("A")), &numbers)?;
+    let Some(own) = own else { return Ok(None) };
+    if named.is_empty() {
+        return Ok(Some(own));
+    }
+    let in_turn = |index: usize| Some(own[named.iter().position(|of| *of == index)?]);
+    let in_turn: Option<Vec<f64>> = (0..pictures.len()).map(in_turn).collect();
+    let is_whole = named.len() == own.len() && own.len() == pictures.len();
+    in_turn.filter(|_| is_whole).map(Some).ok_or_else(|| {
+        format!("it names pictures in {} lines, expected the {} of bands, each once", named.len(), pictures.len())
+    })
+}
+
+/// Returns the picture that a line names, whatever its ending, and the name; a number alone is no name.
+fn named_in(line: &str, pictures: &[Numbered]) -> Option<(usize, String)> {
+    let is_of_name = |c: char| c.is_alphanumeric() || "_-".contains(c);
+    let stands = |name: &str| {
+        let is_apart = |(at, _): (usize, &str)| {
+            !line[..at].ends_with(is_of_name) && !line[at + name.len()..].starts_with(is_of_name)
+        };
+        line.match_indices(name).any(is_apart)
+    };
+    let names = pictures.iter().enumerate().flat_map(|(index, (_, path))| {
+        let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned());
+        let stem = stem.filter(|stem| stem.parse::<f64>().is_err() && unit_in(stem).is_none());
+        stem.into_iter().chain([name_of(path)]).map(move |name| (index, name))
+    });
+    names.filter(|(_, name)| stands(name)).max_by_key(|(_, name)| name.len())
+}
+
 fn wavelengths_of(folder: &Path, pictures: &[(f64, PathBuf)]) -> Result<Vec<f64>, SceneError> {
     if let Some(list) = LISTS.iter().map(|name| folder.join(name)).find(|path| path.is_file()) {
         let text = text::read(&list).map_err(|error| unreadable(&list, error))?;
-        let is_separator = |c: char| c.is_whitespace() || c == ',' || c == ';';
-        let text = text::with_commas(&text);
-        let numbers: Vec<f64> = text.split(is_separator).filter_map(|word| word.parse().ok()).collect();
-        let unit = text.split(|c| "()[]#:=;,".contains(c) || char::is_whitespace(c)).find_map(unit_in);
-        // A single letter, behind every number, of which none is another's.
-        let are_angstroms =
-            text.split(is_separator).any(|word| word == "A") && numbers.iter().all(|own| *own >= 1500.0);
-        let unit = unit.or(are_angstroms.then_some("A"));
-        let own = listed_nm("wavelengths", unit, &numbers).map_err(|reason| unreadable(&list, reason))?;
+        let own = listed(&text::with_commas(&text), pictures).map_err(|reason| unreadable(&list, reason))?;
         return own.ok_or_else(|| unreadable(&list, "its numbers count bands: expected wavelengths in nm"));
     }
     if let Some(middles) = middles_of_ranges(pictures) {
@@ -406,6 +455,40 @@ mod tests {
         }
         fs::write(folder.path().join("readme.md"), "not a picture").unwrap();
         folder
+    }
+
+    #[test]
+    fn lists_go_by_the_names_of_pictures() {
+        let folder = folder_of(&["b1.png", "b2.png", "b10.png"]);
+        let read = |text: &str| {
+            fs::write(folder.path().join("wavelengths.txt"), text).unwrap();
+            read_band_folder(folder.path(), None).map(|image| image.grid().centers_nm().to_vec())
+        };
+        // Codes of 100, 200 and 300.
+        for text in [
+            "# exposure 10 ms\nb1.png 450\nb10.png 560\nb2.png 500\n",
+            "b10 560 nm\nb2 500 nm\nb1 450 nm\n",
+            "file,wavelength_nm\n./b1.png,450\n./b2.png,500\n./b10.png,560\n",
+            "450nm\n500nm\n560nm\n",
+            "0.45um b1.png\n0.56um b10.png\n0.5um b2.png\n",
+            "# filter 3 of 10, in nm\n450 500 560 # 10 wide\n",
+        ] {
+            assert_eq!(read(text).unwrap(), [450.0, 500.0, 560.0], "{text}");
+            let image = read_band_folder(folder.path(), None).unwrap();
+            assert_eq!(
+                image.spectrum_at(1, 2),
+                [100.0, 200.0, 300.0].map(|code: f32| f64::from(code / 65535.0)),
+                "{text}"
+            );
+        }
+        for (text, word) in [
+            ("b1.png 450\nb2.png 500\n", "names pictures in 2 lines"),
+            ("b1.png 450\nb2.png 500\nb2.png 560\n", "each once"),
+            ("b1.png 450 10\nb2.png 500 10\nb10.png 560 10\n", "has 2 numbers"),
+        ] {
+            let message = read(text).unwrap_err().to_string();
+            assert!(message.contains(word), "{text}: {message}");
+        }
     }
 
     #[test]

@@ -13,7 +13,7 @@ use serde_json::{Value, json};
 
 use super::{
     camera::CameraFile,
-    camera_models::{HARMLESS, check_matrix, is_fisheye, unknown_model},
+    camera_models::{HARMLESS, check_matrix, is_fisheye, is_model, unknown_model},
     camera_yaml::{of_xml, of_yaml},
     depth_names::words_of,
     distortion::Distortion,
@@ -382,24 +382,45 @@ fn n_samples(n: f64, name: &str) -> Result<usize, String> {
     is_whole.then_some(n as usize).ok_or_else(|| format!("{name} is {n}, expected a number of samples"))
 }
 
+/// Names of lists of coefficients of a distortion.
+const LISTS: [&str; 11] = [
+    "distortion",
+    "dist_coeff",
+    "dist",
+    "coeffs",
+    "dist_coeffs",
+    "distortion_coefficients",
+    "Distortion_Coefficients",
+    "distortion_coeffs",
+    "distCoeffs",
+    "D",
+    "d",
+];
+
 /// Whether the file names a model of fisheyes.
 fn is_of_fisheye(keys: &mut Keys) -> Result<bool, String> {
     let mut is_any = false;
+    let own = LISTS.iter().find_map(|name| numbers_of(keys.get(name)?, name).ok());
+    let is_zero = own.is_some_and(|own| own.iter().all(|v| *v == 0.0));
     for name in ["camera_model", "distortion_model", "model", "type"] {
         let Some(model) = keys.get(name).and_then(Value::as_str).map(str::to_owned) else { continue };
-        match is_fisheye(&model) {
+        match is_fisheye(&model, is_zero) {
             Some(is_fisheye) => {
                 is_any |= is_fisheye;
                 keys.take(name);
             }
             // Who made the camera may stand there as well, which is named.
-            None if ["model", "type"].contains(&name) => {}
+            None if ["model", "type"].contains(&name) && !is_model(&model) => {}
             None => return Err(unknown_model(&model)),
         }
     }
-    if let Some(is_fisheye) = keys.get("is_fisheye").and_then(Value::as_bool) {
-        is_any |= is_fisheye;
-        keys.take("is_fisheye");
+    // A sample of OpenCV writes 1 or 0.
+    for name in ["is_fisheye", "fisheye_model"] {
+        let is = |own: &Value| own.as_bool().or(own.as_f64().map(|own| own != 0.0));
+        if let Some(is_fisheye) = keys.get(name).and_then(is) {
+            is_any |= is_fisheye;
+            keys.take(name);
+        }
     }
     Ok(is_any)
 }
@@ -445,19 +466,6 @@ fn distortion_of(keys: &mut Keys, is_fisheye: bool, is_nerf: bool) -> Result<Dis
     for (place, name) in ["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"].iter().enumerate() {
         k[place] = number(keys, &[name])?.unwrap_or(0.0);
     }
-    const LISTS: [&str; 11] = [
-        "distortion",
-        "dist_coeff",
-        "dist",
-        "coeffs",
-        "dist_coeffs",
-        "distortion_coefficients",
-        "Distortion_Coefficients",
-        "distortion_coeffs",
-        "distCoeffs",
-        "D",
-        "d",
-    ];
     let list = keys.take_any(&LISTS).filter(|list| !list.is_null());
     // Of none.
     let list = list.filter(|list| !list.as_str().is_some_and(|text| text.eq_ignore_ascii_case("none")));

@@ -39,21 +39,40 @@ const POLYNOMIALS: [&str; 12] = [
     "NONE",
 ];
 /// What they call a fisheye by the angle.
-const FISHEYES: [&str; 6] = ["OPENCV_FISHEYE", "FISHEYE", "EQUIDISTANT", "EQUI", "KANNALA_BRANDT", "KANNALABRANDT8"];
+const FISHEYES: [&str; 8] = [
+    "OPENCV_FISHEYE",
+    "FISHEYE",
+    "EQUIDISTANT",
+    "EQUI",
+    "KANNALA_BRANDT",
+    "KANNALA_BRANDT4",
+    "KANNALABRANDT4",
+    "KANNALABRANDT8",
+];
+/// What they call polynomials that are another than `OpenCV`'s, and the same where all coefficients are 0.
+const POLYNOMIALS_AT_0: [&str; 2] = ["INVERSE_BROWN_CONRADY", "MODIFIED_BROWN_CONRADY"];
 
-/// Returns whether a model is a fisheye; `None` of one that is not known.
-pub(super) fn is_fisheye(model: &str) -> Option<bool> {
+/// Returns whether a model is a fisheye, without distortion where all coefficients are 0; `None` of one that is not known.
+pub(super) fn is_fisheye(model: &str, is_zero: bool) -> Option<bool> {
     // RealSense has `distortion.brown_conrady`.
     let model = model.rsplit('.').next().unwrap_or(model);
     let model = model.trim().trim_matches(['"', '\'']).to_uppercase().replace(['-', ' '], "_");
-    if model.is_empty() || POLYNOMIALS.contains(&model.as_str()) {
+    let of = |known: &[&str]| known.contains(&model.as_str());
+    if model.is_empty() || of(&POLYNOMIALS) || is_zero && of(&POLYNOMIALS_AT_0) {
         return Some(false);
     }
-    FISHEYES.contains(&model.as_str()).then_some(true)
+    of(&FISHEYES).then_some(true)
+}
+
+/// Whether a word is that of a model, known or not, and not who made a camera.
+pub(super) fn is_model(word: &str) -> bool {
+    let upper = word.to_uppercase().replace(['-', ' '], "_");
+    const OF_MODELS: [&str; 6] = ["DISTORTION.", "BROWN_CONRADY", "FTHETA", "F_THETA", "KANNALA", "_FISHEYE"];
+    OF_MODELS.iter().any(|part| upper.contains(part))
 }
 
 pub(super) fn unknown_model(model: &str) -> String {
-    format!("its camera model is '{}', expected PINHOLE, OPENCV or OPENCV_FISHEYE", short(model))
+    format!("its camera model is '{}', expected PINHOLE, OPENCV or OPENCV_FISHEYE with its coefficients", short(model))
 }
 
 /// Checks that of a camera matrix nothing is left out: what must be 0, for it to be that of a camera whose rows and columns are at right angles.

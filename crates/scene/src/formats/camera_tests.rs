@@ -144,6 +144,19 @@ fn other_programs_are_read() {
     ] {
         same(flow, None);
     }
+    // What RealSense and a sample of OpenCV call the model of the lens; inverse polynomials bend nothing where all is 0.
+    let with = |words: &str| format!(r#"{{"width":640,"height":480,"fx":525,"fy":526,"cx":319.5,"cy":239.5,{words}}}"#);
+    let four = r#""coeffs":[0.1,0,0.2,0]"#;
+    for words in [r#""model":"distortion.kannala_brandt4""#, r#""fisheye_model":1"#, r#""is_fisheye":true"#] {
+        assert_eq!(same(&with(&format!("{words},{four}")), None), fisheye, "{words}");
+    }
+    same(&with(r#""model":"distortion.inverse_brown_conrady","coeffs":[0,0,0,0,0]"#), None);
+    same(&with(r#""fisheye_model":0"#), None);
+    for model in ["distortion.inverse_brown_conrady", "distortion.ftheta", "ftheta", "THIN_PRISM_FISHEYE"] {
+        let message = read(&with(&format!(r#""model":"{model}",{four}"#)), 480, 640).unwrap_err().to_string();
+        assert!(message.contains(&format!("its camera model is '{model}'")), "{message}");
+    }
+    assert!(read(&with(r#""model":"D455""#), 480, 640).unwrap().notes[0].contains("'model'"));
     // Words that are no numbers are named.
     for (words, named) in [
         (r#""resolution": "1080p""#, "'resolution'"),

@@ -6,6 +6,7 @@ use dioptric_files::text;
 use ndarray::Array2;
 
 use super::{
+    column_names::is_no_reflectance,
     contents::Cube,
     reading::FileQuantity,
     stated::{name_of, note_of, short},
@@ -65,33 +66,7 @@ pub(super) fn read_chart(path: &Path) -> Result<Cube, SceneError> {
             "it has no line of numbers: expected wavelengths in nm and a reflectance a column".to_owned(),
         ));
     }
-    const OTHERS: [&str; 13] = [
-        "absor",
-        "radian",
-        "emission",
-        "w/m",
-        "w m-2",
-        "w/cm",
-        "counts",
-        "density",
-        "extinction",
-        "attenuation",
-        "coefficient",
-        "mu_a",
-        "k/s",
-    ];
-    const SHORT: [&str; 6] = ["dn", "abs", "db", "log", "logr", "ln"];
-    const BESIDE: [&str; 9] = ["r", "t", "i", "a", "u", "sample", "reflectance", "transmittance", "value"];
-    let is_other = |name: &&String| {
-        let lower = name.to_lowercase();
-        let words: Vec<&str> = lower.split(|c: char| !c.is_alphabetic()).filter(|word| !word.is_empty()).collect();
-        // Beside other words they are names of patches, as of log cabins.
-        let is_short = words.iter().any(|word| SHORT.contains(word));
-        OTHERS.iter().any(|other| lower.contains(other))
-            || words.iter().any(|word| *word == "od" || word.starts_with("photon") && !word.starts_with("photonic"))
-            || is_short && words.iter().all(|word| SHORT.contains(word) || BESIDE.contains(word))
-    };
-    if let Some(other) = names.iter().find(is_other) {
+    if let Some(other) = names.iter().find(|name| is_no_reflectance(name)) {
         return Err(wrong(format!("its column '{}' says that it holds no reflectances, expected such", short(other))));
     }
     let wavelengths_nm = wavelengths_of_column(&first, &wavelengths_nm, comments_of(&text)).map_err(wrong)?;
@@ -189,6 +164,9 @@ mod tests {
             ("nm,skin OD\n400,.2\n", "'skin OD' says that it holds no reflectances"),
             ("nm,logR\n400,.2\n", "'logR' says that it holds no reflectances"),
             ("nm,log(1/T)\n400,.2\n", "'log(1/T)' says that it holds no reflectances"),
+            ("nm,F(R)\n400,.2\n", "'F(R)' says that it holds no reflectances"),
+            ("nm,Reflectance (0-255)\n400,.2\n", "(0-255)' says that it holds no reflectances"),
+            ("Pixel,a\n400,.2\n500,.2\n", "'Pixel' holds no wavelengths"),
             ("waves (zorp),a\n400,.2\n", "'zorp'"),
             ("nm,a\n400,0.1\n500\n", "line 3: 1 numbers"),
             ("nm,a\n400,0.1\n500,x\n", "line 3: '500,x'"),

@@ -168,7 +168,8 @@ fn unit_m_of(path: &Path, numbers: &DepthNumbers, words: DepthWords<'_>) -> Resu
     if let Some(unit_m) = words.unit_m {
         return Ok((unit_m, true));
     }
-    let own = SaidOfDepth::of_file(&path.file_stem().unwrap_or_default().to_string_lossy()).unit_m;
+    let said = SaidOfDepth::of_file(&path.file_stem().unwrap_or_default().to_string_lossy());
+    let own = said.unit_m;
     // Codes of metres would be of whole ones.
     if let Some(own_m) = own.filter(|own_m| numbers.top.is_none() || *own_m < 1.0) {
         return Ok((own_m, true));
@@ -189,7 +190,7 @@ fn unit_m_of(path: &Path, numbers: &DepthNumbers, words: DepthWords<'_>) -> Resu
             Ok((UNIT_M, false))
         }
         Some(_) => Ok((UNIT_M, false)),
-        None if is_of(path, &["pfm"]) => wrong(
+        None if is_of(path, &["pfm"]) && !said.is_of_depth => wrong(
             "whether it holds depths or disparities is not known: expected --depth-unit m, or --depth-kind, as disparity:BASELINE_M",
         ),
         None => Ok((1.0, false)),
@@ -276,6 +277,10 @@ mod tests {
             assert!(z_m[(1, 0)] == f32::INFINITY && z_m[(1, 1)].is_nan() && z_m[(1, 2)] == 0.0, "{name}: {z_m}");
         }
         assert!(read_depth(&at("a.pfm"), DepthWords::default()).is_err_and(|e| e.to_string().contains("disparity")));
+        for name in ["room.depth.pfm", "img_0_DepthPlanar.pfm", "distance.pfm"] {
+            std::fs::copy(at("a.pfm"), at(name)).unwrap();
+            assert!(read_depth(&at(name), DepthWords::default()).is_ok(), "{name}");
+        }
         for name in [
             "left_inverse_depth.npy",
             "disp.npy",

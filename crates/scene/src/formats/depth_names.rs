@@ -11,6 +11,8 @@ pub(super) struct SaidOfDepth {
     pub(super) is_radial: Option<bool>,
     /// What is asked for where the numbers are no lengths of a known unit.
     pub(super) lacks: Option<&'static str>,
+    /// Whether they name a depth or a distance.
+    pub(super) is_of_depth: bool,
     /// Whether they have a number with a unit of length, as `lens_50_mm`, which may be that of a lens, of a place or of a step.
     pub(super) has_length: bool,
 }
@@ -34,6 +36,7 @@ impl SaidOfDepth {
             unit_m: unit_of(&own),
             is_radial,
             lacks: lacks(&own),
+            is_of_depth: has(&DEPTHS) || has(&DISTANCES),
             has_length: (0..own.len()).any(|i| is_counted(&own, i)),
         }
     }
@@ -60,6 +63,7 @@ impl SaidOfDepth {
             unit_m: unit_of(&own),
             is_radial,
             lacks: lacks(&own),
+            is_of_depth: has(&DEPTHS) || has(&DISTANCES),
             has_length: (0..own.len()).any(|i| is_counted(&own, i)),
         }
     }

@@ -133,6 +133,30 @@ fn of_several_eyes_the_first_sees() {
     let (found, scene) = read(&file, &options(None, None)).unwrap();
     assert_eq!(found, depths());
     assert!(scene.notes.iter().any(|note| note == "stereo.exr: its view 'right' is not used"), "{:?}", scene.notes);
+    // The other by its name, or by that of its layer.
+    for (told, added, unused) in
+        [("right", 1.0, "'left'"), ("rgb.right", 1.0, "'left'"), ("left", 0.0, "'right'"), ("rgb.left", 0.0, "'right'")]
+    {
+        let mut options = options(None, None);
+        options.reading.variable = Some(told.to_owned());
+        let (found, scene) = read(&file, &options).unwrap();
+        assert_eq!(found, depths() + added, "{told}");
+        assert!(
+            scene.notes.iter().any(|note| note.contains(&format!("its view {unused} is not"))),
+            "{:?}",
+            scene.notes
+        );
+    }
+    // Parts that are called as their views are, with colors alone.
+    let parts = [("left", 0.5), ("right", 0.1)].map(|(name, v)| (name, Some(name), (0, 0), colors(v)));
+    write_exr(&file, (COLUMNS, ROWS), parts.to_vec());
+    let luminance = |told: Option<&str>| {
+        let mut options = ReadOptions { depth_m: Some(1.0), ..options(None, None) };
+        options.reading.variable = told.map(str::to_owned);
+        read_scene(&file, &options).unwrap().radiance.spectrum_at(0, 0)[15]
+    };
+    assert_eq!(luminance(Some("left")), luminance(None));
+    assert!((luminance(Some("right")) / luminance(None) - 0.2).abs() < 1e-6);
 }
 
 #[test]

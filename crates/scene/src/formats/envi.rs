@@ -19,7 +19,7 @@ use super::{
     read_options::{Part, ReadOptions},
     reading::{FileQuantity, Frame, NoData, light_unit},
     reduced::reduced_size,
-    stated::{name_of, note_of, short},
+    stated::{name_of, note_of, short, tells},
     unusable::{in_file, starts_with, unreadable},
     wavelength_unit::ascending,
 };
@@ -49,6 +49,7 @@ pub(super) fn contents_of_envi(path: &Path, options: &ReadOptions) -> Result<Con
     let file = EnviFile::open(path, options.reading.wavelengths_nm.as_deref(), wanted_nm)?;
     let (meaning, what) = file.meaning(options)?;
     let mut notes: Vec<String> = file.notes.clone();
+    notes.extend(file.unused_description(path, options));
     notes.extend(file.unused_unit(path, matches!(meaning, Meaning::Light(_)) && file.header.gains.is_none()));
     let references = match &meaning {
         Meaning::Between(pair, _) => &pair[..],
@@ -262,14 +263,24 @@ impl EnviFile {
     /// Returns the note of data units that are none of light, and say more than that the numbers are a share or a count where they are taken for such.
     fn unused_unit(&self, path: &Path, is_light: bool) -> Option<String> {
         const OF_ANY: [&str; 2] = ["", "unknown"];
-        const OF_SHARES: [&str; 6] = ["reflectance", "transmittance", "unitless", "dimensionless", "none", "dn"];
+        const OF_SHARES: [&str; 7] =
+            ["reflectance", "transmittance", "unitless", "dimensionless", "none", "dn", "counts"];
         let unit = self.header.data_units.as_deref()?;
         let words = unit.to_lowercase();
         let is_plain = OF_ANY.contains(&words.as_str())
             || !is_light && OF_SHARES.contains(&words.as_str())
             || self.has_percent()
-            || LightUnit::parse(unit).is_some();
+            || LightUnit::parse(unit).is_some_and(|unit| unit.quantity == Quantity::Radiance);
         if is_plain { None } else { note_of(path, "unit", &[unit.to_owned()]) }
+    }
+
+    /// Returns the note of a description that says something of the numbers, where options say what they are.
+    fn unused_description(&self, path: &Path, options: &ReadOptions) -> Option<String> {
+        let description = self.header.description.as_deref().filter(|words| tells(words))?;
+        let is_told =
+            options.reading.quantity.is_some() || options.reading.unit.is_some() || options.white_level.is_some();
+        let is_used = self.header.data_units.as_deref().is_some_and(|unit| description.contains(unit));
+        if is_told && !is_used { note_of(path, "description", &[description.to_owned()]) } else { None }
     }
 
     /// Whether its units say that a perfect white is 100.
@@ -283,8 +294,8 @@ impl EnviFile {
         let (header, reading) = (&self.header, &options.reading);
         let scale = reading.scale.unwrap_or(1.0);
         let units = |reason: String| Err(SceneError::Units { file: self.header_path.clone(), reason });
-        let own_unit = header.data_units.as_deref().and_then(LightUnit::parse);
-        let own_unit = own_unit.filter(|unit| unit.quantity == Quantity::Radiance);
+        let any_unit = header.data_units.as_deref().and_then(LightUnit::parse);
+        let own_unit = any_unit.filter(|unit| unit.quantity == Quantity::Radiance);
         let has_gains = header.gains.is_some() || header.offsets.is_some();
         let own_level = header.reflectance_scale.or(self.has_percent().then_some(100.0));
         let is_reflecting = header.are_gains_of_reflectance || own_level.is_some();
@@ -302,6 +313,13 @@ impl EnviFile {
             let unit = header.data_units.as_deref().unwrap_or_default();
             return units(format!(
                 "its data units are '{}', which says something else than was asked for",
+                short(unit)
+            ));
+        }
+        if wants_light == Some(true) && told_unit.is_none() && any_unit != own_unit {
+            let unit = header.data_units.as_deref().unwrap_or_default();
+            return units(format!(
+                "its data units are '{}', of irradiance: expected the unit of its radiance (--unit), with /sr",
                 short(unit)
             ));
         }

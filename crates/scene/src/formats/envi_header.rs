@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use dioptric_spectrum::Quantity;
+
 use super::{
     light_unit::LightUnit,
     stated::{self, name_of, note_of},
@@ -76,8 +78,10 @@ pub(crate) struct EnviHeader {
     pub(crate) exposures: Vec<(String, f64)>,
     /// How the camera was set and which it was: keys with their words, which count between a cube and its references.
     pub(crate) settings: Vec<(String, String)>,
-    /// `data units`, as written.
+    /// `data units`, as written, or the unit that the titles of plots or the description state.
     pub(crate) data_units: Option<String>,
+    /// What it says of itself in free words.
+    pub(crate) description: Option<String>,
     /// What of the header is not used, or contradicts itself, a sentence each.
     pub(crate) notes: Vec<String>,
 }
@@ -180,13 +184,13 @@ pub(crate) fn parse(path: &Path, text: &str) -> Result<EnviHeader, SceneError> {
         entries.list("bbl", bands)?.map_or_else(Vec::new, |list| list.iter().map(|good| *good <= 0.0).collect());
     let wavelengths_nm = entries.wavelengths_nm()?;
     let frame_offsets = entries.frame_offsets()?;
-    // The second title is that of the values, as in {Wavelength (nm), Radiance (uW/cm2/sr/nm)}.
-    let titles = entries.get("z plot titles").map(|entry| entry.value.trim_matches(['{', '}']).to_owned());
-    let title = titles.as_deref().and_then(|titles| titles.rsplit_once(',')).map(|(_, title)| title.trim());
-    let plotted = title.and_then(|title| title.split_once(['(', '['])).map(|(_, unit)| unit.trim_end());
-    let plotted =
-        plotted.and_then(|unit| unit.strip_suffix([')', ']'])).filter(|unit| LightUnit::parse(unit).is_some());
-    let plotted_unit = plotted.map(str::to_owned);
+    let description = entries.get("description").map(|entry| words_of(&entry.value));
+    let data_units = entries.get("data units").map(|entry| words_of(&entry.value)).or_else(|| entries.unit_of_titles());
+    let described = || unit_described(description.as_deref()?);
+    let data_units = data_units.or_else(described).map(|words| match LightUnit::in_words(&words) {
+        Some((_, unit)) => unit.to_owned(),
+        None => words,
+    });
     let mut header = EnviHeader {
         columns: entries.required("samples")?,
         rows: entries.required("lines")?,
@@ -210,10 +214,8 @@ pub(crate) fn parse(path: &Path, text: &str) -> Result<EnviHeader, SceneError> {
         radiance_scale: entries.positive("radiance scale factor")?,
         exposures: entries.exposures(),
         settings: entries.settings(),
-        data_units: entries
-            .get("data units")
-            .map(|entry| entry.value.trim_matches(['{', '}']).trim().to_owned())
-            .or(plotted_unit),
+        data_units,
+        description,
         notes: vec![],
     };
     if header.columns == 0 || header.rows == 0 || header.bands == 0 {
@@ -242,6 +244,22 @@ pub(crate) fn parse(path: &Path, text: &str) -> Result<EnviHeader, SceneError> {
     Ok(header)
 }
 
+/// Returns the words of a value in braces, a space between them.
+fn words_of(value: &str) -> String {
+    value.trim_matches(['{', '}']).split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+/// Returns the unit of radiance that a description of a radiance ends in or has in brackets.
+fn unit_described(description: &str) -> Option<String> {
+    if description.to_lowercase().contains("reflect") {
+        return None;
+    }
+    let ends = description.match_indices([')', ']']).map(|(at, _)| at + 1).chain([description.len()]);
+    let unit = |end: usize| LightUnit::in_words(&description[..end]);
+    let of_radiance = ends.filter_map(unit).find(|(unit, _)| unit.quantity == Quantity::Radiance);
+    of_radiance.map(|(_, words)| words.to_owned())
+}
+
 struct Entries<'a> {
     path: &'a Path,
     list: Vec<Entry>,
@@ -267,6 +285,14 @@ impl Entries<'_> {
         let entry = self.list.iter().find(|entry| entry.key == key);
         let list = entry.map_or("", |entry| entry.value.trim_matches(['{', '}']));
         list.split(',').map(str::trim).filter(|word| !word.is_empty()).collect()
+    }
+
+    /// Returns what the second title of plots says that values are, as in `{Wavelength (nm), Radiance (uW/cm2/sr/nm)}`, where it says more than usual.
+    fn unit_of_titles(&mut self) -> Option<String> {
+        const USUAL: [&str; 6] = ["", "value", "values", "data value", "data values", "radiance"];
+        let titles = words_of(&self.get("z plot titles")?.value);
+        let (_, title) = titles.split_once(',')?;
+        Some(title.trim().to_owned()).filter(|title| !USUAL.contains(&title.to_lowercase().as_str()))
     }
 
     /// Returns what is said of samples that are not square, and of a map that they are turned on.

@@ -162,6 +162,55 @@ fn white_is_reported_by_the_caller_the_header_or_references() {
 }
 
 #[test]
+fn what_titles_and_descriptions_say_of_numbers_is_obeyed_or_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let (text, bytes) = (header(4, "bsq", 0), samples(4, "bsq", 0));
+    let read = |more: &str, quantity: FileQuantity, unit: Option<&str>| {
+        let path = write(folder.path(), "a", &format!("{text}{more}\n"), &bytes);
+        let reading = FileReading { quantity: Some(quantity), unit: unit.map(str::to_owned), ..FileReading::default() };
+        read_with(&path, &ReadOptions { reading, ..ReadOptions::default() })
+            .map(|(image, notes)| (image.spectrum_at(1, 2), notes.join("\n")))
+            .map_err(|error| error.to_string())
+    };
+    let (light, shares) = (FileQuantity::Radiance, FileQuantity::Reflectance);
+    let (plain, notes) = read("", light, None).unwrap();
+    assert_eq!(notes, "");
+    for (more, factor) in [
+        ("description = {EMIT L1B calibrated spectral\n radiance (units: uW nm-1 cm-2 sr-1)}", 0.01),
+        ("z plot titles = {Wavelength (nm), Radiance W/m2/sr/um}", 1e-3),
+        ("data units = Radiance (W/m2/sr/um)", 1e-3),
+        ("description = {File imported}\nz plot titles = {Wavelength, Radiance}", 1.0),
+    ] {
+        let (found, notes) = read(more, light, None).unwrap();
+        assert_eq!(notes, "", "{more}");
+        for (found, plain) in found.iter().zip(&plain) {
+            assert!((found / (factor * plain) - 1.0).abs() < 1e-6, "{more}: {found} {plain}");
+        }
+    }
+    for (more, quantity, words) in [
+        ("z plot titles = {Wavelength, Counts}", light, "unit 'Counts' is not used"),
+        ("z plot titles = {Wavelength, Brightness Temperature (K)}", light, "Temperature (K)' is not used"),
+        ("z plot titles = {Wavelength, Absorbance}", shares, "'Absorbance' is not used"),
+        ("description = {top of atmosphere reflectance * 10000}", shares, "reflectance * 10000' is not used"),
+    ] {
+        let (_, notes) = read(more, quantity, None).unwrap();
+        assert!(notes.contains(words), "{more}: {notes}");
+    }
+    for (more, words) in [
+        ("z plot titles = {Wavelength, Reflectance (%)}", "says that it is a reflectance"),
+        ("z plot titles = {Wavelength, Reflectance}", "says that it is a reflectance"),
+        ("data units = uW/cm^2/nm", "'uW/cm^2/nm', of irradiance: expected the unit of its radiance (--unit)"),
+        ("data units = photons/s/m2/nm", "of irradiance"),
+        ("data units = W/m^2", "of irradiance"),
+    ] {
+        let message = read(more, light, None).unwrap_err();
+        assert!(message.contains(words), "{more}: {message}");
+    }
+    let (_, notes) = read("data units = uW/cm^2/nm", light, Some("uW/cm^2/sr/nm")).unwrap();
+    assert!(notes.contains("unit 'uW/cm^2/nm' is not used"), "{notes}");
+}
+
+#[test]
 fn references_of_other_settings_and_those_that_do_not_count_are_named() {
     let folder = tempfile::tempdir().unwrap();
     let (text, bytes) = (header(1, "bsq", 0), samples(1, "bsq", 0));

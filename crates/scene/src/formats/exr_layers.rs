@@ -139,21 +139,33 @@ pub(super) fn split_layers(layers: Vec<RawLayer>) -> Vec<RawLayer> {
     layers.into_iter().flat_map(RawLayer::split).collect()
 }
 
-/// Leaves the layers of the first view, and those of none, and returns the names of the other views.
-pub(super) fn leave_other_views(layers: &mut Vec<RawLayer>) -> Vec<String> {
-    let first = layers.iter().find_map(|layer| layer.view.clone());
+/// Leaves the layers of the view that is told by its name or by that of one of its layers, or else of the first, and those of none. Returns the names of the
+/// other views, and the layer that is still asked for.
+pub(super) fn leave_other_views(layers: &mut Vec<RawLayer>, told: Option<&str>) -> (Vec<String>, Option<String>) {
+    let is_told =
+        |layer: &&RawLayer| told.is_some_and(|told| layer.view.as_deref() == Some(told) || layer.name == told);
+    // What is told may be in no view.
+    let of_told = layers.iter().find(is_told).and_then(|layer| layer.view.clone());
+    let first = of_told.clone().or_else(|| layers.iter().find_map(|layer| layer.view.clone()));
     let is_other = |layer: &RawLayer| layer.view.is_some() && layer.view != first;
     let mut others: Vec<String> =
         layers.iter().filter(|layer| is_other(layer)).filter_map(|layer| layer.view.clone()).collect();
     others.dedup();
     layers.retain(|layer| !is_other(layer));
+    let asked = layers.iter().position(|layer| Some(layer.name.as_str()) == told);
     // Parts of a view are named after it, as `left` or `depth.left`, which its channels need not be.
     for layer in layers.iter_mut() {
         let Some(view) = &layer.view else { continue };
         let rest = layer.name.strip_suffix(view.as_str()).map(|rest| rest.trim_end_matches(['.', '_']).to_owned());
         layer.name = rest.unwrap_or_else(|| layer.name.clone());
     }
-    others
+    // The only layer of a view needs no name.
+    let asked = match (of_told, asked) {
+        (Some(_), Some(index)) if layers.len() > 1 => Some(layers[index].name.clone()).filter(|name| !name.is_empty()),
+        (Some(_), _) => None,
+        (None, _) => told.map(str::to_owned),
+    };
+    (others, asked)
 }
 
 /// Reads all layers; at least one.

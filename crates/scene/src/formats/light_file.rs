@@ -6,10 +6,13 @@ use dioptric_files::text;
 use dioptric_spectrum::{Illuminant, Spectrum};
 
 use super::{
+    column_names::{counts_photons, is_no_power},
     contents::is_of,
+    light_unit::LightUnit,
     mat::{has_variable, read_mat_matrices},
+    stated::short,
     unusable::unreadable,
-    wavelength_unit::{comments_of, wavelengths_of_column},
+    wavelength_unit::{comments_of, unit_in, unit_of_waves, wavelengths_of_column},
 };
 use crate::SceneError;
 
@@ -38,7 +41,6 @@ pub fn read_light(path: &Path) -> Result<Illuminant, SceneError> {
         .comment(Some(b'#'))
         .trim(csv::Trim::All)
         .from_reader(text.as_bytes());
-    let has = |text: &str, words: &[&str]| words.iter().any(|of| text.to_lowercase().contains(of));
     let (mut names, mut wavelengths_nm, mut values) = (Vec::<String>::new(), Vec::new(), Vec::new());
     for (number, record) in reader.records().enumerate() {
         let record = record.map_err(|e| unreadable(e.to_string()))?;
@@ -64,38 +66,73 @@ pub fn read_light(path: &Path) -> Result<Illuminant, SceneError> {
     let comments = comments_of(&text).chain([line.trim_start_matches([';', '%', '/', ' '])]);
     let wavelengths_nm = wavelengths_of_column(first, &wavelengths_nm, comments).map_err(unreadable)?;
     // Of a line of names that is not told apart, all of it.
-    let of_power = names.get(1).or(names.first());
-    let counts_photons = of_power.is_some_and(|name| has(name, &["photon", "quant", "mol", "pfd", "einstein"]));
-    let is_comment = |line: &&str| line.starts_with('#') && has(line, &["photon", "quanta"]);
-    if let Some(comment) = text.lines().find(is_comment).filter(|_| !counts_photons) {
-        return Err(unreadable(format!(
-            "it says '{}': expected the name of its second column to say whether its numbers are photons or watts",
-            comment.trim_start_matches('#').trim()
-        )));
-    }
+    let of_power = names.get(1).or(names.first()).map_or("", String::as_str);
+    let unit = unit_of_power(of_power, comments_of(&text)).map_err(unreadable)?;
     if values.is_empty() {
         return Err(unreadable("it has no line of a wavelength in nm and a power".to_owned()));
     }
-    // A power a frequency, or in decibels, is none a nanometre.
-    let is_other = |name: &String| {
-        let lower = name.to_lowercase();
-        let has_word = |of: &str| lower.split(|c: char| !c.is_alphabetic()).any(|word| word == of);
-        ["db", "dbm", "decibel", "decibels", "log", "logarithm", "fnu"].into_iter().any(has_word)
-            || ["absor", "transmi", "reflectance", "wavenumber", "cm-1"].iter().any(|of| lower.contains(of))
-            || ["%t", "%r"].contains(&lower.trim())
-            || lower.ends_with("hz")
-            || lower.contains("hz-1")
-            || lower.contains("hz^-1")
-    };
-    if let Some(name) = of_power.filter(|name| is_other(name)) {
-        return Err(unreadable(format!(
-            "its column '{name}' is no power a nanometre, expected such (W/nm) or photons"
-        )));
-    }
-    if counts_photons {
-        values.iter_mut().zip(&wavelengths_nm).for_each(|(value, nm)| *value /= nm);
-    }
+    values.iter_mut().zip(&wavelengths_nm).for_each(|(value, nm)| *value /= unit.divisor_at(*nm));
     light_of(&wavelengths_nm, &values).map_err(unreadable)
+}
+
+/// Returns the unit of a light's numbers, by the name of their column or, where that has none, by what comments say.
+///
+/// # Errors
+/// When it is none of a power, or of photons, or free words speak of photons.
+fn unit_of_power<'a>(name: &str, comments: impl Iterator<Item = &'a str>) -> Result<LightUnit, String> {
+    if let Some(unit) = power_in(name).map_err(|what| format!("its column {what}"))? {
+        return Ok(unit);
+    }
+    for comment in comments {
+        if let Some(own) = said_of_power(comment)
+            && let Some(unit) = power_in(own).map_err(|what| format!("its comment: {what}"))?
+        {
+            return Ok(unit);
+        }
+        let lower = comment.to_lowercase();
+        let is_of_photons = |word: &str| ["photon", "quanta", "pfd", "ppfd"].iter().any(|own| word.starts_with(own));
+        if lower.split(|c: char| !c.is_alphabetic()).any(is_of_photons) {
+            return Err(format!(
+                "it says '{}': expected the name of its second column to say whether its numbers are photons or watts",
+                short(comment)
+            ));
+        }
+    }
+    Ok(LightUnit::RADIANCE)
+}
+
+/// Returns the unit of power, or of photons, that a name has; `None` where it says nothing of it.
+fn power_in(name: &str) -> Result<Option<LightUnit>, String> {
+    let own = LightUnit::of_spectrum(name);
+    if is_no_power(own.map_or(name, |(_, before)| before)) {
+        return Err(format!(
+            "'{}' is no power a nanometre: expected such (W/nm) or photons, and a name that says so",
+            short(name)
+        ));
+    }
+    Ok(own.map(|(unit, _)| unit).or(counts_photons(name).then_some(LightUnit::PHOTONS)))
+}
+
+/// Returns what of a comment is about the numbers of a light: what stands behind the word for a unit, the last of the names of columns, or all of
+/// one that is short.
+fn said_of_power(comment: &str) -> Option<&str> {
+    let lower = comment.to_lowercase();
+    if let Some(at) = lower.rfind("unit") {
+        let rest = comment.get(at + "unit".len()..)?.trim_start_matches(['s', ')', ':', '=', ' ']);
+        return Some(rest).filter(|rest| unit_in(rest).is_none_or(|unit| unit != *rest));
+    }
+    let names: Vec<&str> = comment.split([',', ';', '\t']).map(str::trim).collect();
+    if names.len() > 1 && unit_of_waves(names[0]).is_some() {
+        return names.last().copied();
+    }
+    let words: Vec<&str> = comment.split_whitespace().collect();
+    let is_of_unit = |text: &str| LightUnit::of_spectrum(text).is_some_and(|(_, before)| before.is_empty());
+    match words[..] {
+        [of_waves, of_power] if unit_in(of_waves) == Some(of_waves) => Some(of_power),
+        [_] => Some(comment),
+        [_, _] | [_, _, _] if is_of_unit(comment) || is_no_power(comment) => Some(comment),
+        _ => None,
+    }
 }
 
 fn light_of(wavelengths_nm: &[f64], values: &[f64]) -> Result<Illuminant, String> {
@@ -110,7 +147,7 @@ fn light_of(wavelengths_nm: &[f64], values: &[f64]) -> Result<Illuminant, String
 fn of_iset(path: &Path) -> Result<Illuminant, SceneError> {
     const WAVES: [&str; 2] = ["wavelength", "wave"];
     if let Some(name) = ["units", "unit"].into_iter().find(|name| has_variable(path, name)) {
-        let reason = format!("its '{name}' is not read: expected energy a nanometre, and none");
+        let reason = format!("its '{name}' is not read: expected energy a nanometre, and the file without it");
         return Err(unreadable(path, reason));
     }
     let matrices = read_mat_matrices(path, &["wavelength", "wave", "data"])?;
@@ -174,6 +211,18 @@ mod tests {
             "# Wavelength (Angstroms), flux\n4000 1\n5000 2\n8000 1\n",
             "nm, quantum flux\n400, 400\n500, 1000\n800, 800\n",
             "nm, PPFD\n400, 400\n500, 1000\n800, 800\n",
+            "# units: umol/m2/s/nm\n400 400\n500 1000\n800 800\n",
+            "Unit: µmol m-2 s-1 nm-1\nnm, value\n400, 400\n500, 1000\n800, 800\n",
+            "# quanta\n400 400\n500 1000\n800 800\n",
+            "# PPFD\n400 400\n500 1000\n800 800\n",
+            "# nm photons\n400 400\n500 1000\n800 800\n",
+            "# Wavelength (nm), photon flux\n400 400\n500 1000\n800 800\n",
+            "# y unit = erg/s/cm2/A\n400 1\n500 2\n800 1\n",
+            "# log of the lamp 2020, units: nm\n400 1\n500 2\n800 1\n",
+            // Steps of frequency and of energy.
+            "nm,W/m2/cm-1\n400,160000\n500,500000\n800,640000\n",
+            "# W/m2/Hz\n400 160000\n500 500000\n800 640000\n",
+            "nm,W/m2/eV\n400,160000\n500,500000\n800,640000\n",
             "\u{feff}Å, W\n4000, 1\n5000, 2\n8000, 1\n",
         ] {
             assert_eq!(read(text).unwrap(), light, "{text}");
@@ -187,7 +236,14 @@ mod tests {
             ("nm,%T\n400, 1\n500, 2\n", "'%T' is no power"),
             ("nm,dB\n400, -1\n500, -2\n", "'dB' is no power"),
             ("nm,absolute log irradiance\n400, -1\n500, -2\n", "irradiance' is no power"),
-            ("nm,W m-2 Hz-1\n400, 1\n500, 2\n", "Hz-1' is no power"),
+            ("nm,Intensity (counts)\n400, 1\n500, 2\n", "(counts)' is no power"),
+            ("nm,log10(W)\n400, 1\n500, 2\n", "log10(W)' is no power"),
+            ("nm,A/W\n400, 1\n500, 2\n", "'A/W' is no power"),
+            ("nm,f_nu\n400, 1\n500, 2\n", "'f_nu' is no power"),
+            ("# Units: counts\n400 1\n500 2\n", "'counts' is no power"),
+            ("# dB\n400 1\n500 2\n", "'dB' is no power"),
+            ("# not photons\n400 1\n500 2\n", "'not photons'"),
+            ("Pixel,power\n400, 1\n500, 2\n", "'Pixel' holds no wavelengths"),
             ("Light in photons\nnm, a\n400, 1\n500, 2\n", "photons"),
             ("400, 1\n400, 2\n", "400"),
             ("4000, 1\n7000, 2\n", "may be nm or Å"),

@@ -12,11 +12,19 @@ pub(super) struct LightUnit {
     pub(super) quantity: Quantity,
     factor: f64,
     is_photons: bool,
+    /// Whether it is of a step of frequency, energy or wavenumber, to which a step of wavelength is as the square of that.
+    is_per_frequency: bool,
 }
+
+/// Planck's constant times the speed of light, eV nm, the latter, nm/s, and the photons of a mole (CODATA 2018).
+const EV_NM: f64 = 1_239.841_984;
+const NM_PER_S: f64 = 2.997_924_58e17;
+const PER_MOLE: f64 = 6.022_140_76e23;
 
 impl LightUnit {
     /// Radiance in W m⁻² sr⁻¹ nm⁻¹.
-    pub(super) const RADIANCE: Self = Self { quantity: Quantity::Radiance, factor: 1.0, is_photons: false };
+    pub(super) const RADIANCE: Self =
+        Self { quantity: Quantity::Radiance, factor: 1.0, is_photons: false, is_per_frequency: false };
 
     /// Returns the unit of a text, or `None` where it is no unit of spectral light. A nanometre is understood where no length
     /// of wavelength is stated.
@@ -24,9 +32,29 @@ impl LightUnit {
         Sum::of(text)?.unit()
     }
 
+    /// Returns the unit of spectral light that a text is or ends in, as `Radiance (uW/cm2/sr/nm)`, and its words.
+    pub(super) fn in_words(text: &str) -> Option<(Self, &str)> {
+        endings(text).find_map(|(_, words)| Some((Self::parse(words)?, words)))
+    }
+
+    /// Returns the unit of watts, or of photons, that the name of a relative spectrum is or ends in, whatever it says of areas, angles and times,
+    /// and what stands before it.
+    pub(super) fn of_spectrum(name: &str) -> Option<(Self, &str)> {
+        endings(name).find_map(|(before, words)| Some((Sum::of(words)?.spectral()?, before)))
+    }
+
+    /// That of photons a nanometre of a relative spectrum.
+    pub(super) const PHOTONS: Self = Self { is_photons: true, ..Self::RADIANCE };
+
+    /// Returns what makes a relative power a nanometre of a number when it is divided by it.
+    pub(super) fn divisor_at(self, wavelength_nm: f64) -> f64 {
+        let of = |is: bool, divisor: f64| if is { divisor } else { 1.0 };
+        of(self.is_photons, wavelength_nm) * of(self.is_per_frequency, wavelength_nm.powi(2))
+    }
+
     /// Whether a unit of spectral light states no length of wavelength, so that a nanometre is understood.
     pub(super) fn lacks_wavelength(text: &str) -> bool {
-        Sum::of(text).is_some_and(|sum| sum.wavelengths == 0 && sum.metres != -3)
+        Sum::of(text).is_some_and(|sum| sum.wavelengths == 0 && sum.metres != -3 && sum.per_frequency() == Some(None))
     }
 
     /// Whether it counts photons, and not their energy.
@@ -37,7 +65,8 @@ impl LightUnit {
     /// Returns what makes watts of a number.
     pub(super) fn factor_at(self, wavelength_nm: f64) -> f64 {
         let joules = if self.is_photons { joules_per_photon(wavelength_nm) } else { 1.0 };
-        self.factor * joules
+        let step = if self.is_per_frequency { wavelength_nm.powi(-2) } else { 1.0 };
+        self.factor * joules * step
     }
 
     /// Puts the samples of a band into watts.
@@ -48,6 +77,19 @@ impl LightUnit {
             plane.mapv_inplace(|v| (f64::from(v) * factor) as f32);
         }
     }
+}
+
+/// Returns a text, and what is behind each of its words and brackets, with what stands before.
+fn endings(text: &str) -> impl Iterator<Item = (&str, &str)> {
+    let is_between = |c: char| c.is_whitespace() || "([:=,".contains(c);
+    let inner = text.char_indices().filter(move |(_, c)| is_between(*c)).map(|(at, c)| at + c.len_utf8());
+    std::iter::once(0).chain(inner).map(|at| {
+        let (before, rest) = text.split_at(at);
+        let rest = rest.trim();
+        let n = |signs: [char; 2]| rest.matches(signs).count();
+        let is_closed = n([')', ']']) > n(['(', '[']);
+        (before, rest.strip_suffix([')', ']']).filter(|_| is_closed).unwrap_or(rest))
+    })
 }
 
 /// Returns a text with the symbols of units that are written out: `Microwatts per square centimeter …` becomes `uW / cm^2 …`.
@@ -84,6 +126,10 @@ fn symbols(text: &str) -> String {
             "micrometer" | "micrometers" | "micrometre" | "micrometres" | "microns" => "um",
             "steradian" | "steradians" | "ster" => "sr",
             "second" | "seconds" => "s",
+            "joule" | "joules" => "J",
+            "ergs" => "erg",
+            "angstrom" | "angstroms" | "ångström" => "Å",
+            "hertz" => "Hz",
             // Sr is written as often as sr.
             "sr" => "sr",
             _ => word,
@@ -131,6 +177,11 @@ struct Sum {
     metres: i32,
     steradians: i32,
     wavelengths: i32,
+    /// Of what a step of frequency, energy or wavenumber may be counted in.
+    hertz: i32,
+    electronvolts: i32,
+    wavenumbers: i32,
+    moles: i32,
     log10_factor: i32,
 }
 
@@ -163,6 +214,23 @@ impl Sum {
 
     fn add(&mut self, name: &str, exponent: i32) -> Option<()> {
         let (what, log10) = match name {
+            "J" | "erg" => {
+                self.seconds += exponent;
+                (&mut self.watts, if name == "J" { 0 } else { -7 })
+            }
+            "mol" | "mmol" | "umol" | "µmol" | "μmol" | "nmol" => {
+                self.moles += exponent;
+                let log10 = [("mol", 0), ("mmol", -3), ("nmol", -9)].iter().find(|(own, _)| *own == name);
+                (&mut self.photons, log10.map_or(-6, |(_, log10)| *log10))
+            }
+            "Hz" => (&mut self.hertz, 0),
+            "GHz" => (&mut self.hertz, 9),
+            "THz" => (&mut self.hertz, 12),
+            "eV" => (&mut self.electronvolts, 0),
+            // Of a wavenumber, as in W/m2/cm-1.
+            "m" if exponent == 1 => (&mut self.wavenumbers, 0),
+            "cm" if exponent == 1 => (&mut self.wavenumbers, -2),
+            "Å" | "A" => (&mut self.wavelengths, -1),
             "W" | "watt" | "watts" => (&mut self.watts, 0),
             "kW" => (&mut self.watts, 3),
             "mW" => (&mut self.watts, -3),
@@ -184,6 +252,30 @@ impl Sum {
         Some(())
     }
 
+    /// Returns what a power a nanometre times the square of wavelengths is of one a step of frequency, energy or wavenumber, where it is one; `None`
+    /// of what is no step.
+    fn per_frequency(&self) -> Option<Option<f64>> {
+        match (self.hertz, self.electronvolts, self.wavenumbers) {
+            (0, 0, 0) => Some(None),
+            (-1, 0, 0) => Some(Some(NM_PER_S)),
+            (0, -1, 0) => Some(Some(EV_NM)),
+            (0, 0, 1) => Some(Some(1e9)),
+            _ => None,
+        }
+        .filter(|own| own.is_none() || self.wavelengths == 0)
+    }
+
+    /// Returns the unit of a relative spectrum.
+    fn spectral(&self) -> Option<LightUnit> {
+        let is_photons = match (self.watts, self.photons) {
+            (1, 0) => false,
+            (0, 1) => true,
+            _ => return None,
+        };
+        let is_per_frequency = self.per_frequency()?.is_some();
+        matches!(self.wavelengths, 0 | -1).then(|| LightUnit { is_photons, is_per_frequency, ..LightUnit::RADIANCE })
+    }
+
     fn unit(mut self) -> Option<LightUnit> {
         // A spectral unit in metres alone: W.m^-3.sr^-1.
         if self.metres == -3 && self.wavelengths == 0 {
@@ -200,8 +292,14 @@ impl Sum {
             0 => Quantity::Irradiance,
             _ => return None,
         };
+        let step = self.per_frequency()?;
         let is_light = self.metres == -2 && matches!(self.wavelengths, 0 | -1);
-        is_light.then(|| LightUnit { quantity, factor: 10.0_f64.powi(self.log10_factor), is_photons })
+        is_light.then(|| LightUnit {
+            quantity,
+            factor: 10.0_f64.powi(self.log10_factor) * PER_MOLE.powi(self.moles) * step.unwrap_or(1.0),
+            is_photons,
+            is_per_frequency: step.is_some(),
+        })
     }
 }
 
@@ -254,6 +352,51 @@ mod tests {
             // A photon of 550 nm has 3.6117e-19 J (CODATA: h c = 1.98644586e-25 J m).
             assert_relative_eq!(plane[(0, 0)], 3.611_72e-4, max_relative = 1e-5);
         }
+    }
+
+    #[test]
+    fn steps_of_frequency_become_those_of_wavelength() {
+        // At 500 nm a nanometre is 40 cm⁻¹, 1.199 170 THz and 4.959 368 meV.
+        for (text, expected) in [
+            ("W/m2/cm-1/sr", 40.0),
+            ("W m-2 sr-1 cm", 40.0),
+            ("mW/(m^2 sr cm^-1)", 0.04),
+            ("W/m^2/sr/THz", 1.199_169_832),
+            ("W/m2/sr/eV", 4.959_367_936e-3),
+            ("erg/s/cm2/sr/A", 1e-2),
+        ] {
+            let unit = LightUnit::parse(text).unwrap();
+            assert_relative_eq!(unit.factor_at(500.0), expected, max_relative = 1e-9);
+            assert!(!LightUnit::lacks_wavelength(text), "{text}");
+        }
+        // A micromole of photons of 550 nm has 0.217 502 J.
+        let unit = LightUnit::parse("umol/m2/s/nm").unwrap();
+        assert_relative_eq!(unit.factor_at(550.0), 0.217_502, max_relative = 1e-5);
+    }
+
+    #[test]
+    fn words_end_in_units() {
+        let unit = |text| LightUnit::in_words(text).map(|(_, words)| words);
+        for (text, expected) in [
+            ("Radiance (uW/cm2/nm/sr)", "uW/cm2/nm/sr"),
+            ("Radiance W/(m2 sr um)", "W/(m2 sr um)"),
+            ("calibrated radiance (units: uW nm-1 cm-2 sr-1)", "uW nm-1 cm-2 sr-1"),
+        ] {
+            assert_eq!(unit(text), Some(expected), "{text}");
+        }
+        assert_eq!([unit("Radiance"), unit("Counts"), unit("Temperature (K)")], [None; 3]);
+        let spectrum = |text| LightUnit::of_spectrum(text).map(|(own, before)| (own.divisor_at(10.0), before));
+        for (text, expected) in [
+            ("power (W)", (1.0, "power (")),
+            ("W/nm", (1.0, "")),
+            ("irradiance W/m2/cm-1", (100.0, "irradiance ")),
+            ("photons", (10.0, "")),
+            ("PFD (umol m-2 s-1 nm-1)", (10.0, "PFD (")),
+            ("log10(W)", (1.0, "log10(")),
+        ] {
+            assert_eq!(spectrum(text), Some(expected), "{text}");
+        }
+        assert_eq!([spectrum("power"), spectrum("A/W"), spectrum("counts")], [None; 3]);
     }
 
     #[test]

@@ -9,6 +9,7 @@ mod camera_files;
 mod camera_models;
 mod camera_yaml;
 mod chart_table;
+mod column_names;
 mod contents;
 mod cube_folder;
 mod depth;

@@ -151,10 +151,12 @@ pub(super) struct AskedChannels<'a> {
 /// Reads an EXR file of bands or, where it has none, of red, green and blue.
 ///
 /// Bands may be in a part each. The depth is the channel told, or `Z`, or that of the view layer whose colors are taken (`….Depth.Z`), or
-/// `distance`. Of several views (stereo) the first is taken.
+/// `distance`. Of several views (stereo) that told, or the first, is taken.
 pub(super) fn read_raw_exr(path: &Path, asked: AskedChannels<'_>) -> Result<RawFile, SceneError> {
     let (head, mut layers) = read_layers(path)?;
-    let mut notes: Vec<String> = note_of(path, "view", &leave_other_views(&mut layers)).into_iter().collect();
+    let (views, layer) = leave_other_views(&mut layers, asked.layer);
+    let asked = AskedChannels { layer: layer.as_deref(), ..asked };
+    let mut notes: Vec<String> = note_of(path, "view", &views).into_iter().collect();
     let mut layers = split_layers(layers);
     let hidden = layers
         .iter()

@@ -164,7 +164,9 @@ pub(super) fn read_tiff(path: &Path, wanted: TiffAs) -> Result<Noted<TiffFile>, 
     let of_gdal = first.gdal.wavelengths_nm.as_ref().map(Vec::len);
     let is_listed = [first.n_listed(), of_gdal].contains(&Some(n_planes));
     let as_planes = first.is_stack() || ((wanted != TiffAs::Marked || is_listed) && first.has_plain_samples());
-    notes.extend(first.note_of_white(path).filter(|_| as_planes));
+    // Depths are counted as they stand, which is said where they are read.
+    let is_said = as_planes && (wanted != TiffAs::Depths || first.n_samples > 1);
+    notes.extend(first.note_of_white(path).filter(|_| is_said));
     // Gray pages are planes of a stack, colored ones a picture and others.
     let is_picture = !as_planes && (pages.len() == 1 || first.n_samples > 1);
     if is_picture {

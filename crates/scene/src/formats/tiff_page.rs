@@ -241,15 +241,14 @@ impl Page {
         listed_in(self).map(|(list, _)| list.len())
     }
 
-    /// Returns what is said of a mark that 0 is white where a pixel has several samples, none of which is counted from white.
+    /// Returns what is said of planes with a mark that 0 is white: those of a sample a pixel are counted from white, others are not.
     pub(super) fn note_of_white(&self, path: &Path) -> Option<String> {
-        let is_marked = self.marked == Marked::Gray { is_white_zero: true } && self.n_samples > 1;
-        is_marked.then(|| {
-            format!(
-                "{}: its mark that 0 is white (tag 262) is not used: its bands are taken as they stand",
-                name_of(path)
-            )
-        })
+        let is_marked = self.marked == Marked::Gray { is_white_zero: true };
+        let what = match self.n_samples {
+            1 => "(tag 262) is obeyed: its numbers are counted from the largest down",
+            _ => "(tag 262) is not used: its bands are taken as they stand",
+        };
+        is_marked.then(|| format!("{}: its mark that 0 is white {what}", name_of(path)))
     }
 
     /// Whether its samples are numbers by themselves, a plane each.
@@ -359,12 +358,9 @@ impl PageWords {
 /// shows it; none of another description.
 fn written_keys(text: &str) -> Option<Vec<String>> {
     if text.starts_with("ImageJ=") {
-        const KEYS: [&str; 17] = [
+        const KEYS: [&str; 14] = [
             "ImageJ",
             "images",
-            "channels",
-            "slices",
-            "frames",
             "hyperstack",
             "mode",
             "loop",
@@ -378,8 +374,15 @@ fn written_keys(text: &str) -> Option<Vec<String>> {
             "max",
             "axes",
         ];
-        let is_usual = |key: &str, value: &str| KEYS.contains(&key) || key == "unit" && value.starts_with("pixel");
+        const AXES: [&str; 3] = ["channels", "slices", "frames"];
         let pairs = text.lines().filter_map(|line| line.split_once('=')).map(|(key, value)| (key.trim(), value.trim()));
+        let is_long = |(key, value): &(&str, &str)| AXES.contains(key) && *value != "1";
+        // Of bands along several axes it is not known which are whose.
+        let are_several = pairs.clone().filter(is_long).count() > 1;
+        let is_usual = |key: &str, value: &str| match AXES.contains(&key) {
+            true => !(are_several && value != "1"),
+            false => KEYS.contains(&key) || key == "unit" && value.starts_with("pixel"),
+        };
         return Some(pairs.filter(|(key, value)| !is_usual(key, value)).map(|(key, _)| key.to_owned()).collect());
     }
     match serde_json::from_str(text) {

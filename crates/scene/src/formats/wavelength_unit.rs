@@ -2,7 +2,10 @@
 
 use std::path::Path;
 
-use super::stated::{short, shown};
+use super::{
+    column_names::is_no_wavelength,
+    stated::{short, shown},
+};
 use crate::SceneError;
 
 /// The speed of light times 1e9 nm per m, nm/s, and the energy of a photon times its wavelength, eV nm (CODATA 2018).
@@ -122,6 +125,12 @@ pub(super) fn wavelengths_of_column<'a>(
     numbers: &[f64],
     comments: impl IntoIterator<Item = &'a str>,
 ) -> Result<Vec<f64>, String> {
+    if is_no_wavelength(name) {
+        return Err(format!(
+            "its column '{}' holds no wavelengths: expected such in nm, and in its name that they are",
+            short(name)
+        ));
+    }
     let bracketed = name.rsplit_once(['(', '[']).map(|(_, rest)| rest.trim_end_matches([')', ']', ' ']));
     let can_be = |unit: &&str| {
         let nm = in_nm(unit, numbers);
@@ -153,7 +162,7 @@ pub(super) fn comments_of(text: &str) -> impl Iterator<Item = &str> {
 }
 
 /// Returns the first unit behind a word for wavelengths, or that which a text begins with, as names of columns do.
-fn unit_of_waves(text: &str) -> Option<&str> {
+pub(super) fn unit_of_waves(text: &str) -> Option<&str> {
     let lower = text.to_lowercase();
     let at = ["wavelength", "lambda", "wavenumber", "frequency"].iter().find_map(|word| lower.find(word));
     let mut words = text.get(at.unwrap_or(0)..)?.split(|c: char| c.is_whitespace() || ",;:=[]()".contains(c));

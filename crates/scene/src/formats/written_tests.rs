@@ -98,6 +98,7 @@ fn pages_and_descriptions_may_not_say_two_things() {
         (r#"{"shape": [2, 3, 4], "axes": "CYX"}"#, ""),
         (r#"{"shape": [2, 3, 4], "axes": "CXY", "gain": 2.5}"#, "'axes', 'gain'"),
         ("ImageJ=1.53\nimages=2\nslices=2\nmin=0.0\nloop=false", ""),
+        ("ImageJ=1.53\nimages=4\nchannels=2\nslices=2\nframes=1", "'channels', 'slices'"),
         ("ImageJ=1.53\nimages=2\ncf=0\nc0=-32768.0\nc1=1.0", "'cf', 'c0', 'c1'"),
     ] {
         write_pages(&path, &[&[name("450 nm"), list(text)], &[name("550 nm")]]);
