@@ -82,10 +82,14 @@ impl LensDefaults {
              and --film-mm puts it elsewhere"
                 .to_owned()
         });
+        let weightless = [&file.wavelength_weights, &file.field_weights]
+            .into_iter()
+            .any(|weights| !weights.is_empty() && weights.iter().all(|weight| *weight == 0.0));
+        let weightless = weightless.then(|| "weights that are all 0 count as alike".to_owned());
         Self {
             several,
             wavelength_weights,
-            reference_nm: file.reference_wavelength_nm.filter(is_known),
+            reference_nm: file.main_wavelength_nm().filter(is_known),
             wavelengths_nm,
             distance_mm: file.object_distance_mm.unwrap_or(f64::INFINITY),
             surface_comments: file.surface_comments,
@@ -93,7 +97,7 @@ impl LensDefaults {
             field_weights: file.field_weights,
             film_distance_mm: file.film_distance_mm.filter(|_| is_solved),
             lens: file.lens,
-            notes: file.notes.into_iter().chain(unsolved).collect(),
+            notes: file.notes.into_iter().chain(unsolved).chain(weightless).collect(),
         }
     }
 
@@ -324,6 +328,12 @@ mod tests {
             medium: Named(\"MISC:GERMANIUM\"), thickness_mm: 2.0), (radius_mm: 70.0, semi_aperture_mm: 5.0,
             thickness_mm: 0.0)])";
         let infrared = of_file("a.ron", text);
+        // Of wavelengths that nobody sees one is the main one; of others 550 nm stand for it.
+        let main = |list: &str| {
+            of_file("a.ron", &text.replace("source:", &format!("wavelengths_nm: {list}, source:"))).reference_nm
+        };
+        assert_eq!(main("[9000.0, 5000.0]"), Some(5000.0));
+        assert_eq!(read("WL 656 486\nSO 0 1E10", "1.5").wavelengths_or(&[550.0]), [656.0, 486.0]);
         assert_eq!(infrared.wavelengths_or(&[450.0, 550.0, 650.0]), [5000.0, 8000.0, 11_000.0]);
         assert_eq!(infrared.wavelength_or_usual(), 8000.0);
     }

@@ -200,7 +200,13 @@ impl<'a> Seq<'a> {
                 let [constant, powers @ ..] = terms.as_slice() else {
                     return Err(command.wrong("a glass of Laurent's formula (LAU) without coefficients".to_owned()));
                 };
-                let pairs = powers.iter().zip([2.0, -2.0, -4.0, -6.0, -8.0, -10.0]).flat_map(|(c, power)| [*c, power]);
+                if powers.len() > 5 {
+                    let found = terms.len();
+                    return Err(
+                        command.wrong(format!("{found} coefficients of Laurent's formula (LAU), expected up to 6"))
+                    );
+                }
+                let pairs = powers.iter().zip([2.0, -2.0, -4.0, -6.0, -8.0]).flat_map(|(c, power)| [*c, power]);
                 let coefficients = [*constant].into_iter().chain(pairs).collect();
                 let glass = Glass::Formula { formula: 3, coefficients, range_nm: None };
                 glass.check().map_err(|error| command.wrong(error))?;
@@ -384,7 +390,12 @@ impl<'a> Seq<'a> {
                 let found = self.glasses.find(if is_private { word } else { &name }, None);
                 let is_number = word.starts_with(|first: char| first.is_ascii_digit());
                 let expected = "an index is written as 1.5168, 1.5168:64.17, 517642 or 1.0001e4";
-                let hint = if is_number { format!("; {expected}") } else { String::new() };
+                let unread = self.notes.iter().find(|note| note.starts_with(&format!("private glass {word} ")));
+                let hint = match unread {
+                    Some(note) => format!("; {note}"),
+                    None if is_number => format!("; {expected}"),
+                    None => String::new(),
+                };
                 found.map_err(|reason| command.wrong(format!("{reason}{hint}")))?.glass
             }
         };

@@ -65,7 +65,7 @@ impl LensFile {
                 let _ = writeln!(text, "  SLB S{} {}", i + 1, quoted(comment));
             }
             write_shape(&mut text, i, &lens.interfaces()[i].surface)?;
-            write_phase(&mut text, lens, i, self.main_wavelength_nm())?;
+            write_phase(&mut text, lens, i, self.reference_wavelength_nm.unwrap_or(D_LINE_NM))?;
             write_apertures(&mut text, lens, i)?;
             write_tilt(&mut text, tilts[i]);
         }
@@ -81,10 +81,6 @@ impl LensFile {
         Ok(text)
     }
 
-    fn main_wavelength_nm(&self) -> f64 {
-        self.reference_wavelength_nm.unwrap_or(D_LINE_NM)
-    }
-
     /// Returns what stands before the surfaces, but for the glasses.
     fn seq_header(&self) -> Result<String, OpticsError> {
         let lens = &self.lens;
@@ -94,7 +90,7 @@ impl LensFile {
         }
         let _ = writeln!(text, "RDM;LEN\nTIT {}\nDIM M", quoted(lens.name()));
         self.write_seq_wavelengths(&mut text);
-        let first = lens.at(self.main_wavelength_nm())?.first_order_of_stop();
+        let first = lens.at(self.reference_wavelength_nm.unwrap_or(D_LINE_NM))?.first_order_of_stop();
         if first.entrance_pupil_diameter_mm.is_finite() {
             let _ = writeln!(text, "EPD {}", written(first.entrance_pupil_diameter_mm));
         }

@@ -299,7 +299,11 @@ fn zmx_aperture(lens: &Lens, surface: usize) -> Result<String, OpticsError> {
         if apertures.is_empty() {
             return Ok(format!("  CLAP 0 {rim_mm:e} 0\r\n"));
         }
-        return Err(cannot("a .zmx file", surface, "has several apertures"));
+        return Err(cannot(
+            "a .zmx file",
+            surface,
+            "has several apertures (as the arms of a spider), of which the format has one a surface",
+        ));
     };
     let [x_mm, y_mm] = aperture.center_mm;
     let lines = match (&aperture.outline, aperture.is_obscuration) {

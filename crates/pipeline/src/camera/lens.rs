@@ -228,10 +228,10 @@ impl Camera {
     }
 }
 
-/// Returns the wavelength of focus, stop and field of a lens, nm: the main one of its file where that is visible, else 550 nm.
+/// Returns the wavelength of focus, stop and field of a lens, nm: the main one of its file, else 550 nm.
 pub fn reference_nm_of(file: &LensFile) -> f64 {
-    let is_visible = |nm: &f64| (380.0..=780.0).contains(nm) && file.lens.at(*nm).is_ok();
-    file.reference_wavelength_nm.filter(is_visible).unwrap_or(REFERENCE_WAVELENGTH_NM)
+    let is_known = |nm: &f64| file.lens.at(*nm).is_ok();
+    file.main_wavelength_nm().filter(is_known).unwrap_or(REFERENCE_WAVELENGTH_NM)
 }
 
 /// Returns a lens with these blades, or with its own where there are none.
