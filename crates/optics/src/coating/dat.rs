@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::{COATING_CENTER_NM, Coating, CoatingLayer, ReflectanceTable, file::table_of};
+use super::{COATING_CENTER_NM, Coating, CoatingLayer, ReflectanceTable};
 use crate::Glass;
 
 /// Wavelengths far beyond all, nm, to which the ends of a table of a material are held.
@@ -148,7 +148,7 @@ fn table(lines: &[(usize, Vec<&str>)]) -> Result<ReflectanceTable, String> {
             }
         }
     }
-    table_of(rows, true)
+    ReflectanceTable::of_rows(rows, true)
 }
 
 /// Returns an ideal coating: shares transmitted and reflected that are the same at all wavelengths and angles.
@@ -169,7 +169,10 @@ fn share_of_name(name: &str) -> Option<f64> {
 
 /// Returns the table of shares transmitted and reflected that are the same everywhere.
 fn even(t: f64, r: f64) -> Result<ReflectanceTable, String> {
-    table_of(FAR_NM.iter().flat_map(|&nm| [0.0, 90.0].map(|deg| [nm, deg, r, r, t, t])).collect(), true)
+    ReflectanceTable::of_rows(
+        FAR_NM.iter().flat_map(|&nm| [0.0, 90.0].map(|deg| [nm, deg, r, r, t, t])).collect(),
+        true,
+    )
 }
 
 #[cfg(test)]

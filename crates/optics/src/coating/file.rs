@@ -103,36 +103,7 @@ fn table_from_csv(text: &str) -> Result<ReflectanceTable, String> {
         let [t_s, t_p] = transmittances.unwrap_or(reflectances);
         rows.push([number(nm)?, number(deg)?, number(s)?, number(p)?, number(t_s)?, number(t_p)?]);
     }
-    table_of(rows, transmittances.is_some())
-}
-
-/// Returns the table of rows: wavelength, nm, angle, degrees, shares reflected of s and p, and those transmitted, if these count.
-pub(super) fn table_of(mut rows: Vec<[f64; 6]>, transmits: bool) -> Result<ReflectanceTable, String> {
-    let distinct = |k: usize| {
-        let mut list: Vec<f64> = rows.iter().map(|row| row[k]).collect();
-        list.sort_by(f64::total_cmp);
-        list.dedup();
-        list
-    };
-    let (wavelengths_nm, angles_deg) = (distinct(0), distinct(1));
-    if rows.is_empty() || rows.len() != wavelengths_nm.len() * angles_deg.len() {
-        return Err(format!(
-            "has {} rows, expected each of its {} wavelengths with each of its {} angles once",
-            rows.len(),
-            wavelengths_nm.len(),
-            angles_deg.len()
-        ));
-    }
-    rows.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
-    if let Some(twice) = rows.windows(2).find(|two| two[0][..2] == two[1][..2]) {
-        return Err(format!("states {} nm at {} degrees twice", twice[0][0], twice[0][1]));
-    }
-    let values = |k: usize| -> Vec<Vec<f64>> {
-        rows.chunks(angles_deg.len()).map(|row| row.iter().map(|r| r[k]).collect()).collect()
-    };
-    let (r_s, r_p) = (values(2), values(3));
-    let [t_s, t_p] = if transmits { [values(4), values(5)] } else { Default::default() };
-    Ok(ReflectanceTable { wavelengths_nm, angles_deg, r_s, r_p, t_s, t_p })
+    ReflectanceTable::of_rows(rows, transmittances.is_some())
 }
 
 #[cfg(test)]

@@ -32,6 +32,35 @@ pub struct ReflectanceTable {
 const STRAIGHT_ON_DEG: f64 = 15.0;
 
 impl ReflectanceTable {
+    /// Returns the table of rows: wavelength, nm, angle, degrees, shares reflected of s and p, and those transmitted, if these count.
+    pub(super) fn of_rows(mut rows: Vec<[f64; 6]>, transmits: bool) -> Result<Self, String> {
+        let distinct = |k: usize| {
+            let mut list: Vec<f64> = rows.iter().map(|row| row[k]).collect();
+            list.sort_by(f64::total_cmp);
+            list.dedup();
+            list
+        };
+        let (wavelengths_nm, angles_deg) = (distinct(0), distinct(1));
+        if rows.is_empty() || rows.len() != wavelengths_nm.len() * angles_deg.len() {
+            return Err(format!(
+                "has {} rows, expected each of its {} wavelengths with each of its {} angles once",
+                rows.len(),
+                wavelengths_nm.len(),
+                angles_deg.len()
+            ));
+        }
+        rows.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
+        if let Some(twice) = rows.windows(2).find(|two| two[0][..2] == two[1][..2]) {
+            return Err(format!("states {} nm at {} degrees twice", twice[0][0], twice[0][1]));
+        }
+        let values = |k: usize| -> Vec<Vec<f64>> {
+            rows.chunks(angles_deg.len()).map(|row| row.iter().map(|r| r[k]).collect()).collect()
+        };
+        let (r_s, r_p) = (values(2), values(3));
+        let [t_s, t_p] = if transmits { [values(4), values(5)] } else { Default::default() };
+        Ok(Self { wavelengths_nm, angles_deg, r_s, r_p, t_s, t_p })
+    }
+
     /// Checks that all numbers are there and make sense.
     ///
     /// # Errors
