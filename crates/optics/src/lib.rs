@@ -60,7 +60,10 @@ pub use extinction::Absorption;
 pub use eye::{EyeModel, SchematicEye};
 pub use film_cone::FilmCone;
 pub use film_site::FilmSite;
-pub use formats::{Configuration, Field, LensFile, Microlens, MissingGlass, ReadOptions, SeqNumbers};
+pub use formats::{
+    Configuration, Field, LensFile, Microlens, MissingGlass, REFERENCE_WAVELENGTH_NM, ReadOptions, SeqNumbers,
+    VISIBLE_NM, nearest_to_reference_nm,
+};
 pub use frame::{FilmPoint, StopPoint};
 pub use ghosts::{
     FilmGhosts, Ghost, GhostBeam, GhostBeams, GhostLight, GhostRay, GhostRequest, Ghosts, LightAccount, MOST_BOUNCES,

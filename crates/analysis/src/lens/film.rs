@@ -1,15 +1,12 @@
 //! Where the film is: one rule for everything that is asked of a lens.
 
 use dioptric_optics::{
-    Lens, MonoLens, ObjectPoint,
+    Lens, MonoLens, ObjectPoint, VISIBLE_NM,
     analysis::{Autofocus, PupilRule},
     glam::DVec2,
 };
 
 use dioptric_pipeline::{PipelineError, REFERENCE_WAVELENGTH_NM, nearest_to_reference_nm};
-
-/// Wavelengths that are seen.
-const VISIBLE_NM: std::ops::RangeInclusive<f64> = 380.0..=780.0;
 
 /// The focal length of the ideal lens through which afocal light is looked at, mm: on its film 1 mm is 1/1000 of a tangent, and so
 /// 1 µm is 1 µrad near the axis, and 1 mm of focus is 1/1000 of a dioptre.

@@ -148,18 +148,24 @@ pub struct ReadOptions {
     pub configuration: Option<usize>,
 }
 
-/// The wavelength that is meant where a lens states none, and those that are seen, nm.
-const USUAL_NM: f64 = 550.0;
-const VISIBLE_NM: std::ops::RangeInclusive<f64> = 380.0..=780.0;
+/// The wavelength of f-numbers, fields and focus where nothing else is said, nm.
+pub const REFERENCE_WAVELENGTH_NM: f64 = 550.0;
+/// Wavelengths that are seen, nm.
+pub const VISIBLE_NM: std::ops::RangeInclusive<f64> = 380.0..=780.0;
+
+/// Returns that of these wavelengths which is nearest to 550 nm: the one that fields, f-numbers and focus are stated at.
+pub fn nearest_to_reference_nm(wavelengths_nm: &[f64]) -> f64 {
+    let off = |nm: &f64| (nm - REFERENCE_WAVELENGTH_NM).abs();
+    wavelengths_nm.iter().copied().min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(REFERENCE_WAVELENGTH_NM)
+}
 
 impl LensFile {
     /// The wavelength of its focus, f-number and first-order data, nm: the one that it states, or of a lens for other light than is seen
     /// the one of its wavelengths that is nearest to 550 nm; `None` of a lens without, which 550 nm stand for.
     pub fn main_wavelength_nm(&self) -> Option<f64> {
         let is_seen = self.wavelengths_nm.iter().any(|nm| VISIBLE_NM.contains(nm));
-        let off = |nm: &f64| (nm - USUAL_NM).abs();
-        let nearest = || self.wavelengths_nm.iter().copied().min_by(|a, b| off(a).total_cmp(&off(b)));
-        self.reference_wavelength_nm.or_else(|| nearest().filter(|_| !is_seen))
+        let is_for_other_light = !is_seen && !self.wavelengths_nm.is_empty();
+        self.reference_wavelength_nm.or(is_for_other_light.then(|| nearest_to_reference_nm(&self.wavelengths_nm)))
     }
 
     pub(super) fn of_lens(lens: Lens) -> Self {

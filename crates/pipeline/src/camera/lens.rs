@@ -12,14 +12,7 @@ use serde::{Deserialize, Serialize};
 use super::measured_eye;
 use crate::{Camera, LensSpec, PipelineError, SensorSpec, StopSpec};
 
-/// The wavelength of f-numbers, fields and focus where nothing else is said, nm.
-pub const REFERENCE_WAVELENGTH_NM: f64 = 550.0;
-
-/// Returns that of these wavelengths which is nearest to 550 nm: the one that fields, f-numbers and focus are stated at.
-pub fn nearest_to_reference_nm(wavelengths_nm: &[f64]) -> f64 {
-    let off = |nm: &f64| (nm - REFERENCE_WAVELENGTH_NM).abs();
-    wavelengths_nm.iter().copied().min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(REFERENCE_WAVELENGTH_NM)
-}
+pub use dioptric_optics::{REFERENCE_WAVELENGTH_NM, nearest_to_reference_nm};
 
 impl LensSpec {
     /// Returns what `LENS` on the command line means: an ideal lens where it is named by its numbers
