@@ -147,18 +147,24 @@ fn tables(analysis: &LensAnalysis) -> Result<String, std::fmt::Error> {
 }
 
 /// Returns the part about the whole lens.
-fn head(analysis: &LensAnalysis) -> Result<String, std::fmt::Error> {
-    let LensAnalysis { lens, efl_mm, f_number, film_distance_mm, film, .. } = analysis;
+/// Returns the lens in one line: its focal length, f-number and T-number, at which wavelength, and its film.
+pub(crate) fn lens_line(analysis: &LensAnalysis) -> String {
+    let LensAnalysis { lens, efl_mm, f_number, reference_nm, film_distance_mm, film, .. } = analysis;
     let t_number = analysis.t_number.map_or_else(String::new, |t| format!(", T/{t:.3}"));
-    let mut text = match &analysis.afocal {
+    match &analysis.afocal {
         Some(view) => format!(
             "{lens}: afocal, exit pupil {:.4} mm across, {:.4} mm behind the last vertex\n",
             view.exit_pupil_diameter_mm, view.exit_pupil_z_mm
         ),
         None => format!(
-            "{lens}: f = {efl_mm:.4} mm, f/{f_number:.3}{t_number}, film {film_distance_mm:.4} mm behind the last vertex: {film}\n"
+            "{lens}: f = {efl_mm:.4} mm, f/{f_number:.3}{t_number} at {reference_nm} nm, \
+             film {film_distance_mm:.4} mm behind the last vertex: {film}\n"
         ),
-    };
+    }
+}
+
+fn head(analysis: &LensAnalysis) -> Result<String, std::fmt::Error> {
+    let mut text = lens_line(analysis);
     if let Some(x) = analysis.x_plane {
         writeln!(text, "along x: f = {:.4} mm, f/{:.3}", x.efl_mm, x.f_number)?;
     }

@@ -10,7 +10,7 @@ use dioptric_pipeline::{Staged, number};
 use dioptric_report::{AnalysisPlots, LensComparisonPage, LensPage, chart_svg, write_drawing};
 
 use crate::{
-    analyze::request,
+    analyze::{lens_line, request},
     args::Common,
     lens_args::LensCompareArgs,
     terminal::{Bar, fixed, print, print_json, remark},
@@ -47,7 +47,10 @@ pub(crate) fn run(arguments: &LensCompareArgs, common: &Common) -> anyhow::Resul
         let words = format!("wrote comparison.json, comparison.html and the curves of both in {}", path.display());
         remark(common.quiet, &words);
     }
-    if common.json { print_json(&comparison) } else { print(&table(&comparison)?) }
+    if common.json {
+        return print_json(&comparison);
+    }
+    print(&([&first, &second].map(|one| lens_line(&one.analysis)).concat() + &table(&comparison)?))
 }
 
 /// Says that the second lens is looked at with the object of the first, where its file has another one.
@@ -85,6 +88,7 @@ impl Analyzed {
             Some(first) => AnalysisRequest {
                 fields: first.fields(),
                 film: arguments.asked.film.of(&used),
+                main_wavelength_nm: used.reference_nm,
                 ..first.request.clone()
             },
         };

@@ -31,6 +31,6 @@ mod zmx;
 
 pub use lens_file::{
     Configuration, Field, LensFile, Microlens, MissingGlass, REFERENCE_WAVELENGTH_NM, ReadOptions, SeqNumbers,
-    VISIBLE_NM, nearest_to_reference_nm,
+    nearest_to_reference_nm,
 };
 pub(crate) use prescription::lens_from_ron;

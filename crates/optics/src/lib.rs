@@ -62,7 +62,7 @@ pub use film_cone::FilmCone;
 pub use film_site::FilmSite;
 pub use formats::{
     Configuration, Field, LensFile, Microlens, MissingGlass, REFERENCE_WAVELENGTH_NM, ReadOptions, SeqNumbers,
-    VISIBLE_NM, nearest_to_reference_nm,
+    nearest_to_reference_nm,
 };
 pub use frame::{FilmPoint, StopPoint};
 pub use ghosts::{

@@ -249,8 +249,8 @@ fn preview_and_sketch_show_the_full_picture() {
     camera.film = FilmSpec::Pixels { columns: 600, rows: 400, pitch_um: 52.8 };
     camera.scene.source = SceneSource::StillLife { columns: 680, rows: 454 };
     camera.wavelengths = WavelengthSpec::Range { first_nm: 400.0, last_nm: 700.0, step_nm: 20.0 };
-    // As it is arranged, narrower and wider than the film; where the film sees a part of it, the samples of the full scene are the coarser ones.
-    for fov_deg in [34.0, 37.0, 33.0, 20.0, 60.0] {
+    // A little wider than the film, narrower and wider; where the film sees a part of it, the samples of the full scene are the coarser ones.
+    for fov_deg in [37.0, 20.0, 60.0] {
         let kept = KeptCamera::new(camera.clone()).with(|camera| camera.scene.field_of_view_deg = Some(fov_deg));
         let full = capture(&kept);
         let preview = capture(&kept.with_quality(Quality::Preview));

@@ -79,6 +79,7 @@ fn whole(both: [ComparedLens<'_>; 2]) -> Vec<ComparisonRow> {
     };
     let rows = vec![
         row("object before the first vertex, mm", of(&|a| Some(a.distance_mm))),
+        row("reference wavelength, nm", of(&|a| Some(a.reference_nm))),
         row("focal length, mm", of(&|a| Some(a.efl_mm))),
         row("f-number", of(&|a| Some(a.f_number))),
         row("T-number", of(&|a| a.t_number)),

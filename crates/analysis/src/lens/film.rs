@@ -1,7 +1,7 @@
 //! Where the film is: one rule for everything that is asked of a lens.
 
 use dioptric_optics::{
-    Lens, MonoLens, ObjectPoint, VISIBLE_NM,
+    Lens, MonoLens, ObjectPoint,
     analysis::{Autofocus, PupilRule},
     glam::DVec2,
 };
@@ -42,17 +42,13 @@ pub struct FilmUse<'a> {
 
 impl FilmUse<'_> {
     /// Returns the lens at the wavelength of paraxial images: the main one of its file, else 550 nm, so that the film stays where it is
-    /// whatever wavelengths are looked at. Where the lens is not known there, or none of these is visible as it is, theirs that is nearest
-    /// to 550 nm.
+    /// whatever wavelengths are looked at; where the lens is not known there, theirs that is nearest to 550 nm.
     ///
     /// # Errors
     /// When the lens is not known there either.
     pub fn reference(&self, lens: &Lens) -> Result<MonoLens, PipelineError> {
-        let usual_nm = self.main_nm.unwrap_or(REFERENCE_WAVELENGTH_NM);
-        let own_nm = nearest_to_reference_nm(self.wavelengths_nm);
-        let is_as_visible = VISIBLE_NM.contains(&own_nm) || !VISIBLE_NM.contains(&usual_nm);
-        let usual = lens.at(usual_nm).ok().filter(|_| is_as_visible);
-        Ok(usual.map_or_else(|| lens.at(own_nm), Ok)?)
+        let usual = lens.at(self.main_nm.unwrap_or(REFERENCE_WAVELENGTH_NM));
+        Ok(usual.or_else(|_| lens.at(nearest_to_reference_nm(self.wavelengths_nm)))?)
     }
 }
 

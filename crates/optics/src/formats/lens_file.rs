@@ -151,12 +151,17 @@ pub struct ReadOptions {
 /// The wavelength of f-numbers, fields and focus where nothing else is said, nm.
 pub const REFERENCE_WAVELENGTH_NM: f64 = 550.0;
 /// Wavelengths that are seen, nm.
-pub const VISIBLE_NM: std::ops::RangeInclusive<f64> = 380.0..=780.0;
+const VISIBLE_NM: std::ops::RangeInclusive<f64> = 380.0..=780.0;
 
 /// Returns that of these wavelengths which is nearest to 550 nm: the one that fields, f-numbers and focus are stated at.
 pub fn nearest_to_reference_nm(wavelengths_nm: &[f64]) -> f64 {
-    let off = |nm: &f64| (nm - REFERENCE_WAVELENGTH_NM).abs();
-    wavelengths_nm.iter().copied().min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(REFERENCE_WAVELENGTH_NM)
+    nearest_nm(wavelengths_nm, REFERENCE_WAVELENGTH_NM).unwrap_or(REFERENCE_WAVELENGTH_NM)
+}
+
+/// Returns that of these wavelengths which is nearest to another, nm.
+pub(super) fn nearest_nm(wavelengths_nm: &[f64], to_nm: f64) -> Option<f64> {
+    let off = |nm: &f64| (nm - to_nm).abs();
+    wavelengths_nm.iter().copied().min_by(|a, b| off(a).total_cmp(&off(b)))
 }
 
 impl LensFile {

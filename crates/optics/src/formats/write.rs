@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use crate::{Glass, Interface, Lens, OpticsError, Placement, Shape, Surface, glass::D_LINE_NM};
 
 use super::{
-    lens_file::{Field, LensFile, Microlens},
+    lens_file::{Field, LensFile, Microlens, REFERENCE_WAVELENGTH_NM, nearest_nm},
     number::reciprocal,
 };
 
@@ -172,13 +172,20 @@ impl LensFile {
 
     /// Returns where first-order optics focuses the file's object, mm behind the last vertex.
     pub(super) fn focus_mm(&self) -> Option<f64> {
-        let lens = self.lens.at(self.reference_wavelength_nm.unwrap_or(D_LINE_NM)).ok()?;
+        let lens = self.lens.at(self.listed_main_nm().unwrap_or(REFERENCE_WAVELENGTH_NM)).ok()?;
         lens.film_distance_mm_for(self.object_distance_mm.unwrap_or(f64::INFINITY)).ok().filter(|mm| mm.is_finite())
     }
 
-    /// Returns the states for a format in which all have as many fields of one kind: those without take the angles of the first that has any.
-    pub(super) fn states_with_fields(&self) -> Vec<Self> {
+    /// Returns the states for a format in which all have as many fields of one kind: those without take the angles of the first that has
+    /// any. The main wavelength of each is one of its list.
+    pub(super) fn listed_states(&self) -> Vec<Self> {
         let mut states = self.states();
+        for state in &mut states {
+            state.reference_wavelength_nm = state.listed_main_nm();
+            if let (true, Some(nm)) = (state.wavelengths_nm.is_empty(), state.reference_wavelength_nm) {
+                state.wavelengths_nm = vec![nm];
+            }
+        }
         if let Some(number) = self.lends_fields() {
             let Self { fields, field_weights, .. } = states[number - 1].clone();
             for state in states.iter_mut().filter(|state| state.fields.is_empty()) {
@@ -186,6 +193,26 @@ impl LensFile {
             }
         }
         states
+    }
+
+    /// The main wavelength in a format in which it is one of the list, nm: the nearest of it, else what is stated alone.
+    fn listed_main_nm(&self) -> Option<f64> {
+        let main_nm = self.main_wavelength_nm().unwrap_or(REFERENCE_WAVELENGTH_NM);
+        nearest_nm(&self.wavelengths_nm, main_nm).or(self.reference_wavelength_nm)
+    }
+
+    /// Returns a sentence on a main wavelength that is not one of the list, for a format in which it is.
+    fn note_on_main_wavelength(&self, extension: &str) -> Option<String> {
+        let main_nm = self.main_wavelength_nm().unwrap_or(REFERENCE_WAVELENGTH_NM);
+        let listed_nm = self.listed_main_nm()?;
+        if self.wavelengths_nm.is_empty() {
+            return Some(format!("the file states no wavelengths but the main one: it has {listed_nm} nm alone"));
+        }
+        (listed_nm != main_nm).then(|| {
+            format!(
+                "the main wavelength of a .{extension} file is one of its list: it has {listed_nm} nm, not {main_nm} nm"
+            )
+        })
     }
 
     /// The number of the configuration whose fields those take that state none, where there are both.
@@ -224,7 +251,7 @@ impl LensFile {
             ("the place of the film", self.film_distance_mm.is_some() && !holds_use),
             ("the curvature of the film", self.lens.image_surface().curvature_per_mm != 0.0 && !holds_use),
             ("the distance of the object", self.object_distance_mm.is_some() && !holds_use),
-            ("wavelengths", !self.wavelengths_nm.is_empty() && !holds_use),
+            ("wavelengths", !(self.wavelengths_nm.is_empty() && self.reference_wavelength_nm.is_none()) && !holds_use),
             ("fields", !self.fields.is_empty() && !holds_use),
             ("names of surfaces", !self.surface_comments.is_empty() && !holds_use),
             ("comments", !self.comments.is_empty() && !holds_use),
@@ -270,9 +297,20 @@ impl LensFile {
         if let (Some(number), "zmx" | "seq") = (self.lends_fields(), extension) {
             notes.push(format!("configurations that state no fields have the angles of number {number}"));
         }
+        if matches!(extension, "zmx" | "seq") {
+            let mut of_states: Vec<String> =
+                self.states().iter().filter_map(|state| state.note_on_main_wavelength(extension)).collect();
+            of_states.dedup();
+            notes.extend(of_states);
+        }
         if matches!(extension, "zmx" | "seq") && self.film_distance_mm.is_none() {
             notes.push(match self.focus_mm() {
-                Some(mm) => format!("the place of the film is not stated: the file has the paraxial focus, {mm:.4} mm"),
+                Some(mm) => {
+                    let nm = self.listed_main_nm().unwrap_or(REFERENCE_WAVELENGTH_NM);
+                    format!(
+                        "the place of the film is not stated: the file has the paraxial focus at {nm} nm, {mm:.4} mm"
+                    )
+                }
                 None => "the place of the film is not stated, and there is no focus: the file has 0 mm".to_owned(),
             });
         }

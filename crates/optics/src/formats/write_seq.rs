@@ -42,7 +42,7 @@ impl LensFile {
     /// When the format has no word for a glass, shape, aperture or phase of the lens, or its fields are of several kinds; the
     /// message names which.
     pub fn to_seq(&self) -> Result<String, OpticsError> {
-        let texts = self.states_with_fields().iter().map(Self::seq_text).collect::<Result<Vec<_>, _>>()?;
+        let texts = self.listed_states().iter().map(Self::seq_text).collect::<Result<Vec<_>, _>>()?;
         zoom::with_zoom(&texts, &self.configuration_names())
     }
 

@@ -105,7 +105,7 @@ impl LensFile {
         mut private: Option<&mut Vec<Glass>>,
         catalogue: Option<&str>,
     ) -> Result<String, OpticsError> {
-        let states = self.states_with_fields();
+        let states = self.listed_states();
         let lines = states.iter().map(|state| zmx_glasses(&state.lens, private.as_deref_mut()));
         let lines = lines.collect::<Result<Vec<Vec<String>>, _>>()?;
         let mut makers = zmx_makers(&states)?;

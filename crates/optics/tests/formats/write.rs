@@ -233,3 +233,36 @@ fn distances_that_round_stay_straight() {
     assert!(zmx.contains("DISZ 1.53") && !zmx.contains("COORDBRK"), "{zmx}");
     assert_eq!(read("again.zmx", &zmx).lens.vertices_z_mm(), file.lens.vertices_z_mm());
 }
+
+#[test]
+fn main_wavelength_beside_the_list_is_said() {
+    let file = |wavelengths_nm: &[f64], reference_wavelength_nm| {
+        let mut file = LensFile { wavelengths_nm: wavelengths_nm.to_vec(), reference_wavelength_nm, ..design() };
+        (file.wavelength_weights, file.film_distance_mm) = (Vec::new(), Some(30.0));
+        file
+    };
+    let list = [486.0, 588.0, 656.0];
+    let cases = [
+        (&list[..], Some(588.0), 588.0, None),
+        (&list, Some(700.0), 656.0, Some("it has 656 nm, not 700 nm")),
+        (&list, None, 588.0, Some("it has 588 nm, not 550 nm")),
+        (&[850.0, 1064.0], None, 850.0, None),
+        (&[], Some(700.0), 700.0, Some("it has 700 nm alone")),
+    ];
+    for (wavelengths_nm, stated_nm, expected_nm, said) in cases {
+        let file = file(wavelengths_nm, stated_nm);
+        for (name, text) in [("a.zmx", file.to_zmx().unwrap()), ("a.seq", file.to_seq().unwrap())] {
+            let again = read(name, &text);
+            assert_eq!(again.main_wavelength_nm(), Some(expected_nm), "{name} {wavelengths_nm:?} {stated_nm:?}");
+            let notes = file.left_out(&name[2..]);
+            assert!(
+                notes.iter().any(|note| said.is_some_and(|said| note.contains(said))) == said.is_some(),
+                "{notes:?}"
+            );
+            assert!(said.is_some() || !notes.iter().any(|note| note.contains(" nm")), "{notes:?}");
+        }
+        assert!(said.is_none() || stated_nm.is_none() || file.left_out("dat")[0].contains("wavelengths"));
+    }
+    let neither = file(&[], None);
+    assert_eq!(read("a.zmx", &neither.to_zmx().unwrap()).main_wavelength_nm(), None);
+}

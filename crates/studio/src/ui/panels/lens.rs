@@ -140,7 +140,7 @@ fn stop(ui: &mut Ui, camera: &mut Camera, desk: &Desk<'_>) {
         range: 0.1..=1000.0,
         slider: 1.0..=64.0,
         is_logarithmic: true,
-        words: "Focal length over the diameter of the entrance pupil, for a far object at 550 nm",
+        words: "Focal length over the diameter of the entrance pupil, for a far object, at the main wavelength of the lens, else at 550 nm",
     };
     if field.show(ui, &mut number) {
         camera.stop = StopSpec::FNumber(number);
