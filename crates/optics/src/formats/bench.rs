@@ -69,7 +69,12 @@ struct Bench<'a> {
     variables: Vec<Row<'a>>,
     surfaces: Vec<Row<'a>>,
     aspheres: Vec<Row<'a>>,
+    /// Names of sections with rows that are not read.
+    other_sections: Vec<String>,
 }
+
+/// The sections that say nothing of how a lens images: what it is, and constants of the program's drawing.
+const HARMLESS_SECTIONS: [&str; 4] = ["descriptive data", "constants", "notes", "figure"];
 
 /// Reads the text of the Optical Bench; `name` serves where it has no title.
 pub(super) fn lens_from_bench(text: &str, name: &str, glasses: &Glasses) -> Result<LensFile, TextError> {
@@ -91,7 +96,12 @@ pub(super) fn lens_from_bench(text: &str, name: &str, glasses: &Glasses) -> Resu
             "variable distances" => bench.variables.push(row),
             "lens data" => bench.surfaces.push(row),
             "aspherical data" => bench.aspheres.push(row),
-            _ => {}
+            section if HARMLESS_SECTIONS.contains(&section) => {}
+            section => {
+                if !bench.other_sections.iter().any(|known| known == section) {
+                    bench.other_sections.push(section.to_owned());
+                }
+            }
         }
     }
     bench.read(name, glasses)
@@ -109,8 +119,12 @@ impl Bench<'_> {
             (1..=n_states).map(|column| Ok((column, state(column)?))).collect::<Result<Vec<_>, TextError>>()?;
         // A column of distances that are not known is no configuration, unless there is no other.
         let is_known = |(_, state): &(usize, SystemState)| state.system.is_ok();
+        let mut left_out = Vec::new();
         if states.iter().any(is_known) {
-            states.retain(is_known);
+            for (column, state) in states.extract_if(.., |state| !is_known(state)) {
+                let reason = state.system.err().map_or_else(String::new, |error| error.reason);
+                left_out.push(format!("column {column} of [variable distances] is no configuration: {reason}"));
+            }
         }
         let (columns, mut states): (Vec<usize>, Vec<SystemState>) = states.into_iter().unzip();
         let mut file = match states.len() {
@@ -118,8 +132,16 @@ impl Bench<'_> {
             _ => system_states::build(states, 1, glasses)?,
         };
         let column = columns.get(file.configuration - 1).copied().unwrap_or(1);
+        file.notes.extend(left_out);
+        file.notes.extend(self.note_on_sections());
         file.notes.extend(note_on_focal_length(&file.lens, self.variable("Focal Length", column)?));
         Ok(file)
+    }
+
+    /// Returns a sentence on sections that are not known, if there are any.
+    fn note_on_sections(&self) -> Option<String> {
+        let names = self.other_sections.iter().map(|name| format!("[{name}]")).collect::<Vec<_>>().join(", ");
+        (!names.is_empty()).then(|| format!("sections that are not known are left out: {names}"))
     }
 
     /// Returns notes on the distances `d…` that stand behind no surface.
@@ -197,7 +219,12 @@ impl Bench<'_> {
         }
         notes.extend(self.note_on_indices(&surfaces)?);
         notes.extend(self.notes_on_unused(column)?);
-        let object_distance_mm = self.variable("d0", column)?.unwrap_or(f64::INFINITY);
+        let stated_mm = self.variable("d0", column)?;
+        let object_distance_mm = stated_mm.unwrap_or(f64::INFINITY);
+        if let (None, Some(magnification)) = (stated_mm, self.variable("Magnification", column)?.filter(|m| *m != 0.0))
+        {
+            notes.push(format!("a magnification of {magnification} is stated without the distance of the object (d0), which counts as far"));
+        }
         let half_deg = self.variable("Angle of View", column)?.map(|angle_deg| 0.5 * angle_deg);
         let fields = half_deg.filter(|half_deg| (0.0..90.0).contains(half_deg) && object_distance_mm.is_infinite());
         let field = |share: f64, half_deg: f64| {
@@ -277,7 +304,10 @@ impl Bench<'_> {
             }
             shape = even_asphere(conic, &coefficients);
         }
-        let diameter = row.number(4, "the diameter")?.filter(|diameter| *diameter > 0.0);
+        let diameter = row.number(4, "the diameter")?.filter(|diameter| *diameter != 0.0);
+        if let Some(diameter) = diameter.filter(|diameter| *diameter < 0.0) {
+            return Err(row.wrong(format!("the diameter is {diameter}, expected 0 or more")));
+        }
         let surface = SystemSurface {
             line: row.line,
             comment: String::new(),

@@ -24,7 +24,7 @@ use self::{
 use super::{
     glasses::{Glasses, constant, model},
     lens_file::{Field, LensFile},
-    system::{Beam, FieldVignetting, System, SystemSurface},
+    system::{Beam, FieldVignetting, System, SystemSurface, note_on_film, note_on_object},
     text_error::TextError,
 };
 
@@ -239,7 +239,13 @@ impl<'a> Len<'a> {
             "MOD" => &statement.words[1..],
             _ => &statement.words,
         };
-        let numbers: Vec<f64> = words.iter().filter_map(|word| word.parse().ok()).collect();
+        // A name may stand before the numbers.
+        let is_number = |word: &String| word.parse::<f64>().is_ok();
+        let first = words.iter().position(is_number).unwrap_or(words.len());
+        if let Some(word) = words[first..].iter().find(|word| !is_number(word)) {
+            return Err(statement.wrong(format!("'{word}' is not a number")));
+        }
+        let numbers: Vec<f64> = words[first..].iter().filter_map(|word| word.parse().ok()).collect();
         let wavelengths_nm: Vec<f64> = self.wavelengths_um.iter().map(|um| super::zmx::nm_of_um(*um)).collect();
         let checked = |glass: Glass| match glass.check() {
             Ok(()) => Ok((glass, None)),
@@ -308,6 +314,9 @@ impl<'a> Len<'a> {
         let object_medium = self.surfaces[0].medium.clone().unwrap_or(Glass::Air);
         let image = &self.surfaces[n_surfaces - 1];
         let image_surface = ImageSurface { curvature_per_mm: image.curvature / mm, conic: image.conic };
+        let object = &self.surfaces[0];
+        self.notes.extend(note_on_film(image.shape(mm).map_err(|reason| TextError { line: Some(image.line), reason })));
+        self.notes.extend(note_on_object(object_distance_mm, object.curvature / mm));
         let mut surfaces: Vec<SystemSurface> = Vec::with_capacity(n_surfaces);
         let (mut moves, mut z_mm) = (Vec::new(), 0.0);
         for (i, surface) in self.surfaces[1..].iter().enumerate() {
@@ -321,7 +330,13 @@ impl<'a> Len<'a> {
         if let Some(last) = surfaces.last_mut() {
             last.thickness_after_mm += image.thickness * mm;
         }
-        let stop = self.surfaces.iter().position(|surface| surface.is_stop);
+        let stops: Vec<usize> = (0..n_surfaces).filter(|&i| self.surfaces[i].is_stop).collect();
+        for pair in stops.windows(2) {
+            let [before, after] = [pair[0], pair[1]];
+            self.notes
+                .push(format!("two stops (AST): that of surface {after} takes the place of that of surface {before}"));
+        }
+        let stop = stops.last().copied();
         if stop.is_none() {
             self.notes.push("no surface is marked as the stop (AST): the first is it".to_owned());
         }

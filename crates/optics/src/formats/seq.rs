@@ -22,7 +22,7 @@ use self::{
 use super::{
     glasses::{Glasses, constant, glass_of_digits, model},
     lens_file::{Field, LensFile, SeqNumbers},
-    system::{Beam, FieldVignetting, System, SystemSurface},
+    system::{Beam, FieldVignetting, System, SystemSurface, note_on_film, note_on_object},
     text_error::TextError,
 };
 
@@ -455,6 +455,8 @@ impl<'a> Seq<'a> {
         let defocus_mm = image.thickness * mm;
         let is_far = object.thickness.abs() >= 1e10;
         let object_distance_mm = if is_far { f64::INFINITY } else { object.thickness * mm };
+        self.notes.extend(note_on_film(image.shape(mm)));
+        self.notes.extend(note_on_object(object_distance_mm, object.curvature / mm));
         let mut surfaces: Vec<SystemSurface> = Vec::with_capacity(n_surfaces);
         let (mut moves, mut z_mm) = (Vec::new(), 0.0);
         for (i, surface) in self.surfaces[1..].iter().enumerate() {

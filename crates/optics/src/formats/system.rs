@@ -74,6 +74,26 @@ impl SystemSurface {
     }
 }
 
+/// Returns a sentence on a film that is more than a sphere or a conic, of which the rest is left out; `shape` is that of its file.
+pub(super) fn note_on_film(shape: Result<Shape, TextError>) -> Option<String> {
+    let is_held = match shape {
+        Ok(Shape::Sphere | Shape::Conic { .. }) => true,
+        Ok(Shape::EvenAsphere { coefficients, .. } | Shape::OddAsphere { coefficients, .. }) => {
+            coefficients.iter().all(|a| *a == 0.0)
+        }
+        _ => false,
+    };
+    (!is_held).then(|| {
+        "the film is no sphere or conic: of its shape, curvature and conic constant are taken alone".to_owned()
+    })
+}
+
+/// Returns a sentence on an object at this distance that is curved, which is taken for a plane.
+pub(super) fn note_on_object(distance_mm: f64, curvature_per_mm: f64) -> Option<String> {
+    (distance_mm.is_finite() && curvature_per_mm != 0.0)
+        .then(|| format!("the object is taken for a plane: its radius of {} mm is left out", 1.0 / curvature_per_mm))
+}
+
 /// A tilt and decenter, with the z along the axis at which it happens: from the file's first surface.
 ///
 /// Its surfaces are those that the file has; the last may be beyond them, which means the film.

@@ -9,13 +9,13 @@
 mod configurations;
 mod surface;
 
-use crate::ImageSurface;
+use crate::{Glass, ImageSurface};
 
 use self::{configurations::ZmxOperand, surface::ZmxSurface};
 use super::{
     glasses::Glasses,
     lens_file::{Field, LensFile},
-    system::{Beam, FieldVignetting, System, SystemMove, SystemSurface},
+    system::{Beam, FieldVignetting, System, SystemMove, SystemSurface, note_on_film, note_on_object},
     text_error::TextError,
 };
 
@@ -191,8 +191,18 @@ impl Zmx {
             "VCYN" | "ZVCY" => self.vignetting[3] = line.numbers()?,
             "WAVM" => {
                 let stated = (line.count(0)?, line.number(1)?, line.number_or(2, 1.0)?);
+                let is_used = self.n_wavelengths.is_none_or(|n| n == 0 || stated.0 <= n);
                 match self.wavelengths_um.iter_mut().find(|known| known.0 == stated.0) {
-                    Some(known) => *known = stated,
+                    Some(known) => {
+                        if is_used && known.1 != stated.1 {
+                            let (number, um) = (stated.0, stated.1);
+                            self.notes.push(format!(
+                                "wavelength {number} is stated twice: {um} µm takes the place of {} µm",
+                                known.1
+                            ));
+                        }
+                        *known = stated;
+                    }
                     None => self.wavelengths_um.push(stated),
                 }
             }
@@ -295,6 +305,19 @@ impl Zmx {
         })
     }
 
+    /// Returns sentences on what stands twice, of which the last counts.
+    fn notes_on_replaced(&self) -> Vec<String> {
+        let stops: Vec<usize> = (0..self.surfaces.len()).filter(|&i| self.surfaces[i].is_stop).collect();
+        let of_stops = stops.windows(2).map(|pair| {
+            format!("two stops (STOP): that of surface {} takes the place of that of surface {}", pair[1], pair[0])
+        });
+        let of_surfaces =
+            self.surfaces.iter().enumerate().flat_map(|(number, surface)| {
+                surface.notes.iter().map(move |note| format!("surface {number}: {note}"))
+            });
+        of_stops.chain(of_surfaces).collect()
+    }
+
     fn into_system(mut self, name: &str, mut glasses: Glasses) -> Result<System, TextError> {
         glasses.makers = std::mem::take(&mut self.makers);
         let mm = self.mm_per_unit.unwrap_or(1.0);
@@ -310,6 +333,12 @@ impl Zmx {
         let object_medium = object.medium(0, &glasses, &mut notes)?;
         let image_surface = ImageSurface { curvature_per_mm: image.curvature / mm, conic: image.conic };
         let last = self.surfaces.len() - 1;
+        notes.extend(note_on_film(image.in_mm(last, mm, Glass::Air).map(|surface| surface.shape)));
+        notes.extend(note_on_object(object.thickness * mm, object.curvature / mm));
+        if !matches!(object.kind.as_str(), "STANDARD" | "COORDBRK") {
+            notes.push(format!("an object of type {} is taken for a plane", object.kind));
+        }
+        notes.extend(self.notes_on_replaced());
         let mut surfaces: Vec<SystemSurface> = Vec::with_capacity(last);
         let mut stop = self.surfaces[0].is_stop.then_some(0);
         let mut moves: Vec<SystemMove> = Vec::new();
@@ -344,6 +373,17 @@ impl Zmx {
         wavelengths_um.sort_by_key(|(number, ..)| *number);
         wavelengths_um.truncate(self.n_wavelengths.filter(|&n| n > 0).unwrap_or(usize::MAX));
         let wavelengths_nm = wavelengths_um.iter().map(|(_, um, _)| nm_of_um(*um)).collect();
+        // The first where none is named.
+        let reference = match self.primary {
+            0 | 1 => 0,
+            primary => {
+                let of = |(number, ..): &(usize, f64, f64)| *number == primary;
+                let numbers: Vec<String> = wavelengths_um.iter().map(|(number, ..)| number.to_string()).collect();
+                let reason =
+                    format!("PWAV: the file states no wavelength {primary}; it has the numbers {}", numbers.join(", "));
+                wavelengths_um.iter().position(of).ok_or(TextError { line: None, reason })?
+            }
+        };
         let mut remarks = self.remarks.into_iter().filter(|remark| !remark.is_empty());
         Ok(System {
             name: if self.name.is_empty() { name.to_owned() } else { self.name },
@@ -363,7 +403,7 @@ impl Zmx {
             wavelengths_nm,
             wavelength_weights: wavelengths_um.iter().map(|(.., weight)| *weight).collect(),
             field_weights: self.field_weights,
-            reference: self.primary.saturating_sub(1),
+            reference,
             fields: fields(self.field_type, self.n_fields, mm, &self.fields, &self.vignetting)?,
             notes,
             is_reduced: false,

@@ -220,3 +220,23 @@ fn configurations_without_fields_are_written_with_those_of_another() {
     }
     assert!(!file.left_out("ron").iter().any(|note| note.contains("angles")));
 }
+
+#[test]
+fn columns_and_sections_that_are_left_out_are_said() {
+    let text = "[variable distances]\nd0\tInfinity\t500\nd1\t3.75\nBf\t40\t45\n[aspheric data]\n1\t50\t-1\n\
+                [lens data]\n1\t50\td1\t1.5\t20\t60\n2AS\tAS\t1\t\t15\n3\t-50\tBf\t\t20\n";
+    let read = |text: &str| LensFile::from_bytes(Path::new("a.txt"), text.as_bytes(), &ReadOptions::default());
+    let notes = read(text).unwrap().notes;
+    for expected in [
+        "column 2 of [variable distances] is no configuration: the distance d1 is not known in this configuration",
+        "sections that are not known are left out: [aspheric data]",
+    ] {
+        assert!(notes.iter().any(|note| note == expected), "{notes:?}");
+    }
+    let near = text.replace("d0\tInfinity\t500", "Magnification\t0\t-0.5").replace("3.75", "3.75\t4.25");
+    let far = "a magnification of -0.5 is stated without the distance of the object (d0), which counts as far";
+    let options = ReadOptions { configuration: Some(2), ..ReadOptions::default() };
+    let second = LensFile::from_bytes(Path::new("a.txt"), near.as_bytes(), &options).unwrap();
+    assert!(second.notes.iter().any(|note| note == far), "{:?}", second.notes);
+    assert!(read(&text.replace("\t20\t60", "\t-20\t60")).unwrap_err().to_string().contains("the diameter is -20"));
+}

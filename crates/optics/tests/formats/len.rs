@@ -190,3 +190,20 @@ fn what_cannot_be_traced_is_refused_and_what_is_not_understood_noted() {
     let file = read(&singlet("EBR 2", "XYZ 3; DRW ON", "XYZ 4"));
     assert!(file.notes.contains(&"not understood and passed over: XYZ (line 9)".to_owned()), "{:?}", file.notes);
 }
+
+#[test]
+fn what_is_no_number_or_stands_twice_is_said() {
+    let text = singlet("EBR 2", "", "");
+    for (from, to, expected) in [
+        ("GLA 1.5", "GLA MOD M1 1.62 36.5x", "'36.5x' is not a number"),
+        ("RD 20", "RD 20\nAP CHK -8.25", "an aperture of -8.25, expected 0 or more"),
+    ] {
+        let found = message(&text.replace(from, to));
+        assert!(found.contains(expected), "{found}");
+    }
+    let twice = text.replace("RD 20", "RD 20\nAST").replace("RD -20", "RD -20\nAST");
+    let file = read(&twice);
+    let note = "two stops (AST): that of surface 2 takes the place of that of surface 1";
+    assert!(file.notes.iter().any(|found| found == note), "{:?}", file.notes);
+    assert_eq!(file.lens.stop(), 1);
+}

@@ -92,6 +92,11 @@ fn what_is_guessed_or_passed_over_is_noted_with_its_line() {
     let text = DOUBLET.replace("EPD   10.0", "QXY 3;EPD 10").replace("  CCY 0; THC 0", "  CIX 7; QXY 2; CCY 0");
     assert_eq!(notes_on(&text), [unknown]);
     assert_eq!(notes("EPD   10.0", "CIR 3; EPD 10"), [unknown.replace("QXY (line 4), CIX (line 20)", "CIR (line 4)")]);
+    // A line goes on at a last & alone.
+    assert_eq!(notes("EPD   10.0", "E&PD 10.0").len(), 1);
+    assert!(notes("EPD   10.0", "EPD & ! goes on\n 10.0").is_empty());
+    let film = "the film is no sphere or conic: of its shape, curvature and conic constant are taken alone";
+    assert_eq!(notes("GO", "ASP; A 1e-5\nGO"), [film]);
     let zoom = "ZOO 3\nZOO THI S1 4 5 6\nGO";
     assert_eq!(notes("GO", zoom), ["of 3 configurations number 1 is in use"]);
     let solve = "solves and pickups are not worked out anew, the stored values stand: PIM (line 23)";

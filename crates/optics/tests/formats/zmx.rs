@@ -287,6 +287,35 @@ fn stop_of_no_stated_width_is_as_wide_as_the_other_rims_let_it_be() {
     }
 }
 
+/// What stands twice, and what has no place here, is said.
+#[test]
+fn what_is_replaced_or_left_out_is_noted() {
+    let second = "  DISZ 60.0\n";
+    let cases = [
+        (second, "  STOP\n  DISZ 60.0\n", "two stops (STOP): that of surface 2 takes the place of that of surface 1"),
+        (second, "  SQAP 5 4\n  SQOB 2 1\n  DISZ 60.0\n", "surface 2: two apertures: SQOB takes the place of SQAP"),
+        (
+            "GLAS N-BK7 0 0 1.5168 64.17 0",
+            "GLAS ___BLANK 1 0 1.5168 64.17 0.03",
+            "surface 1: the deviation of its partial dispersion P_g,F from that of usual glasses, 0.03, is left out",
+        ),
+        ("  CURV 0.0\n", "  TYPE EVENASPH\n  PARM 2 1E-5\n  CURV 0.0\n", "the film is no sphere or conic"),
+        ("  CURV 0.0\n", "  TYPE ZERNSAG\n  CURV 0.0\n", "the film is no sphere or conic"),
+        (
+            "  CURV 0.0 0 0 0 0 \"\"\n  DISZ INFINITY\n",
+            "  CURV 0.02\n  DISZ 300\n",
+            "the object is taken for a plane: its radius of 50 mm is left out",
+        ),
+    ];
+    for (from, to, note) in cases {
+        assert!(SINGLET.contains(from), "{from}");
+        let notes = read(&SINGLET.replace(from, to)).unwrap().notes;
+        assert!(notes.iter().any(|found| found.starts_with(note)), "{note}: {notes:?}");
+    }
+    let sound = SINGLET.replace("  CURV 0.0\n", "  TYPE EVENASPH\n  CURV 0.01\n  CONI -1\n");
+    assert_eq!(read(&sound).unwrap().notes, read(SINGLET).unwrap().notes);
+}
+
 #[test]
 fn crystals_are_found_in_the_catalogues_that_zemax_keeps_them_in() {
     let text = SINGLET.replace("GLAS N-BK7 0 0 1.5168 64.17", "GLAS BAF2").replace("SCHOTT MISC", "INFRARED");

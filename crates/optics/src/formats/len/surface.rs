@@ -135,7 +135,11 @@ impl LenSurface {
             "NOT" => self.comment = statement.words.join(" "),
             "AP" | "APF" => {
                 self.is_checked = statement.word(0).eq_ignore_ascii_case("CHK");
-                let _ = self.put(keyword, statement.number(usize::from(self.is_checked))?);
+                let radius = statement.number(usize::from(self.is_checked))?;
+                if radius < 0.0 {
+                    return Err(statement.wrong(format!("an aperture of {radius}, expected 0 or more")));
+                }
+                let _ = self.put(keyword, radius);
             }
             "DT" => self.tilt_first = statement.number(0)? < 0.0,
             "BEN" => self.bends = true,
@@ -220,7 +224,7 @@ impl LenSurface {
         Ok(moves)
     }
 
-    fn shape(&self, mm: f64) -> Result<Shape, String> {
+    pub(super) fn shape(&self, mm: f64) -> Result<Shape, String> {
         let powers = (1..).map(|half| 1 - 2 * half);
         let from_r2: Vec<f64> = self.coefficients.iter().zip(powers).map(|(a, power)| a * mm.powi(power)).collect();
         if self.coefficients.first().is_some_and(|&a| a != 0.0) && !self.is_general_asphere {

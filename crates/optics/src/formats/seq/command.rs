@@ -16,7 +16,7 @@ pub(super) fn commands_of(text: &str) -> Vec<Command> {
     for (number, line) in text.lines().enumerate() {
         let mut word = String::new();
         let (mut quote, mut is_continued) = (None, false);
-        for sign in line.chars().chain(['\n']) {
+        for (at, sign) in line.char_indices().chain([(line.len(), '\n')]) {
             match (quote, sign) {
                 (Some(mark), sign) if sign == mark || sign == '\n' => {
                     command.words.push(std::mem::take(&mut word));
@@ -28,7 +28,7 @@ pub(super) fn commands_of(text: &str) -> Vec<Command> {
                     push_word(&mut command, &mut word);
                     break;
                 }
-                (None, '&') => is_continued = true,
+                (None, '&') if is_last(&line[at + 1..]) => is_continued = true,
                 (None, ';') => {
                     push_word(&mut command, &mut word);
                     finish(&mut commands, &mut command, number + 1);
@@ -44,6 +44,12 @@ pub(super) fn commands_of(text: &str) -> Vec<Command> {
     }
     finish(&mut commands, &mut command, 0);
     commands
+}
+
+/// Whether no command stands in the rest of a line.
+fn is_last(rest: &str) -> bool {
+    let rest = rest.trim_start();
+    rest.is_empty() || rest.starts_with('!')
 }
 
 fn push_word(command: &mut Command, word: &mut String) {

@@ -370,7 +370,7 @@ impl SeqSurface {
         }
     }
 
-    fn shape(&self, mm: f64) -> Result<Shape, TextError> {
+    pub(super) fn shape(&self, mm: f64) -> Result<Shape, TextError> {
         let mut from_r2 = vec![0.0];
         from_r2.extend(self.coefficients.iter().zip(1..).map(|(a, i)| a * mm.powi(-1 - 2 * i)));
         let curvature_x = if self.is_turned() { self.curvature } else { self.curvature_x };

@@ -32,6 +32,8 @@ pub(super) struct ZmxSurface {
     aperture: Option<(String, [f64; 2])>,
     aperture_center: [f64; 2],
     pub(super) glass: Option<ZmxGlass>,
+    /// What of it is left out, without its number.
+    pub(super) notes: Vec<String>,
     /// The solves and pickups by which the program would find some of the numbers anew.
     pub(super) solves: Vec<ZmxSolve>,
 }
@@ -111,7 +113,7 @@ impl ZmxSurface {
                 if line.keyword == "OBSC" && numbers[0] > 0.0 {
                     return Err(line.wrong("an obscuration with a hole is not supported"));
                 }
-                self.aperture = Some((line.keyword.to_owned(), numbers));
+                self.put_aperture(line.keyword, numbers);
             }
             "SPID" => {
                 let (width, n_arms) = (line.number(0)?, line.count(1)?);
@@ -119,7 +121,7 @@ impl ZmxSurface {
                     let expected = format!("a width above 0 and 1 to {MOST_ARMS} arms");
                     return Err(line.wrong(format!("a spider of {n_arms} arms {width} wide; expected {expected}")));
                 }
-                self.aperture = Some((line.keyword.to_owned(), [width, n_arms as f64]));
+                self.put_aperture(line.keyword, [width, n_arms as f64]);
             }
             "XDAT" => {
                 let place = line.count(0)?;
@@ -136,6 +138,12 @@ impl ZmxSurface {
             "GLAS" => {
                 let name = line.words.first().copied().unwrap_or_default().to_owned();
                 let (nd, vd) = (line.number_or(3, 0.0)?, line.number_or(4, 0.0)?);
+                let deviation = line.number_or(5, 0.0)?;
+                if name == "___BLANK" && deviation != 0.0 {
+                    self.notes.push(format!(
+                        "the deviation of its partial dispersion P_g,F from that of usual glasses, {deviation}, is left out"
+                    ));
+                }
                 self.glass = Some(ZmxGlass { line: line.number, name, nd_vd: (nd > 0.0).then_some((nd, vd)) });
             }
             solve if SOLVES.contains(&solve) => self.solves.push(ZmxSolve {
@@ -152,6 +160,12 @@ impl ZmxSurface {
             }
         }
         Ok(true)
+    }
+
+    fn put_aperture(&mut self, keyword: &str, numbers: [f64; 2]) {
+        if let Some((before, _)) = self.aperture.replace((keyword.to_owned(), numbers)) {
+            self.notes.push(format!("two apertures: {keyword} takes the place of {before}"));
+        }
     }
 
     /// Forgets a rim that the program found for another configuration than this.
