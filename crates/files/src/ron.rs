@@ -42,6 +42,17 @@ fn is_of_word(c: char) -> bool {
     c.is_ascii_alphanumeric() || c == '_'
 }
 
+fn is_of_number(c: char) -> bool {
+    is_of_word(c) || matches!(c, '-' | '+' | '.')
+}
+
+/// Returns the number before a comma behind which digits stand as no field of a struct does.
+fn with_decimal_comma<'a>(before: &'a str, found: &str) -> Option<&'a str> {
+    let number = before.trim_end().strip_suffix(',')?;
+    let is_digit = |c: char| c.is_ascii_digit();
+    (number.ends_with(is_digit) && found.starts_with(is_digit)).then_some(number)
+}
+
 /// Returns what is wrong, after which key, and what stands there; and the word of a choice whose values have not begun well.
 fn reason(text: &str, error: &SpannedError) -> (String, Option<String>) {
     let Position { line, col } = error.span.start;
@@ -50,10 +61,16 @@ fn reason(text: &str, error: &SpannedError) -> (String, Option<String>) {
     let (before, found) =
         text.split_at(from + of_line.char_indices().nth(col.saturating_sub(1)).map_or(of_line.len(), |(at, _)| at));
     let found = found.lines().next().unwrap_or_default();
-    let head = before.trim_end().trim_end_matches('(').trim_end();
-    let head = head.strip_suffix(':').or_else(|| head.trim_end_matches(is_of_word).trim_end().strip_suffix(':'));
+    let comma = with_decimal_comma(before, found);
+    let head = comma.unwrap_or(before).trim_end().trim_end_matches('(').trim_end();
+    let head = head.strip_suffix(':').or_else(|| head.trim_end_matches(is_of_number).trim_end().strip_suffix(':'));
     let key = head.map(|head| head.rsplit(|c| !is_of_word(c)).next().unwrap_or_default());
     let Some(key) = key.filter(|key| !key.is_empty()) else { return (error.code.to_string(), None) };
+    if let Some(number) = comma {
+        let number = number.rsplit(|c| !is_of_number(c)).next().unwrap_or_default();
+        let digits = &found[..found.find(|c: char| !is_of_number(c)).unwrap_or(found.len())];
+        return (format!("{key}: expected a point within a number, found {number},{digits}"), None);
+    }
     let end = match found.strip_prefix('"') {
         Some(within) => within.find('"').map(|end| end + 2),
         None => found.find([',', ')', ']', '}']),
@@ -83,6 +100,7 @@ mod tests {
     struct Lens {
         name: String,
         radius_mm: Option<f64>,
+        count: Option<u32>,
     }
 
     #[test]
@@ -91,6 +109,13 @@ mod tests {
         let error = from_text::<Lens>("(name: \"a\", radius_mm: big, more: 1)").unwrap_err();
         assert_eq!((error.line, error.column), (1, 23));
         assert_eq!(error.reason, "radius_mm: Expected float, found big");
+        for (wrong, reason) in [
+            ("(name: \"a\", radius_mm: -50,25)", "radius_mm: expected a point within a number, found -50,25"),
+            ("(name: \"a\", count: -3)", "count: Integer is out of bounds"),
+        ] {
+            let error = from_text::<Lens>(wrong).unwrap_err();
+            assert!(error.reason.starts_with(reason), "{error}");
+        }
         for cut in ["", "(", "(name", "(name:", "(name: \"é\", radius_mm:", "(name: \"a"] {
             assert!(!from_text::<Lens>(cut).unwrap_err().to_string().contains('\n'), "{cut}");
         }
