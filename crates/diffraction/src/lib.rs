@@ -32,7 +32,7 @@ pub use stop_edge::StopEdge;
 pub use stop_ray::{StopRay, trace_stop_rays};
 pub use wave::{
     Encircled, LineSpread, Peak, PhaseRange, Propagation, PupilFunctionFit, PupilGrid, PupilOutline, PupilSamples,
-    TransferFunction, TransferMethod, TransferQuality, WavePsf, WaveQuality, WaveWindow, WindowCenter,
+    TransferFunction, TransferMethod, TransferQuality, TransferSpokes, WavePsf, WaveQuality, WaveWindow, WindowCenter,
     polychromatic_psf, pupil_samples, wave_psf,
 };
 pub use wavefront::{ReferenceSphere, Wavefront, WavefrontReference};

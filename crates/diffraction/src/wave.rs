@@ -35,7 +35,7 @@ pub use grid::{PhaseRange, PupilGrid};
 use gridded::Grid;
 pub use map::{PupilFunctionFit, PupilOutline};
 pub use nodes::PupilSamples;
-pub use otf::{Encircled, LineSpread, TransferFunction, TransferMethod, TransferQuality};
+pub use otf::{Encircled, LineSpread, TransferFunction, TransferMethod, TransferQuality, TransferSpokes};
 pub use polychromatic::polychromatic_psf;
 pub(crate) use propagation::FilmRays;
 pub use propagation::Propagation;

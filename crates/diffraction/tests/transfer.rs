@@ -1,9 +1,11 @@
 //! Optical transfer functions against closed forms and against point spread functions.
 #![expect(clippy::unwrap_used, reason = "a helper of tests fails by panicking")]
 
+use std::f64::consts::{FRAC_PI_2, TAU};
+
 use dioptric_diffraction::{
-    PupilSamples, TransferFunction, TransferMethod, TransferQuality, WaveQuality, WaveWindow, WindowCenter, airy,
-    wave_psf,
+    PupilSamples, TransferFunction, TransferMethod, TransferQuality, TransferSpokes, WaveQuality, WaveWindow,
+    WindowCenter, airy, wave_psf,
 };
 use dioptric_optics::{
     Aperture, Lens, MonoLens, ObjectPoint, Outline,
@@ -56,7 +58,7 @@ fn perfect_lens_has_the_modulation_of_its_pupil() {
             // At f/16 directions are evenly bright to a part in five hundred, and the modulation is Airy's.
             assert!(f_number < 16.0 || (airy::mtf(s) - expected).abs() < 2e-4, "{s}: {} {expected}", airy::mtf(s));
         }
-        let encircled = transfer.encircled();
+        let encircled = transfer.spokes([0.0, FRAC_PI_2]).encircled();
         for radius in [0.3, 0.6, 1.0, 1.22, 2.0, 5.0] {
             let (found, expected) = (encircled.share(radius * unit_mm), airy::encircled_energy(radius));
             // At f/4 the edge of the pupil is 3 % brighter than its middle, which Airy's is not.
@@ -65,13 +67,13 @@ fn perfect_lens_has_the_modulation_of_its_pupil() {
                 "f/{f_number} {radius}: {found} {expected}"
             );
         }
-        let spread = transfer.line_spread(0.3);
+        let [spread, _] = transfer.spokes([0.0, FRAC_PI_2]).line_spreads();
         assert!((spread.full_width_at_half_maximum_mm() / unit_mm - 1.0017).abs() < 2e-3);
         assert!((spread.per_mm(0.0) * unit_mm - airy::lsf(0.0)).abs() < 1e-3);
     }
     // The circle that holds 80 % of the light of an f/4 lens at 550 nm: Airy's has 1.989 µm, that of the brighter edge 2.000 µm.
     let (transfer, _) = TransferFunction::trace(&thin(4.0), &FAR, 50.0, TransferQuality::Fine).unwrap();
-    let radius_um = 1e3 * transfer.encircled().radius_mm(0.8);
+    let radius_um = 1e3 * transfer.spokes([0.0, FRAC_PI_2]).encircled().radius_mm(0.8);
     assert!((radius_um - 2.0).abs() < 0.003, "{radius_um}");
 }
 
@@ -201,5 +203,59 @@ fn strehl_ratio_of_defocus_is_its_closed_form_to_a_thousandth() {
         let found = PupilSamples::peak_of(&lens, &FAR, 50.0 + shift_mm).unwrap().strehl;
         let x = std::f64::consts::PI * waves / (1.0 + shift_mm / 50.0);
         assert!(found > 0.99 * (x.sin() / x).powi(2) && found < 1.2 / (x * x), "{waves}: {found}");
+    }
+}
+
+/// An opening with straight edges leaves 1 − f/f_c along each of them: cells that the edges cut count by the squares of their shares where
+/// they meet themselves, which takes a third of a cell of the 487 across.
+#[test]
+fn slits_have_the_modulation_of_their_width() {
+    for half_widths_mm in [[4.5, 4.5], [0.25, 4.5], [4.5, 0.1]] {
+        let [half_x_mm, half_y_mm] = half_widths_mm;
+        let outline = Outline::Rectangle { half_x_mm, half_y_mm };
+        let aperture = Aperture { surface: 0, outline, center_mm: [0.0; 2], is_obscuration: false };
+        let whole = Lens::thin(200.0, 40.0).unwrap();
+        let lens = Lens::new_with_apertures("slit", "test", whole.interfaces().to_vec(), 0, vec![aperture]).unwrap();
+        let lens = lens.at(550.0).unwrap();
+        let (transfer, limit) = TransferFunction::trace(&lens, &FAR, 200.0, TransferQuality::Fine).unwrap();
+        for (direction, half_mm) in [(0.0, half_x_mm), (FRAC_PI_2, half_y_mm)] {
+            let cutoff_per_mm = 2.0 * half_mm / (550e-6 * 200.0);
+            for share in [0.02, 0.1, 0.3, 0.5, 0.8, 0.97] {
+                for found in [&transfer, &limit].map(|t| t.modulation(direction, share * cutoff_per_mm)) {
+                    assert!((found - (1.0 - share)).abs() < 1.2e-3, "{half_widths_mm:?} {direction} {share}: {found}");
+                }
+            }
+        }
+    }
+}
+
+/// The light of two colors whose centroids lie apart: along any spoke the sum of what both are, turned by how far they are from the middle
+/// of both.
+#[test]
+fn transfer_functions_of_colors_add_up() {
+    let lens = Lens::built_in("singlet-50mm").unwrap().with_f_number(8.0, 550.0).unwrap();
+    let film_mm = lens.at(550.0).unwrap().film_distance_mm_for(f64::INFINITY).unwrap();
+    let point = ObjectPoint::far(4f64.to_radians(), DVec2::Y);
+    let directions = [0.7, 0.7 + FRAC_PI_2];
+    let traced = [480.0, 600.0]
+        .map(|nm| TransferFunction::trace(&lens.at(nm).unwrap(), &point, film_mm, TransferQuality::Quick).unwrap().0);
+    let spokes = traced.each_ref().map(|transfer| transfer.spokes(directions));
+    let shares = [0.75, 0.25];
+    let both = TransferSpokes::sum(&[(&spokes[0], 3.0), (&spokes[1], 1.0)]).unwrap();
+    let centroids = traced.each_ref().map(TransferFunction::centroid_mm);
+    let middle = centroids[0] * shares[0] + centroids[1] * shares[1];
+    assert!(centroids[0].distance(centroids[1]) > 1e-3, "{centroids:?}");
+    for per_mm in [3.0, 11.0, 47.0, 120.0] {
+        for (direction, found) in directions.into_iter().zip(both.modulations(per_mm)) {
+            let f = DVec2::from_angle(direction) * per_mm;
+            let of =
+                |i: usize| DVec2::from_angle(-TAU * f.dot(centroids[i] - middle)).rotate(traced[i].at(f)) * shares[i];
+            let expected = (of(0) + of(1)).length();
+            assert!((found - expected).abs() < 2e-3, "{per_mm}: {found} {expected}");
+        }
+    }
+    let alone = TransferSpokes::sum(&[(&spokes[0], 3.0)]).unwrap();
+    for radius_mm in [2e-3, 0.01, 0.05] {
+        assert!((alone.encircled().share(radius_mm) - spokes[0].encircled().share(radius_mm)).abs() < 1e-6);
     }
 }

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use dioptric_diffraction::Covariance;
+use dioptric_diffraction::{Covariance, TransferSpokes};
 use dioptric_optics::glam::DVec2;
 use dioptric_psf::Picture;
 use dioptric_spectrum::WavelengthGrid;
@@ -82,9 +82,13 @@ impl PsfSet {
             wave_fraction = wave_fraction.zip(row.wave_fraction).map(|(sum, share)| sum + w * share);
         }
         let picture = self.summed(&parts, self.side_of(&parts));
-        let pictures = if mtf_per_mm.is_empty() { vec![] } else { self.waves_of(&parts) };
-        let row = PsfRow::measure(name, centroid_mm, second, &Picture::new(picture.view(), self.pixel_um))
-            .with_mtf(mtf_per_mm, |direction, f| self.modulation_of(&pictures, direction, f));
+        let mut row = PsfRow::measure(name, centroid_mm, second, &Picture::new(picture.view(), self.pixel_um));
+        if let Some(spokes) = self.spokes_of(&parts) {
+            row = row.with_spokes(&spokes);
+        }
+        if !mtf_per_mm.is_empty() {
+            row = row.with_mtf(mtf_per_mm, self.modulation_of(&parts));
+        }
         Some(PolychromaticPsf {
             row: PsfRow {
                 is_polychromatic: true,
@@ -99,35 +103,33 @@ impl PsfSet {
         })
     }
 
-    /// Returns the modulation of the polychromatic light of a point for a wave along a direction from +x; no number where it
-    /// is dark.
+    /// Returns the modulation of the polychromatic light of a point for a wave along its meridian or across it, as a direction from +x; no
+    /// number where it is dark.
     pub(crate) fn polychromatic_modulation(&self, point: Range<usize>) -> impl Fn(f64, f64) -> f64 {
-        let parts = self.parts(point).map_or_else(Vec::new, |(_, parts)| parts);
-        let pictures = self.waves_of(&parts);
-        move |direction, cycles_per_mm| self.modulation_of(&pictures, direction, cycles_per_mm)
+        self.modulation_of(&self.parts(point).map_or_else(Vec::new, |(_, parts)| parts))
     }
 
-    fn waves_of(&self, parts: &[Part]) -> Vec<PartWaves> {
+    /// Returns the transfer function of all parts together, where each of them has one that knows of no pixels.
+    fn spokes_of(&self, parts: &[Part]) -> Option<TransferSpokes> {
+        let of = |part: &Part| Some((&self.rows[part.index].curves.as_ref()?.spokes, part.share));
+        TransferSpokes::sum(&parts.iter().map(of).collect::<Option<Vec<_>>>()?)
+    }
+
+    /// Returns the modulation of all parts together: without pixels, or else that of their pictures.
+    fn modulation_of(&self, parts: &[Part]) -> impl Fn(f64, f64) -> f64 + use<> {
+        let pixel_um = self.pixel_um;
+        let spokes = self.spokes_of(parts);
+        let meridian_rad = parts.first().map(|part| self.rows[part.index].meridian_rad());
         let of = |part: &Part| PartWaves {
             share: part.share,
             offset_px: part.offset_px,
-            picture: Windowed::new(self.pictures[part.index].view(), self.pixel_um),
+            picture: Windowed::new(self.pictures[part.index].view(), pixel_um),
         };
-        parts.iter().map(of).collect()
-    }
-
-    fn modulation_of(&self, parts: &[PartWaves], direction: f64, cycles_per_mm: f64) -> f64 {
-        let (mut real, mut imaginary, mut total) = (0.0, 0.0, 0.0);
-        for PartWaves { share, offset_px, picture } in parts {
-            let place_mm =
-                1e-3 * self.pixel_um * (*offset_px * DVec2::new(1.0, -1.0)).dot(DVec2::from_angle(direction));
-            let (re, im) = picture.transfer(direction, cycles_per_mm);
-            let (s, c) = (std::f64::consts::TAU * cycles_per_mm * place_mm).sin_cos();
-            real += share * (re * c - im * s);
-            imaginary += share * (re * s + im * c);
-            total += share;
+        let pictures: Vec<PartWaves> = if spokes.is_some() { Vec::new() } else { parts.iter().map(of).collect() };
+        move |direction, cycles_per_mm| match &spokes {
+            Some(spokes) => spokes.modulations(cycles_per_mm)[usize::from(Some(direction) != meridian_rad)],
+            None => modulation_of_pictures(&pictures, pixel_um, direction, cycles_per_mm),
         }
-        if total > 0.0 { real.hypot(imaginary) / total } else { f64::NAN }
     }
 
     /// Returns the picture of the polychromatic light as an observer sees it where light of the set's weights is white.
@@ -184,6 +186,19 @@ impl PsfSet {
         }
         sum
     }
+}
+
+fn modulation_of_pictures(parts: &[PartWaves], pixel_um: f64, direction: f64, cycles_per_mm: f64) -> f64 {
+    let (mut real, mut imaginary, mut total) = (0.0, 0.0, 0.0);
+    for PartWaves { share, offset_px, picture } in parts {
+        let place_mm = 1e-3 * pixel_um * (*offset_px * DVec2::new(1.0, -1.0)).dot(DVec2::from_angle(direction));
+        let (re, im) = picture.transfer(direction, cycles_per_mm);
+        let (s, c) = (std::f64::consts::TAU * cycles_per_mm * place_mm).sin_cos();
+        real += share * (re * c - im * s);
+        imaginary += share * (re * s + im * c);
+        total += share;
+    }
+    if total > 0.0 { real.hypot(imaginary) / total } else { f64::NAN }
 }
 
 /// Adds a picture, moved from the middle by this much, to another; what is between pixels is shared between them.

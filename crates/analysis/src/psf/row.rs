@@ -2,7 +2,7 @@
 
 use std::{f64::consts::FRAC_PI_2, fmt::Write};
 
-use dioptric_diffraction::{Covariance, TransferFunction, TransferMethod};
+use dioptric_diffraction::{Covariance, TransferFunction, TransferMethod, TransferSpokes};
 use dioptric_optics::glam::DVec2;
 use dioptric_psf::Picture;
 use serde::Serialize;
@@ -117,6 +117,8 @@ pub(crate) struct WaveCurves {
     pub(crate) modulation: Vec<(f64, [f64; 2], [f64; 2])>,
     /// Radii, µm, and the share of all light within.
     pub(crate) encircled: Vec<(f64, f64)>,
+    /// The transfer function itself, along the meridian and across it among others.
+    pub(crate) spokes: TransferSpokes,
 }
 
 /// Places of a curve.
@@ -196,9 +198,9 @@ impl PsfRow {
         let meridian = self.meridian_rad();
         let directions = [meridian, meridian + FRAC_PI_2];
         let both = |transfer: &TransferFunction, f: f64| directions.map(|direction| transfer.modulation(direction, f));
-        let encircled = transfer.encircled();
+        let spokes = transfer.spokes(directions);
+        let encircled = spokes.encircled();
         let radius_um = |share: f64| 1e3 * encircled.radius_mm(share);
-        let width_um = |direction: f64| 1e3 * transfer.line_spread(direction).full_width_at_half_maximum_mm();
         let mtf = self.mtf.iter().map(|row| {
             let [tangential, sagittal] = both(transfer, row.cycles_per_mm);
             let limit = Some(both(limit, row.cycles_per_mm));
@@ -216,15 +218,23 @@ impl PsfRow {
                 .map(|i| place(i, reach_um))
                 .map(|radius_um| (radius_um, encircled.share(1e-3 * radius_um)))
                 .collect(),
+            spokes,
         };
+        let row = Self { mtf: mtf.collect(), ..self }.with_spokes(&curves.spokes);
+        Self { curves: Some(curves), ..row }
+    }
+
+    /// Returns the row with the widths and radii of light along spokes of its transfer function.
+    pub(crate) fn with_spokes(self, spokes: &TransferSpokes) -> Self {
+        let encircled = spokes.encircled();
+        let [lsf_fwhm_um, lsf_fwhm_y_um] =
+            spokes.line_spreads().map(|spread| 1e3 * spread.full_width_at_half_maximum_mm());
         Self {
-            mtf: mtf.collect(),
-            lsf_fwhm_um: width_um(0.0),
-            lsf_fwhm_y_um: width_um(FRAC_PI_2),
-            ee50_radius_um: radius_um(0.5),
-            ee80_radius_um: radius_um(0.8),
-            curves: Some(curves),
-            measured_on: match transfer.method() {
+            lsf_fwhm_um,
+            lsf_fwhm_y_um,
+            ee50_radius_um: 1e3 * encircled.radius_mm(0.5),
+            ee80_radius_um: 1e3 * encircled.radius_mm(0.8),
+            measured_on: match spokes.method() {
                 TransferMethod::Waves => "waves",
                 TransferMethod::Rays => "rays and diffraction limit",
             },

@@ -544,6 +544,25 @@ mod tests {
     }
 
     #[test]
+    fn light_of_one_color_is_measured_as_that_color() {
+        // Of waves, which know of no pixels: coarse ones change nothing.
+        let mtf_per_mm = vec![20.0, 50.0];
+        let waves = PsfRequest { diffraction: Diffraction::Wave, pixel_um: 5.0, mtf_per_mm, ..request() };
+        let set = PsfRequest { wavelengths_nm: vec![550.0], ..waves }.compute(&paper_lens()).unwrap();
+        for (row, whole) in set.rows.iter().zip(set.polychromatic(&[20.0, 50.0])) {
+            assert_eq!(row.measured_on, whole.row.measured_on);
+            for (of_row, of_whole) in row.mtf.iter().zip(&whole.row.mtf) {
+                assert!((of_row.tangential - of_whole.tangential).abs() < 2e-4, "{of_row:?} {of_whole:?}");
+                assert!((of_row.sagittal - of_whole.sagittal).abs() < 2e-4, "{of_row:?} {of_whole:?}");
+            }
+            let widths = |row: &PsfRow| [row.lsf_fwhm_um, row.ee50_radius_um, row.ee80_radius_um];
+            for (of_row, of_whole) in widths(row).into_iter().zip(widths(&whole.row)) {
+                assert!((of_row / of_whole - 1.0).abs() < 1e-4, "{of_row} {of_whole}");
+            }
+        }
+    }
+
+    #[test]
     fn light_is_focused_at_the_main_wavelength_or_where_the_lens_is_known() {
         let glass = Glass::Sellmeier { b: vec![14.76, 0.24], c_um2: vec![0.19, 1530.0], range_nm: Some((2e3, 14e3)) };
         let side = |radius_mm: f64, medium_after: Glass, thickness_after_mm: f64| Interface {

@@ -1,6 +1,6 @@
 //! Optical transfer functions: the autocorrelation of the pupil, free of pixels and windows.
 //!
-//! The pupil is laid out on a square lattice of the directions that waves arrive from: rays are sent where a polynomial says that
+//! The pupil is laid out on a rectangular lattice of the directions that waves arrive from: rays are sent where a polynomial says that
 //! such waves come from, and their paths carried over to the lattice by what a path changes with the direction, dΦ = −n q·dd
 //! (`docs/wave.md`). The transfer function at the frequency f is then ∫ P(d + λf/n) P*(d) dd over ∫ |P|² dd (Goodman, Introduction to
 //! Fourier Optics, 6.3). Everything that is measured of a point spread function follows from it: the modulation, the light within a
@@ -36,10 +36,10 @@ pub enum TransferMethod {
 /// The optical transfer function of a point at one wavelength, about the centroid of its light.
 #[derive(Clone, Debug)]
 pub struct TransferFunction {
-    /// Values at the frequencies of a square lattice, rows along y, columns along x; 0 in the middle.
+    /// Values at the frequencies of a rectangular lattice, rows along y, columns along x; 0 in the middle.
     values: Array2<Complex<f32>>,
-    /// Distance of neighboring frequencies, cycles per mm.
-    step_per_mm: f64,
+    /// Distances of neighboring frequencies along x and y, cycles per mm.
+    step_per_mm: DVec2,
     /// The centroid of the light, mm along the film's own x and y.
     centroid_mm: DVec2,
     method: TransferMethod,
@@ -95,8 +95,8 @@ struct Pupil {
     amplitudes: Array2<Complex<f32>>,
     /// The energy, Σ amplitude² × coverage.
     energy: f64,
-    /// Distance of neighboring directions.
-    step: f64,
+    /// Distances of neighboring directions along x and y.
+    step: DVec2,
 }
 
 impl TransferFunction {
@@ -118,13 +118,15 @@ impl TransferFunction {
         let n = cells.n_nodes();
         let mean: DVec2 = cells.energy.iter().zip(&waves.d).map(|(e, d)| *e * *d).sum();
         let radius = waves.d.iter().map(|d| d.distance(mean)).fold(0.0, f64::max);
+        // As wide as the pupil along each axis: the edges of a slit take cells as narrow as it is.
+        let half = MARGIN * waves.d.iter().map(|d| (*d - mean).abs()).fold(DVec2::ZERO, DVec2::max);
         let spot_mm = (0..n).map(|i| rays.place_mm(i).distance(centroid_mm)).fold(0.0, f64::max);
         let turns = lens.image_index() * radius * spot_mm / (wavelength_nm * 1e-6);
         let needed = (SAMPLES_A_TURN * turns).ceil() as usize;
         let is_of_waves = needed <= MOST_SAMPLES;
         let least = quality.least_samples();
         let n_samples = if is_of_waves { good_size(needed.max(least)) } else { least };
-        let layout = Layout { lens, point, film_distance_mm, centroid_mm, mean, half: MARGIN * radius, n: n_samples };
+        let layout = Layout { lens, point, film_distance_mm, centroid_mm, mean, half, n: n_samples };
         let pupil = layout.pupil(&cells, &waves)?;
         let limit = Self::of(&pupil.amplitudes, &pupil, lens, centroid_mm);
         let transfer = match is_of_waves {
@@ -187,7 +189,7 @@ impl TransferFunction {
 
     /// The highest frequency at which anything is left, cycles per mm, in any direction.
     pub fn cutoff_per_mm(&self) -> f64 {
-        self.step_per_mm * self.middle()
+        self.step_per_mm.max_element() * self.middle()
     }
 
     /// Returns the value at a frequency, cycles per mm along the film's own x and y, as real and imaginary part: between those of the
@@ -218,25 +220,99 @@ impl TransferFunction {
         self.at(DVec2::from_angle(direction_rad) * cycles_per_mm).length()
     }
 
-    /// Returns the light within circles about the centroid: a function of the radius, mm, that gives its share.
-    pub fn encircled(&self) -> Encircled {
-        let last_per_mm = self.cutoff_per_mm();
-        let step_per_mm = last_per_mm / FREQUENCIES as f64;
-        let mean = |i: usize| {
-            let f = step_per_mm * i as f64;
-            // Opposite frequencies are conjugate: half a turn serves.
-            let at = |k: usize| self.at(DVec2::from_angle(PI * k as f64 / AZIMUTHS as f64) * f).x;
-            (0..AZIMUTHS).map(at).sum::<f64>() / AZIMUTHS as f64
+    /// Returns it along spokes from the middle: evenly over half a turn, and along two directions from +x.
+    pub fn spokes(&self, directions_rad: [f64; 2]) -> TransferSpokes {
+        let step_per_mm = self.cutoff_per_mm() / FREQUENCIES as f64;
+        let value = |(spoke, i)| {
+            let along = DVec2::from_angle(spoke_rad(directions_rad, spoke));
+            let value = self.at(along * (step_per_mm * i as f64));
+            Complex::new(value.x as f32, value.y as f32)
         };
-        Encircled { means: (0..=FREQUENCIES).map(mean).collect(), step_per_mm }
+        let values = Array2::from_shape_fn((AZIMUTHS + 2, FREQUENCIES + 1), value);
+        TransferSpokes { values, directions_rad, step_per_mm, centroid_mm: self.centroid_mm, method: self.method }
+    }
+}
+
+/// A transfer function along spokes from the middle, about the centroid of its light: of one wavelength, or of several together.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TransferSpokes {
+    /// Values at equal steps of the frequency from 0, a row each spoke: those over half a turn, then those along the two directions.
+    values: Array2<Complex<f32>>,
+    directions_rad: [f64; 2],
+    step_per_mm: f64,
+    centroid_mm: DVec2,
+    method: TransferMethod,
+}
+
+/// Returns the direction of a spoke.
+fn spoke_rad(directions_rad: [f64; 2], spoke: usize) -> f64 {
+    if spoke < AZIMUTHS { PI * spoke as f64 / AZIMUTHS as f64 } else { directions_rad[spoke - AZIMUTHS] }
+}
+
+impl TransferSpokes {
+    /// Returns that of the light of several wavelengths of a point, each with its share; all are along the same directions.
+    pub fn sum(parts: &[(&Self, f64)]) -> Option<Self> {
+        let (first, _) = parts.first()?;
+        let total: f64 = parts.iter().map(|(_, share)| share).sum();
+        let centroid_mm = parts.iter().map(|(part, share)| part.centroid_mm * (share / total)).sum();
+        let step_per_mm = parts.iter().map(|(part, _)| part.step_per_mm).fold(0.0, f64::max);
+        let value = |(spoke, i)| {
+            let f = DVec2::from_angle(spoke_rad(first.directions_rad, spoke)) * (step_per_mm * i as f64);
+            let of = |(part, share): &(&Self, f64)| {
+                let aside = DVec2::from_angle(-TAU * f.dot(part.centroid_mm - centroid_mm));
+                aside.rotate(part.along(spoke, f.length())) * (share / total)
+            };
+            let sum: DVec2 = parts.iter().map(of).sum();
+            Complex::new(sum.x as f32, sum.y as f32)
+        };
+        let is_of_waves = parts.iter().all(|(part, _)| part.method == TransferMethod::Waves);
+        Some(Self {
+            values: Array2::from_shape_fn(first.values.dim(), value),
+            directions_rad: first.directions_rad,
+            step_per_mm,
+            centroid_mm,
+            method: if is_of_waves { TransferMethod::Waves } else { TransferMethod::Rays },
+        })
     }
 
-    /// Returns the spread of a line across a direction from +x, per mm, at a distance from the centroid, mm.
-    pub fn line_spread(&self, direction_rad: f64) -> LineSpread {
-        let step_per_mm = self.cutoff_per_mm() / FREQUENCIES as f64;
-        let direction = DVec2::from_angle(direction_rad);
-        let values = (0..=FREQUENCIES).map(|i| self.at(direction * (step_per_mm * i as f64))).collect();
-        LineSpread { values, step_per_mm }
+    /// Returns the value along a spoke, between its samples by cubics.
+    fn along(&self, spoke: usize, cycles_per_mm: f64) -> DVec2 {
+        let row = self.values.row(spoke);
+        let place = cycles_per_mm / self.step_per_mm;
+        let value = |i: i64| match usize::try_from(i.abs()).ok().and_then(|at| row.get(at)) {
+            // Opposite frequencies are conjugate.
+            Some(value) => {
+                DVec2::new(f64::from(value.re), if i < 0 { -f64::from(value.im) } else { f64::from(value.im) })
+            }
+            None => DVec2::ZERO,
+        };
+        let below = place.floor() as i64;
+        cubic([-1, 0, 1, 2].map(|i| value(below + i)), place - place.floor())
+    }
+
+    /// How it was found: by rays where any of its wavelengths is.
+    pub fn method(&self) -> TransferMethod {
+        self.method
+    }
+
+    /// Returns what is left of a wave along each of the two directions.
+    pub fn modulations(&self, cycles_per_mm: f64) -> [f64; 2] {
+        [AZIMUTHS, AZIMUTHS + 1].map(|spoke| self.along(spoke, cycles_per_mm).length())
+    }
+
+    /// Returns the light within circles about the centroid.
+    pub fn encircled(&self) -> Encircled {
+        // Opposite frequencies are conjugate: half a turn serves.
+        let mean = |i: usize| (0..AZIMUTHS).map(|k| f64::from(self.values[(k, i)].re)).sum::<f64>() / AZIMUTHS as f64;
+        Encircled { means: (0..=FREQUENCIES).map(mean).collect(), step_per_mm: self.step_per_mm }
+    }
+
+    /// Returns the spread of lines across x and across y.
+    pub fn line_spreads(&self) -> [LineSpread; 2] {
+        [0, AZIMUTHS / 2].map(|spoke| {
+            let values = self.values.row(spoke).iter().map(|v| DVec2::new(f64::from(v.re), f64::from(v.im))).collect();
+            LineSpread { values, step_per_mm: self.step_per_mm }
+        })
     }
 }
 
@@ -365,9 +441,9 @@ struct Layout<'a> {
     film_distance_mm: f64,
     centroid_mm: DVec2,
     mean: DVec2,
-    /// Half the side of the square of directions.
-    half: f64,
-    /// Samples along its side.
+    /// Half the sides of the rectangle of directions.
+    half: DVec2,
+    /// Samples along each of its sides.
     n: usize,
 }
 
@@ -453,8 +529,8 @@ impl Layout<'_> {
 
     /// The direction of a cell of the lattice.
     fn direction(&self, row: usize, column: usize) -> DVec2 {
-        let at = |i: usize| self.half * ((2 * i + 1) as f64 / self.n as f64 - 1.0);
-        self.mean + DVec2::new(at(column), at(row))
+        let at = |i: usize| (2 * i + 1) as f64 / self.n as f64 - 1.0;
+        self.mean + self.half * DVec2::new(at(column), at(row))
     }
 
     /// Returns where light of each direction of the lattice passes the pupil's plane, by polynomials through the nodes, mm.
@@ -528,11 +604,11 @@ fn coverage(clearances_mm: &Array2<f64>, row: usize, column: usize) -> f64 {
 }
 
 /// Returns the area of the pupil's plane for an area of directions at a cell, mm².
-fn stretch(targets_mm: &Array2<DVec2>, row: usize, column: usize, step: f64) -> f64 {
+fn stretch(targets_mm: &Array2<DVec2>, row: usize, column: usize, step: DVec2) -> f64 {
     let last = targets_mm.nrows() - 1;
     let (left, right) = (column.saturating_sub(1), (column + 1).min(last));
     let (below, above) = (row.saturating_sub(1), (row + 1).min(last));
-    let along_x = (targets_mm[(row, right)] - targets_mm[(row, left)]) / ((right - left) as f64 * step);
-    let along_y = (targets_mm[(above, column)] - targets_mm[(below, column)]) / ((above - below) as f64 * step);
+    let along_x = (targets_mm[(row, right)] - targets_mm[(row, left)]) / ((right - left) as f64 * step.x);
+    let along_y = (targets_mm[(above, column)] - targets_mm[(below, column)]) / ((above - below) as f64 * step.y);
     along_x.perp_dot(along_y).abs()
 }
