@@ -8,7 +8,11 @@ use serde::Serialize;
 
 use dioptric_pipeline::PipelineError;
 
-use super::{afocal::angular_magnification, sharp::SharpDepths};
+use super::{
+    afocal::{AfocalView, angular_magnification},
+    film::{AnalysisFilm, FilmUse},
+    sharp::SharpDepths,
+};
 
 /// By how much of it the f-number of the light may differ from that of the axial beam and be taken for the same.
 const SAME_LIGHT: f64 = 0.01;
@@ -254,7 +258,15 @@ impl LensData {
         let f_number_of_light = has_odd_apertures.then(|| mono.f_number_of_light()).flatten();
         let transmission = mono.axial_transmission(object_distance_mm);
         let t_number = transmission.map(|share| mono.f_number_by_area() / share.sqrt());
-        let [half_light_field_deg, last_light_field_deg] = field_limits_deg(&mono, [0.5, 0.01]);
+        // Light that leaves in parallel falls on no film: it is looked at as everywhere, through an ideal lens.
+        let far = FilmUse {
+            main_nm: Some(wavelength_nm),
+            wavelengths_nm: &[wavelength_nm],
+            weights: &[],
+            distance_mm: f64::INFINITY,
+        };
+        let (seen, _) = AfocalView::applied(lens, AnalysisFilm::BestFocus, &far)?;
+        let [half_light_field_deg, last_light_field_deg] = field_limits_deg(&seen.at(wavelength_nm)?, [0.5, 0.01]);
         Ok(Self {
             lens: lens.name().to_owned(),
             configurations: Vec::new(),
