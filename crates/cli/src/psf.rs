@@ -145,7 +145,10 @@ fn points(arguments: &PsfArgs, used: &LensDefaults, common: &Common) -> anyhow::
         Some(list) => parse_numbers("--distances-mm", list)?,
         // The film that a file states is that of its own object.
         None if used.distance_mm.is_finite() || matches!(film, AnalysisFilm::OfFile(_)) => {
-            taken.push(format!("an object at {} mm", list_of(&[used.distance_mm])));
+            taken.push(match used.distance_mm.is_finite() {
+                true => format!("an object at {} mm", list_of(&[used.distance_mm])),
+                false => "a far object".to_owned(),
+            });
             vec![used.distance_mm]
         }
         // What is in focus, or else far.
