@@ -525,7 +525,7 @@ fn distortion_of(keys: &mut Keys, is_fisheye: bool, is_nerf: bool) -> Result<Dis
     })
 }
 
-/// Names of what one code of depth is, m, and of how many are a metre, as TUM, Open3D and NICE-SLAM have it.
+/// Names of what one code of depth is, m, and of how many are a metre, as TUM, `Open3D` and NICE-SLAM have it.
 const DEPTH_UNITS: [&str; 5] = ["depthunitm", "depthunitscalefactor", "integerdepthscale", "depthunit", "depthunits"];
 const DEPTH_SCALES: [&str; 6] =
     ["depthscale", "pngdepthscale", "depthfactor", "depthscalefactor", "depthmapfactor", "rgbddepthmapfactor"];
