@@ -18,8 +18,9 @@ pub(crate) struct SceneFileArgs {
     /// What 1 of the depth's numbers is: mm, cm, m, or so many of them a metre, as 5000/m; of a disparity px or 256/px
     #[arg(long, value_name = "UNIT")]
     pub(crate) depth_unit: Option<String>,
-    /// What the depth's numbers are: axial, radial, inverse, `inverse:NEAR_M,FAR_M` (the largest and the smallest number) or
-    /// `disparity:BASELINE_M\[,OFFSET_PX\]` [default: axial]
+    /// What the depth's numbers are: axial, radial, inverse, `inverse:NEAR_M,FAR_M` (the largest and the smallest number),
+    /// `buffer:NEAR_M,FAR_M` (of a renderer, from 0 to 1), `ndc:NEAR_M,FAR_M` (from -1 to 1) or `disparity:BASELINE_M\[,OFFSET_PX\]`
+    /// [default: axial]
     #[arg(long, value_name = "KIND")]
     pub(crate) depth_kind: Option<DepthKind>,
     /// Channel of an EXR file, or array of a MATLAB, HDF5 or .npz file, that holds the depth; number of one of several planes of a TIFF

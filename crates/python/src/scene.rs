@@ -217,7 +217,8 @@ impl Scene {
     /// depth, view : str or os.PathLike, optional
     ///     Files of the depth and of the camera data, in place of those in the file or beside it.
     /// depth_unit, depth_kind : str, optional
-    ///     What the depth's numbers are, as ``"5000/m"``, ``"radial"``, ``"inverse:0.5,20"``, ``"disparity:0.193"``.
+    ///     What the depth's numbers are, as ``"5000/m"``, ``"radial"``, ``"inverse:0.5,20"``, ``"buffer:0.1,100"``,
+    ///     ``"disparity:0.193"``.
     /// depth_variable : str, optional
     ///     The channel of an EXR file, or the array of another, that holds the depth; the number of one of several planes of a TIFF.
     /// panorama : str, optional

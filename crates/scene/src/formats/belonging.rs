@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::stated::note_of;
+use super::stated::{bare, note_of};
 
 /// Whether reading a scene may read another file in its folder: the numbers of a header, a depth, camera data, references of a
 /// line scanner.
@@ -16,9 +16,39 @@ pub fn may_be_read_with(scene: &Path, other: &Path) -> bool {
     let goes_on = |start: &str| other.strip_prefix(start).is_some_and(|rest| rest.starts_with(['.', '_']));
     let is_part =
         |start: &str| other.starts_with(&format!("{start}_camera")) || other.starts_with(&format!("{start}_depth"));
-    let is_reference = ["white_reference", "dark_reference"].iter().any(|start| other.starts_with(start));
+    let is_reference = Reference::of_name(&other, &bare_stem(&name(scene))).is_some();
     let is_list = ["wavelengths.txt", "wavelengths.csv"].contains(&other.as_str());
     other != name(scene) && (goes_on(bare) || shared.is_some_and(is_part) || is_reference || is_list)
+}
+
+/// A cube beside one of a line scanner.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Reference {
+    /// Of a perfect white.
+    White,
+    /// Of no light.
+    Dark,
+}
+
+impl Reference {
+    /// Returns what a file is by its name, and whether it is that of a cube, which has this one, [`bare_stem`]: `white_reference_1.hdr`,
+    /// `WHITEREF_451.hdr` of Specim, `darkReference.hdr` of Headwall; `white.hdr` and `451_white.hdr`.
+    pub(super) fn of_name(name: &str, cube: &str) -> Option<(Self, bool)> {
+        let stem = bare_stem(name);
+        [("white", Self::White), ("dark", Self::Dark)].into_iter().find_map(|(word, reference)| {
+            let mut rests = ["reference", "ref"].iter().filter_map(|of| stem.split_once(&format!("{word}{of}")));
+            if let Some((before, behind)) = rests.next() {
+                return Some((reference, format!("{before}{behind}") == cube));
+            }
+            let rest = stem.strip_prefix(word).or_else(|| stem.strip_suffix(word))?;
+            (rest.is_empty() || rest == cube).then_some((reference, rest == cube))
+        })
+    }
+}
+
+/// Returns the letters and digits of a file's name without its ending, in small letters.
+pub(super) fn bare_stem(name: &str) -> String {
+    bare(name.rsplit_once('.').map_or(name, |(stem, _)| stem))
 }
 
 /// Returns what is said of units, scales and masks that GDAL has put beside a file, and of what editors have.
@@ -42,6 +72,26 @@ pub(super) fn notes_of_companions(path: &Path) -> impl Iterator<Item = String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn references_are_known_by_their_names() {
+        use Reference::{Dark, White};
+        for (name, expected) in [
+            ("white_reference.hdr", Some((White, false))),
+            ("white_reference_1.hdr", Some((White, false))),
+            ("WHITEREF_451.hdr", Some((White, true))),
+            ("DARKREF_450.hdr", Some((Dark, false))),
+            ("darkReference.hdr", Some((Dark, false))),
+            ("451_white_reference.hdr", Some((White, true))),
+            ("451_dark.hdr", Some((Dark, true))),
+            ("white.hdr", Some((White, false))),
+            ("451.hdr", None),
+            ("450_white.hdr", None),
+            ("white_room.hdr", None),
+        ] {
+            assert_eq!(Reference::of_name(name, "451"), expected, "{name}");
+        }
+    }
 
     #[test]
     fn files_that_belong_to_a_scene_are_known() {

@@ -19,6 +19,9 @@ const LEAST_FOCAL_WIDTHS: f64 = 0.01;
 /// The largest, likewise: telescopes have a thousandth of that.
 const MOST_FOCAL_WIDTHS: f64 = 1e6;
 
+/// How far from its middle, in its sides, the axis of a picture of which no size is stated may be.
+const MOST_OFF_CENTER: f64 = 0.25;
+
 /// How many times as far apart as columns the rows of a picture may be.
 const LIKELY_STRETCHES: std::ops::RangeInclusive<f64> = 0.05..=20.0;
 
@@ -102,6 +105,18 @@ impl CameraFile {
             let reason = format!(
                 "its focal length of {} px would make a picture of {width} samples wider than 178°: expected it in samples",
                 shown(fx_px)
+            );
+            return Err(unreadable(&self.file, reason));
+        }
+        // Numbers of a picture of another size, which nothing states.
+        let is_off = |own: Option<f64>, side: usize| {
+            own.is_some_and(|own| self.size.is_none() && ((own + 0.5) / side as f64 - 0.5).abs() > MOST_OFF_CENTER)
+        };
+        if is_off(self.center_px[0], width) || is_off(self.center_px[1], height) {
+            let [x, y] = self.center_px.map(|own| own.map_or("none".to_owned(), shown));
+            let reason = format!(
+                "its center ({x}, {y}) is far from the middle of {width} × {height} samples, and it does not say for how many it is: \
+                 expected its width and height"
             );
             return Err(unreadable(&self.file, reason));
         }

@@ -17,8 +17,9 @@ use super::{
     camera_yaml::{of_xml, of_yaml},
     depth_names::words_of,
     distortion::Distortion,
-    npy::parse as parse_npy,
-    stated::{Stated, name_of, short},
+    npy::{MAGIC, parse as parse_npy},
+    reading::DepthUnit,
+    stated::{Stated, bare, name_of, short},
     unusable::{TRUNCATED, check_memory, check_whole, starts_with, unreadable},
 };
 use crate::SceneError;
@@ -47,7 +48,7 @@ impl CameraFile {
         let length = fs::metadata(path).map_err(|error| unreadable(path, error))?.len();
         check_memory(path, length.saturating_mul(4), length)?;
         check_whole(path)?;
-        if starts_with(path, NUMPY)? {
+        if starts_with(path, MAGIC)? {
             let data = of_npy(path).and_then(|object| of_object(path, object, picture));
             return data.and_then(Self::checked).map_err(|reason| unreadable(path, reason));
         }
@@ -164,9 +165,6 @@ impl<'de> Deserialize<'de> for Once {
     }
 }
 
-/// What a file of an array of `NumPy` begins with.
-const NUMPY: &[u8] = b"\x93NUMPY";
-
 /// Reads the matrix of a camera: 3 rows of 3 numbers of `NumPy`.
 fn of_npy(path: &Path) -> Result<Value, String> {
     let array = parse_npy(&fs::read(path).map_err(|error| error.to_string())?)?;
@@ -234,19 +232,7 @@ fn of_object(path: &Path, object: Value, picture: &Path) -> Result<CameraFile, S
     if keys.get("units").and_then(Value::as_str).is_some_and(|unit| ["px", "pixel", "pixels"].contains(&unit)) {
         keys.take("units");
     }
-    // What is called so may be a text or a number of dots an inch, which is named.
-    let is_list = |own: &Value| own.is_array() || own.get("data").is_some();
-    let listed = if keys.get("resolution").is_some_and(is_list) { keys.take("resolution") } else { None };
-    let size = match listed {
-        None => (
-            side(&mut keys, &["width", "w", "image_width", "image_Width"])?,
-            side(&mut keys, &["height", "h", "image_height", "image_Height"])?,
-        ),
-        Some(own) => match numbers_of(&own, "resolution")?[..] {
-            [width, height] => (Some(n_samples(width, "resolution")?), Some(n_samples(height, "resolution")?)),
-            _ => return Err("its resolution is no width and height".to_owned()),
-        },
-    };
+    let size = size_of(&mut keys)?;
     let angles_rad = [number(&mut keys, &["camera_angle_x"])?, number(&mut keys, &["camera_angle_y"])?];
     let [fx, fy, cx, cy] = pinhole_of(&mut keys)?;
     let depth_unit_m = depth_unit_of(&mut keys)?;
@@ -363,18 +349,55 @@ fn frames_of<'a>(path: &Path, picture: &Path, frames: &'a [Value]) -> Vec<&'a Va
     if alike.is_empty() { of(&is_called) } else { alike }
 }
 
-/// Takes the number of the first of these keys that is there; `null` is none.
+/// Takes the number of the first of these keys that is there.
 fn number(keys: &mut Keys, names: &[&str]) -> Result<Option<f64>, String> {
     let own = names.iter().find_map(|name| Some((name, keys.take(name)?)));
+    own.map_or(Ok(None), |(name, own)| number_in(name, &own))
+}
+
+/// Returns the number of a key; `null` is none.
+fn number_in(name: &str, own: &Value) -> Result<Option<f64>, String> {
     match own {
-        None | Some((_, Value::Null)) => Ok(None),
-        Some((name, value)) => value.as_f64().map(Some).ok_or_else(|| format!("{name} is {value}, expected a number")),
+        Value::Null => Ok(None),
+        own => own.as_f64().map(Some).ok_or_else(|| format!("{name} is {own}, expected a number")),
     }
 }
 
-/// Takes a number of samples along a side.
-fn side(keys: &mut Keys, names: &[&str]) -> Result<Option<usize>, String> {
-    number(keys, names)?.map(|n| n_samples(n, names[0])).transpose()
+/// Names of the size of the picture, as a pair.
+const SIZES: [&str; 6] =
+    ["resolution", "imageresolution", "imagesize", "imgsize", "imagedimensions", "referencedimensions"];
+
+/// Takes the columns and rows of the picture that the file speaks of, as a pair or by themselves.
+fn size_of(keys: &mut Keys) -> Result<(Option<usize>, Option<usize>), String> {
+    let pair = |own: &Value| -> Option<Vec<f64>> {
+        match own {
+            Value::String(text) => {
+                let own: Option<Vec<f64>> = text.split([' ', ',', 'x', '×']).map(|word| word.parse().ok()).collect();
+                own.filter(|own| own.len() == 2)
+            }
+            own => numbers_of(own, "")
+                .ok()
+                .or_else(|| Some(vec![own.get("width")?.as_f64()?, own.get("height")?.as_f64()?])),
+        }
+    };
+    // What is called so may be another text or a number of dots an inch, which is named.
+    let is_pair = |name: &&&str| keys.names().any(|own| bare(own) == **name && keys.get(own).and_then(pair).is_some());
+    if let Some(name) = SIZES.iter().find(is_pair)
+        && let Some((name, own)) = keys.take_called(&[name])
+    {
+        return match pair(&own).as_deref() {
+            Some(&[width, height]) => Ok((Some(n_samples(width, &name)?), Some(n_samples(height, &name)?))),
+            _ => Err(format!("its {name} is no width and height")),
+        };
+    }
+    let mut side = |names: &[&str]| -> Result<Option<usize>, String> {
+        let Some((name, own)) = keys.take_called(names) else { return Ok(None) };
+        number_in(&name, &own)?.map(|n| n_samples(n, &name)).transpose()
+    };
+    Ok((
+        side(&["width", "w", "imagewidth", "imgwidth", "imagew", "imgw", "cols", "columns", "resolutionx"])?,
+        side(&["height", "h", "imageheight", "imgheight", "imageh", "imgh", "rows", "resolutiony"])?,
+    ))
 }
 
 fn n_samples(n: f64, name: &str) -> Result<usize, String> {
@@ -383,24 +406,15 @@ fn n_samples(n: f64, name: &str) -> Result<usize, String> {
 }
 
 /// Names of lists of coefficients of a distortion.
-const LISTS: [&str; 11] = [
-    "distortion",
-    "dist_coeff",
-    "dist",
-    "coeffs",
-    "dist_coeffs",
-    "distortion_coefficients",
-    "Distortion_Coefficients",
-    "distortion_coeffs",
-    "distCoeffs",
-    "D",
-    "d",
-];
+const LISTS: [&str; 8] =
+    ["distortion", "distcoeff", "dist", "coeffs", "distcoeffs", "distortioncoefficients", "distortioncoeffs", "d"];
 
 /// Whether the file names a model of fisheyes.
 fn is_of_fisheye(keys: &mut Keys) -> Result<bool, String> {
     let mut is_any = false;
-    let own = LISTS.iter().find_map(|name| numbers_of(keys.get(name)?, name).ok());
+    let list =
+        |name: &str| if LISTS.contains(&bare(name).as_str()) { numbers_of(keys.get(name)?, name).ok() } else { None };
+    let own = keys.names().find_map(list);
     let is_zero = own.is_some_and(|own| own.iter().all(|v| *v == 0.0));
     for name in ["camera_model", "distortion_model", "model", "type"] {
         let Some(model) = keys.get(name).and_then(Value::as_str).map(str::to_owned) else { continue };
@@ -433,8 +447,13 @@ fn pinhole_of(keys: &mut Keys) -> Result<[Option<f64>; 4], String> {
         number(keys, &["cx_px", "cx", "ppx"])?,
         number(keys, &["cy_px", "cy", "ppy"])?,
     ];
-    const MATRICES: [&str; 6] = ["intrinsic_matrix", "camera_matrix", "Camera_Matrix", "cameraMatrix", "K", "k"];
-    let matrix = keys.take_any(&MATRICES).map(|own| (own, "intrinsic_matrix"));
+    // A k in small letters may be the distortion.
+    let is_matrix = |own: &Value| numbers_of(own, "k").is_ok_and(|own| own.len() == 9);
+    let mut matrix = keys.take_called(&["intrinsicmatrix", "cameramatrix"]).map(|(_, own)| own).or(keys.take("K"));
+    if matrix.is_none() && keys.get("k").is_some_and(is_matrix) {
+        matrix = keys.take("k");
+    }
+    let matrix = matrix.map(|own| (own, "intrinsic_matrix"));
     // A text names a file.
     let has_list = keys.get("intrinsics").is_some_and(|own| !own.is_string());
     let intrinsics = || if has_list { Some((keys.take("intrinsics")?, "intrinsics")) } else { None };
@@ -462,11 +481,29 @@ fn pinhole_of(keys: &mut Keys) -> Result<[Option<f64>; 4], String> {
 
 /// Takes the coefficients of a distortion, by names or as a list.
 fn distortion_of(keys: &mut Keys, is_fisheye: bool, is_nerf: bool) -> Result<Distortion, String> {
+    const NAMES: [&str; 8] = ["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"];
     let mut k = [0.0; 8];
-    for (place, name) in ["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"].iter().enumerate() {
+    for (place, name) in NAMES.into_iter().enumerate() {
         k[place] = number(keys, &[name])?.unwrap_or(0.0);
     }
-    let list = keys.take_any(&LISTS).filter(|list| !list.is_null());
+    for (names, places) in [
+        (["k", "radial", "radialdistortion"], &[0, 1, 4, 5, 6, 7][..]),
+        (["p", "tangential", "tangentialdistortion"], &[2, 3]),
+    ] {
+        // A text says something else, and so does a matrix.
+        let is_list = |own: &&str| names.contains(&bare(own).as_str()) && keys.get(own).is_some_and(Value::is_array);
+        let Some(name) = keys.names().find(is_list).map(str::to_owned) else { continue };
+        let own = numbers_of(keys.get(&name).unwrap_or(&Value::Null), &name)?;
+        if own.len() > places.len() {
+            continue;
+        }
+        keys.take(&name);
+        if places.iter().any(|place| k[*place] != 0.0) {
+            return Err(format!("it states its distortion twice, as {name} and by names: expected one"));
+        }
+        own.iter().zip(places).for_each(|(own, place)| k[*place] = *own);
+    }
+    let list = keys.take_called(&LISTS).map(|(_, list)| list).filter(|list| !list.is_null());
     // Of none.
     let list = list.filter(|list| !list.as_str().is_some_and(|text| text.eq_ignore_ascii_case("none")));
     if let Some(list) = list {
@@ -488,25 +525,47 @@ fn distortion_of(keys: &mut Keys, is_fisheye: bool, is_nerf: bool) -> Result<Dis
     })
 }
 
+/// Names of what one code of depth is, m, and of how many are a metre, as TUM, `Open3D` and NICE-SLAM have it.
+const DEPTH_UNITS: [&str; 5] = ["depthunitm", "depthunitscalefactor", "integerdepthscale", "depthunit", "depthunits"];
+const DEPTH_SCALES: [&str; 6] =
+    ["depthscale", "pngdepthscale", "depthfactor", "depthscalefactor", "depthmapfactor", "rgbddepthmapfactor"];
+
 /// Takes what one code of the depth beside the picture stands for, m.
 fn depth_unit_of(keys: &mut Keys) -> Result<Option<f64>, String> {
-    let unit_m = number(keys, &["depth_unit_m", "depth_unit_scale_factor", "integer_depth_scale"])?;
-    let of_scale = match number(keys, &["depth_scale", "DepthMapFactor", "RGBD.DepthMapFactor"])? {
+    let unit = match keys.take_called(&DEPTH_UNITS) {
+        Some((name, Value::String(text))) => match DepthUnit::parse(&text) {
+            Ok(DepthUnit::Metres(unit_m)) => Some((name, unit_m)),
+            _ => return Err(format!("{name} is '{}', expected metres, or mm, cm, m or 5000/m", short(&text))),
+        },
+        Some((name, own)) => match number_in(&name, &own)? {
+            Some(many) if many > 1.0 => {
+                return Err(format!(
+                    "{name} is {many}, expected metres a code, 1 or less, or codes a metre as depth_scale"
+                ));
+            }
+            unit_m => unit_m.map(|unit_m| (name, unit_m)),
+        },
         None => None,
-        // So many codes a metre, as TUM and Open3D have it; small factors are metres to some and millimetres to others.
-        Some(scale) if scale >= 10.0 => Some(1.0 / scale),
-        Some(scale) => {
-            return Err(format!(
-                "depth_scale is {scale}, which is metres or millimetres a code: expected codes a metre, 10 or more, or \
-                 depth_unit_m"
-            ));
-        }
     };
-    match (unit_m, of_scale) {
-        (Some(unit_m), Some(other)) if (unit_m / other - 1.0).abs() > 1e-6 => {
-            Err(format!("depth_unit_m is {unit_m}, and depth_scale says {other}: expected one of them"))
+    let scale = match keys.take_called(&DEPTH_SCALES) {
+        None => None,
+        Some((name, own)) => match number_in(&name, &own)? {
+            None => None,
+            Some(scale) if scale >= 10.0 => Some((name, 1.0 / scale)),
+            // Small factors are metres to some and millimetres to others.
+            Some(scale) => {
+                return Err(format!(
+                    "{name} is {scale}, which is metres or millimetres a code: expected codes a metre, 10 or more, or \
+                     depth_unit_m"
+                ));
+            }
+        },
+    };
+    match (unit, scale) {
+        (Some((unit, unit_m)), Some((scale, other_m))) if (unit_m / other_m - 1.0).abs() > 1e-6 => {
+            Err(format!("{unit} is {unit_m}, and {scale} says {other_m}: expected one of them"))
         }
-        _ => Ok(unit_m.or(of_scale)),
+        (unit, scale) => Ok(unit.or(scale).map(|(_, unit_m)| unit_m)),
     }
 }
 

@@ -160,6 +160,7 @@ fn other_programs_are_read() {
     // Words that are no numbers are named.
     for (words, named) in [
         (r#""resolution": "1080p""#, "'resolution'"),
+        (r#""resolution": "72""#, "'resolution'"),
         (r#""resolution": {"dpi": 72}"#, "'resolution'"),
         (r#""intrinsics": "file.txt""#, "'intrinsics'"),
         (r#""dist": "none""#, ""),
@@ -267,6 +268,67 @@ fn stretched_and_bent_pictures_are_straightened() {
     let x = (700.0 - 311.0) / 994.978;
     let (_, at) = straight.source_of(row.round() as usize, 700);
     assert_abs_diff_eq!(at, 311.0 + 994.978 * x * (1.0 - 0.3 * x * x), epsilon = 1e-3);
+}
+
+#[test]
+fn sizes_and_units_are_known_however_their_keys_are_written() {
+    let matrix = r#""K": [[1050, 0, 639.5], [0, 1050, 479.5], [0, 0, 1]]"#;
+    for size in [
+        r#""imageWidth": 1280, "imageHeight": 960"#,
+        r#""W": 1280, "H": 960"#,
+        r#""cols": 1280, "rows": 960"#,
+        r#""image_size": [1280, 960]"#,
+        r#""imageResolution": {"width": 1280, "height": 960}"#,
+        r#""imageResolution": [1280, 960]"#,
+        r#""image_size": "1280x960""#,
+    ] {
+        // A picture half as wide has half the focal length.
+        let data = read(&format!("{{{matrix}, {size}}}"), 480, 640).unwrap();
+        assert_eq!((data.fx_px, data.cx_px, data.cy_px, data.notes.len()), (525.0, 319.5, 239.5, 0), "{size}");
+    }
+    let message = read(&format!("{{{matrix}}}"), 480, 640).unwrap_err().to_string();
+    assert!(message.contains("(639.5, 479.5)") && message.contains("expected its width and height"), "{message}");
+    for (unit, expected_m) in [
+        (r#""png_depth_scale": 5000"#, Ok(2e-4)),
+        (r#""depth_factor": 1000"#, Ok(1e-3)),
+        (r#""depthScale": 4000"#, Ok(2.5e-4)),
+        (r#""depth_scale_factor": 1000.0"#, Ok(1e-3)),
+        (r#""depth_units": 0.0001"#, Ok(1e-4)),
+        (r#""depth_unit": "cm""#, Ok(1e-2)),
+        (r#""depth_unit": "5000/m""#, Ok(2e-4)),
+        (r#""depth_units": 1000"#, Err("codes a metre as depth_scale")),
+        (r#""depthScale": 0.001"#, Err("depthScale is 0.001")),
+        (r#""depth_unit": "zorp""#, Err("'zorp'")),
+    ] {
+        let text = GOOD.replace("\"source\"", &format!("{unit}, \"source\""));
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.json");
+        fs::write(&path, text).unwrap();
+        match (CameraFile::read(&path, Path::new("a.png")), expected_m) {
+            (Ok(file), Ok(expected_m)) => {
+                assert_eq!((file.depth_unit_m, file.notes.len()), (Some(expected_m), 0), "{unit}")
+            }
+            (Err(message), Err(word)) => assert!(message.to_string().contains(word), "{message}"),
+            (file, _) => panic!("{unit}: {file:?}"),
+        }
+    }
+}
+
+#[test]
+fn distortions_of_two_lists_are_those_of_one() {
+    let of = |own: &str| {
+        let text = format!("{{\"width\":640,\"height\":480,\"fx\":525,\"fy\":526,\"cx\":319.5,\"cy\":239.5,{own}}}");
+        read(&text, 480, 640).map(|data| data.distortion)
+    };
+    let one = of(r#""distortion": [0.12, -0.05, 0.004, -0.006, 0.01]"#).unwrap();
+    for two in [
+        r#""k": [0.12, -0.05, 0.01], "p": [0.004, -0.006]"#,
+        r#""radial": [0.12, -0.05, 0.01], "tangential": [0.004, -0.006]"#,
+        r#""radial_distortion": [0.12, -0.05, 0.01], "tangentialDistortion": [0.004, -0.006]"#,
+    ] {
+        assert_eq!(of(two).unwrap(), one, "{two}");
+    }
+    assert!(of(r#""k": [0.12, -0.05], "k1": 0.12"#).unwrap_err().to_string().contains("twice"));
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! What the names of columns say of their numbers, in tables of lights and of reflectances.
 
 /// Parts of the names of what is neither a power nor a reflectance; between spaces they are whole words.
-const NEITHER: [&str; 19] = [
+const NEITHER: [&str; 21] = [
     "absor",
     "kubelka",
     "extinction",
@@ -20,6 +20,8 @@ const NEITHER: [&str; 19] = [
     " rrs ",
     " mu a ",
     " f nu ",
+    " 1/sr ",
+    " sr 1 ",
     "raman",
 ];
 /// Words of that kind.
@@ -52,17 +54,35 @@ const WORDS: [&str; 24] = [
 /// What may stand beside these in the name of a quantity.
 const BESIDE: [&str; 10] = ["r", "t", "i", "a", "u", "nm", "sample", "reflectance", "transmittance", "value"];
 /// Parts of the names of shares, and of powers of which it is not known a what.
-const NO_POWERS: [&str; 9] =
-    ["transmi", "reflectance", "albedo", " %t ", " %r ", "wavenumber", " cm 1 ", "hz ", " ev "];
+const NO_POWERS: [&str; 10] =
+    ["transmi", "reflectance", "albedo", " %t ", " %r ", "wavenumber", " cm 1 ", "hz ", " ev ", "cumulat"];
 /// Parts of the names of light, and of what may be a reflectance's logarithm.
 const NO_REFLECTANCES: [&str; 7] = ["density", "radian", "emission", "w/m", "w m 2", "w/cm", "counts"];
 /// Shares, and what stands behind their names where 1 is no perfect white.
 const SHARES: [&str; 3] = ["reflectance", "transmittance", "albedo"];
 const SCALES: [&str; 8] = ["*1", "×1", "x1", "/1", "0-10", "0-255", "0-4095", "0-65535"];
 /// Words of what only counts.
-const COUNTS: [&str; 14] = [
-    "pixel", "pixels", "channel", "channels", "index", "sample", "samples", "time", "raman", "row", "column", "number",
-    "frame", "id",
+const COUNTS: [&str; 20] = [
+    "pixel",
+    "pixels",
+    "channel",
+    "channels",
+    "index",
+    "sample",
+    "samples",
+    "time",
+    "raman",
+    "row",
+    "column",
+    "number",
+    "frame",
+    "id",
+    "theta",
+    "angle",
+    "degrees",
+    "temperature",
+    "seconds",
+    "position",
 ];
 /// Words of photons, or parts of them.
 const PHOTONS: [&str; 6] = ["photon", "quanta", "quantum", "mol", "pfd", "einstein"];
@@ -144,6 +164,7 @@ mod tests {
             "Optical_Density",
             "emissivity",
             "Rrs (1/sr)",
+            "sr-1",
             "BRDF",
             "K/S",
             "mu_a",
@@ -153,7 +174,9 @@ mod tests {
         ] {
             assert!(is_no_power(name) && is_no_reflectance(name), "{name}");
         }
-        for name in ["Transmittance", "%T", "Reflectance (%)", "absolute log irradiance", "per cm^-1", "f_nu"] {
+        for name in
+            ["Transmittance", "%T", "Reflectance (%)", "absolute log irradiance", "per cm^-1", "f_nu", "cumulative"]
+        {
             assert!(is_no_power(name), "{name}");
         }
         for name in ["power", "abs irradiance", "intensity", "photon flux density", "W/nm", "catalog", "power density"]
@@ -173,6 +196,8 @@ mod tests {
             ("Channel", true),
             ("Index", true),
             ("Time (s)", true),
+            ("2theta", true),
+            ("Temperature (K)", true),
             ("Raman shift (cm-1)", true),
             ("wavelength", false),
             ("nm", false),

@@ -248,6 +248,23 @@ mod tests {
         let relative = read(&[[0, 65535, 32768, 16384]], words(None, Some("inverse:0.5,inf"))).unwrap();
         assert_eq!((relative[(0, 0)], relative[(0, 1)]), (f32::INFINITY, 0.5));
         assert!((relative[(0, 2)] - 1.0).abs() < 1e-4);
+        // Near at 0.5 m and far at 2 m are 2 and 0.5 a metre; reversed, without a far plane, and from -1 on.
+        for (kind, unit, code, expected_m) in [
+            ("buffer:0.5,2", "65535/m", 0, 0.5),
+            ("buffer:0.5,2", "1000/m", 500, 0.8),
+            ("buffer:0.5,inf", "1000/m", 750, 2.0),
+            ("buffer:inf,0.5", "1000/m", 250, 2.0),
+            ("ndc:0.5,2", "1000/m", 0, 0.8),
+            ("ndc:0.5,2", "1000/m", 1000, 2.0),
+        ] {
+            assert!((flat(kind, unit, code) - expected_m).abs() < 1e-6, "{kind} {code}");
+        }
+        let all = read(&[[0, 65535, 13107, 26214]], words(None, Some("buffer:0.5,2"))).unwrap();
+        for (own, expected) in all.iter().zip([0.5, 2.0, 1.0 / 1.7, 1.0 / 1.4]) {
+            assert!((own - expected).abs() < 1e-6, "{all}");
+        }
+        let wrong = read(&[[1001; 4]], words(Some("1000/m"), Some("buffer:0.5,2"))).unwrap_err().to_string();
+        assert!(wrong.contains("1001") && wrong.contains("from 0 to 1000"), "{wrong}");
         assert!(read(&[[1; 4]], words(Some("px"), None)).unwrap_err().to_string().contains("disparity"));
         assert!(read(&[[1; 4]], words(Some("mm"), Some("disparity:1"))).is_err());
         assert!(read(&[[1; 4]], words(Some("mm"), Some("inverse"))).is_err());

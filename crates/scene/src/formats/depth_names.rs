@@ -19,9 +19,25 @@ pub(super) struct SaidOfDepth {
 
 const DEPTHS: [&str; 4] = ["depth", "depths", "depthmap", "z"];
 const DISTANCES: [&str; 3] = ["distance", "distances", "dist"];
-const RAYS: [&str; 9] = ["ray", "rays", "raydepth", "radial", "euclidean", "slant", "slantrange", "sight", "range"];
+const RAYS: [&str; 11] = [
+    "ray",
+    "rays",
+    "raydepth",
+    "raylength",
+    "raydistance",
+    "radial",
+    "euclidean",
+    "slant",
+    "slantrange",
+    "sight",
+    "range",
+];
+/// What a file of numbers is called beside what they are.
+const OF_FILES: [&str; 8] = ["map", "maps", "image", "img", "pass", "frame", "raw", "data"];
 const MIST: &str = "its name says that it is a mist, whose numbers are no lengths: expected the pass of depth (Z), or --depth-unit or --depth-kind";
 const INVERSE: &str = "its name or words say that it holds disparities or inverse distances: expected --depth-kind, as disparity:BASELINE_M or inverse";
+const BUFFER: &str = "its name or words say that it is a depth buffer or holds normalized device coordinates, and no lengths: expected \
+                      --depth-kind buffer:NEAR_M,FAR_M (numbers from 0 to 1) or ndc:NEAR_M,FAR_M (from -1), or lengths and their --depth-unit";
 const RELATIVE: &str = "its name or words say that its numbers are relative, or logarithms, and no lengths: expected lengths, or --depth-unit or --depth-kind";
 
 impl SaidOfDepth {
@@ -46,16 +62,19 @@ impl SaidOfDepth {
         let own = words_of(stem);
         let has = |known: &[&str]| own.iter().any(|word| known.contains(&word.as_str()));
         let is_last = |known: &[&str]| {
-            let mut words = own.iter().filter(|word| length_m(word).is_none() && !is_number(word));
+            let mut words = own
+                .iter()
+                .filter(|word| length_m(word).is_none() && !is_number(word) && !OF_FILES.contains(&word.as_str()));
             words.next_back().is_some_and(|word| known.contains(&word.as_str()))
         };
         const LENGTHS: [&str; 7] = ["depth", "depths", "distance", "distances", "dist", "length", "lengths"];
         let is_axial = has(&["axial", "planar"]) || has_pair(&own, &["image"], &["plane"]);
-        let radial = has(&["radial", "euclidean", "raydepth", "slantrange"])
+        let radial = has(&["radial", "euclidean", "raydepth", "raylength", "raydistance", "slantrange"])
             || is_last(&DISTANCES)
             || is_last(&["range"])
             || has_pair(&own, &DISTANCES, &["to", "from"])
             || has_pair(&own, &DEPTHS, &["perspective"])
+            || has_pair(&own, &["perspective"], &DEPTHS)
             || has_pair(&own, &["ray"], &LENGTHS)
             || has_pair(&own, &LENGTHS, &["ray"]);
         let is_radial = if is_axial { Some(false) } else { radial.then_some(true) };
@@ -149,6 +168,9 @@ fn lacks(words: &[String]) -> Option<&'static str> {
     if is(&["mist"]) {
         return Some(MIST);
     }
+    if is(&["ndc", "zbuffer", "depthbuffer"]) || has_pair(words, &DEPTHS, &["buffer"]) {
+        return Some(BUFFER);
+    }
     if words.iter().any(|word| is_disparity(word) || word.contains("inverse")) || is(&INVERSES) {
         return Some(INVERSE);
     }
@@ -225,6 +247,11 @@ mod tests {
             "distance_mm",
             "raydepth",
             "slantrange_mm",
+            "distance_map",
+            "range_image_0001",
+            "rangeMap",
+            "perspective_depth",
+            "raylength",
         ] {
             assert_eq!(both(name), [Some(true); 2], "{name}");
         }
@@ -258,6 +285,11 @@ mod tests {
             "relative_depth",
             "depth_norm",
             "Mist",
+            "ndc_depth",
+            "depthNDC",
+            "zbuffer",
+            "depth_buffer_0001",
+            "zBuffer",
         ] {
             assert!(SaidOfDepth::of(name).lacks.is_some() && SaidOfDepth::of_file(name).lacks.is_some(), "{name}");
         }

@@ -10,7 +10,9 @@ use std::{
 use dioptric_spectrum::{Quantity, SpectralImage, WavelengthGrid};
 
 use super::{
+    belonging::{Reference, bare_stem},
     camera::CameraFile,
+    column_names::{is_no_power, is_no_reflectance},
     contents::{Contents, Image},
     depth::files_beside,
     envi_data::{EnviFile, Meaning, Wanted},
@@ -29,8 +31,6 @@ use crate::{SceneError, resample::resampling_weights};
 const LIMIT_HEADER_BYTES: u64 = 64 << 20;
 /// Bands of a cube and of its references that lie no farther apart are the same, nm.
 const SAME_BAND_NM: f64 = 0.1;
-/// What the names of cubes of a perfect white and of no light begin with.
-const REFERENCES: [&str; 2] = ["white_reference", "dark_reference"];
 /// Endings of the file of numbers beside `NAME.hdr`; none at all as well.
 const DATA_ENDINGS: [&str; 9] = ["", "raw", "img", "dat", "bsq", "bil", "bip", "bin", "cube"];
 
@@ -39,7 +39,8 @@ const DATA_ENDINGS: [&str; 9] = ["", "raw", "img", "dat", "bsq", "bil", "bip", "
 ///
 /// Numbers are light where the header's `data units` say so (`W/m^2/sr/nm`, `uW/(cm^2 sr nm)`, `photons/s/m^2/sr/nm` and their like)
 /// or `data gain values` make them so, or else reflectances relative to, in this order: the white level of the options, the header's
-/// `reflectance scale factor`, or the cubes `white_reference*.hdr` and `dark_reference*.hdr` beside the file.
+/// `reflectance scale factor`, or the cubes of white and of no light beside the file (`white_reference*.hdr`, `WHITEREF_NAME.hdr`,
+/// `darkReference.hdr`).
 ///
 /// # Errors
 /// Names the line and key of the header that is wrong, the file of numbers when it is absent or too short, or what is missing to
@@ -57,7 +58,7 @@ pub(super) fn contents_of_envi(path: &Path, options: &ReadOptions) -> Result<Con
     };
     notes.extend(references.iter().flat_map(|reference| reference.notes.clone()));
     if references.is_empty() {
-        let beside = [REFERENCES[0], REFERENCES[1]].map(|start| file.files_beside(start));
+        let beside = [Reference::White, Reference::Dark].map(|reference| file.files_beside(reference));
         let names = beside.into_iter().collect::<Result<Vec<_>, _>>()?.concat();
         notes.extend(note_of(path, "reference", &names.iter().map(|file| name_of(file)).collect::<Vec<_>>()));
     }
@@ -274,13 +275,18 @@ impl EnviFile {
         if is_plain { None } else { note_of(path, "unit", &[unit.to_owned()]) }
     }
 
-    /// Returns the note of a description that says something of the numbers, where options say what they are.
+    /// Returns the note of a description that says something of the numbers, where options say what they are, or more than the unit that it has.
     fn unused_description(&self, path: &Path, options: &ReadOptions) -> Option<String> {
-        let description = self.header.description.as_deref().filter(|words| tells(words))?;
+        let description = self.header.description.as_deref()?;
         let is_told =
             options.reading.quantity.is_some() || options.reading.unit.is_some() || options.white_level.is_some();
-        let is_used = self.header.data_units.as_deref().is_some_and(|unit| description.contains(unit));
-        if is_told && !is_used { note_of(path, "description", &[description.to_owned()]) } else { None }
+        let unit = self.header.data_units.as_deref().filter(|unit| !unit.is_empty());
+        let is_more = match unit.and_then(|unit| description.rsplit_once(unit)) {
+            // A factor may stand behind it.
+            Some((_, rest)) => rest.contains(|c: char| c.is_ascii_digit()),
+            None => is_told && (tells(description) || is_no_power(description) || is_no_reflectance(description)),
+        };
+        if is_more { note_of(path, "description", &[description.to_owned()]) } else { None }
     }
 
     /// Whether its units say that a perfect white is 100.
@@ -366,7 +372,7 @@ impl EnviFile {
         if header.are_gains_of_reflectance {
             return Ok((Meaning::Reflectance(scale), "reflectance by its gains".to_owned()));
         }
-        if let (Some(white), Some(dark)) = (self.beside(REFERENCES[0])?, self.beside(REFERENCES[1])?) {
+        if let (Some(white), Some(dark)) = (self.beside(Reference::White)?, self.beside(Reference::Dark)?) {
             let what =
                 format!("reflectance between {} and {}", name_of(&white.header_path), name_of(&dark.header_path));
             self.check_reference(&white)?;
@@ -382,8 +388,8 @@ impl EnviFile {
         let unknown =
             unknown.map_or_else(String::new, |text| format!(", and '{}' is no unit of radiance", short(text)));
         units(format!(
-            "nothing tells what a perfect white is{unknown}: expected 'reflectance scale factor' in the header, white_reference and \
-             dark_reference files beside it, a white level (--white-level), or what the numbers are (--quantity, --unit)"
+            "nothing tells what a perfect white is{unknown}: expected 'reflectance scale factor' in the header, cubes \
+             white_reference and dark_reference beside it (or WHITEREF_… and DARKREF_…), a white level (--white-level), or what the numbers are (--quantity, --unit)"
         ))
     }
 
@@ -476,23 +482,29 @@ impl EnviFile {
         theirs.iter().filter_map(other).collect()
     }
 
-    /// Returns the headers beside this one whose names start so, in their order.
-    fn files_beside(&self, start: &str) -> Result<Vec<PathBuf>, SceneError> {
+    /// Returns the headers of references beside this one, in their order: those with its own name, or else all.
+    fn files_beside(&self, wanted: Reference) -> Result<Vec<PathBuf>, SceneError> {
         let folder = self.header_path.parent().filter(|folder| !folder.as_os_str().is_empty());
         let folder = folder.unwrap_or(Path::new("."));
         let entries = fs::read_dir(folder).map_err(|error| unreadable(folder, error))?;
-        let mut found: Vec<PathBuf> = entries
+        let own = bare_stem(&name_of(&self.header_path));
+        let mut found: Vec<(bool, PathBuf)> = entries
             .filter_map(|entry| Some(entry.ok()?.path()))
-            .filter(|path| path.extension().is_some_and(|e| e == "hdr") && *path != self.header_path)
-            .filter(|path| path.file_name().is_some_and(|name| name.to_string_lossy().starts_with(start)))
+            .filter(|path| path.extension().is_some_and(|e| e.eq_ignore_ascii_case("hdr")) && *path != self.header_path)
+            .filter_map(|path| {
+                let found = Reference::of_name(&name_of(&path), &own).filter(|(reference, _)| *reference == wanted);
+                found.map(|(_, is_own)| (!is_own, path))
+            })
             .collect();
         found.sort();
-        Ok(found)
+        // Those with its name are its own, others of other cubes.
+        let has_own = found.first().is_some_and(|(is_other, _)| !is_other);
+        Ok(found.into_iter().filter(|(is_other, _)| !(has_own && *is_other)).map(|(_, path)| path).collect())
     }
 
-    /// Opens the cube beside this one whose name starts so, if there is one.
-    fn beside(&self, start: &str) -> Result<Option<Self>, SceneError> {
-        let found = self.files_beside(start)?;
+    /// Opens the reference beside this cube, if there is one.
+    fn beside(&self, wanted: Reference) -> Result<Option<Self>, SceneError> {
+        let found = self.files_beside(wanted)?;
         let Some((first, others)) = found.split_first() else { return Ok(None) };
         let mut reference = Self::open(first, None, Some(&self.wavelengths_nm))?;
         // What a reference holds is a perfect white, or darkness, whatever else its header makes of its numbers.

@@ -211,6 +211,62 @@ fn what_titles_and_descriptions_say_of_numbers_is_obeyed_or_named() {
 }
 
 #[test]
+fn references_are_known_as_cameras_call_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let (text, bytes) = (header(1, "bsq", 0), samples(1, "bsq", 0));
+    let path = write(folder.path(), "451", &text, &bytes);
+    // Specim's of another cube count where there are no others.
+    for (white, dark, level) in [
+        ("WHITEREF_450", "DARKREF_450", 101),
+        ("whiteReference", "darkReference", 101),
+        ("451_white_reference", "451_dark_reference", 201),
+        ("WHITEREF_451", "DARKREF_451", 201),
+    ] {
+        write(folder.path(), white, &text, &[level; 29]);
+        write(folder.path(), dark, &text, &[1; 29]);
+        let (image, _) = read_with(&path, &ReadOptions::default()).unwrap();
+        assert_eq!(image.spectrum_at(0, 1)[0], 100.0 / f64::from(level - 1), "{white}");
+        let told = ReadOptions { white_level: Some(100.0), ..ReadOptions::default() };
+        let (_, notes) = read_with(&path, &told).unwrap();
+        assert!(notes.iter().any(|note| note.contains(&format!("'{white}.hdr'"))), "{notes:?}");
+    }
+}
+
+#[test]
+fn a_black_body_is_one_in_every_unit() {
+    // Planck's law by its variable, with constants of CODATA 2018.
+    const H: f64 = 6.626_070_15e-34;
+    const C: f64 = 299_792_458.0;
+    const KT: f64 = 1.380_649e-23 * 5000.0;
+    const EV: f64 = 1.602_176_634e-19;
+    let bose = |joules: f64| 1.0 / (joules / KT).exp_m1();
+    let folder = tempfile::tempdir().unwrap();
+    let text = header(4, "bsq", 0).replace("header offset = 5", "header offset = 0");
+    let per_nm = |m: f64| 1e-9 * 2.0 * H * C.powi(2) / m.powi(5) * bose(H * C / m);
+    let per_hz = |m: f64| 2.0 * H * (C / m).powi(3) / C.powi(2) * bose(H * C / m);
+    let laws: [(&str, &dyn Fn(f64) -> f64); 9] = [
+        ("W/m^2/sr/nm", &per_nm),
+        ("uW/cm^2/sr/nm", &|m| 100.0 * per_nm(m)),
+        ("photons/s/m^2/sr/nm", &|m| per_nm(m) * m / (H * C)),
+        ("W/m^2/sr/Hz", &per_hz),
+        ("W m-2 sr-1 THz-1", &|m| 1e12 * per_hz(m)),
+        ("W/m^2/sr/cm^-1", &|m| 100.0 * 2.0 * H * C.powi(2) / m.powi(3) * bose(H * C / m)),
+        ("mW m-2 sr-1 (cm-1)-1", &|m| 1e5 * 2.0 * H * C.powi(2) / m.powi(3) * bose(H * C / m)),
+        ("W/m^2/sr/eV", &|m| 2.0 * (H * C / m).powi(3) / (H.powi(3) * C.powi(2)) * bose(H * C / m) * EV),
+        ("photons/s/m^2/sr/eV", &|m| 2.0 * (H * C / m).powi(2) / (H.powi(3) * C.powi(2)) * bose(H * C / m) * EV),
+    ];
+    for (unit, law) in laws {
+        let bytes: Vec<u8> =
+            [600e-9, 500e-9].into_iter().flat_map(|m| (law(m) as f32).to_le_bytes().repeat(12)).collect();
+        let path = write(folder.path(), "a", &format!("{text}data units = {unit}\n"), &bytes);
+        let (image, _) = read_with(&path, &ReadOptions::default()).unwrap();
+        for (own, m) in image.spectrum_at(2, 1).into_iter().zip([500e-9, 600e-9]) {
+            approx::assert_relative_eq!(own, per_nm(m), max_relative = 2e-7);
+        }
+    }
+}
+
+#[test]
 fn references_of_other_settings_and_those_that_do_not_count_are_named() {
     let folder = tempfile::tempdir().unwrap();
     let (text, bytes) = (header(1, "bsq", 0), samples(1, "bsq", 0));

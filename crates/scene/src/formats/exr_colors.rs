@@ -7,7 +7,7 @@ use exr::meta::attribute::Chromaticities;
 use glam::{DMat3, DVec3};
 use ndarray::Array2;
 
-use super::{stated::Stated, unusable::unreadable};
+use super::{exr_depth::COMPOSITE, stated::Stated, unusable::unreadable};
 use crate::SceneError;
 
 /// The channels that a picture has.
@@ -29,11 +29,11 @@ pub(super) enum ColorsOf {
     Xyz,
 }
 
-/// Takes red, green and blue of the layer told, or else `R`, `G` and `B`, or those of a layer, Blender's `….Combined` before others; or
+/// Takes red, green and blue of the layer told, or else `R`, `G` and `B`, or those of a layer, Blender's only `….Combined` before others; or
 /// `X`, `Y` and `Z`; or gray, `Y`. Returns what they are, and them with what stands before their letters.
 ///
 /// # Errors
-/// When there are no such channels, or layers of which none is called a picture.
+/// When there are no such channels, or layers of which none, or several, are called a picture.
 pub(super) fn colors_of(
     path: &Path,
     channels: &mut Stated<Array2<f32>>,
@@ -65,8 +65,9 @@ pub(super) fn colors_of(
     };
     let shown = |prefix: &&str| if prefix.is_empty() { "one without a name".to_owned() } else { format!("'{prefix}'") };
     let listed = || prefixes.iter().map(shown).collect::<Vec<_>>().join(", ");
-    let is_called = |prefix: &&&str| is_called_picture(prefix);
-    let of_picture = || prefixes.iter().find(|prefix| prefix.is_empty()).or_else(|| prefixes.iter().find(is_called));
+    let is_whole = |prefix: &&&str| prefix.is_empty() || **prefix == COMPOSITE;
+    let called: Vec<&&str> = prefixes.iter().filter(|prefix| is_called_picture(prefix)).collect();
+    let of_picture = || prefixes.iter().find(is_whole).or(called.first().copied().filter(|_| called.len() == 1));
     let prefix = match told {
         Some(told) => {
             let found = prefixes.iter().find(|prefix| **prefix == told);
@@ -182,6 +183,15 @@ mod tests {
         let names: Vec<&str> = both.iter().map(String::as_str).collect();
         let (prefix, left) = take(&names).unwrap();
         assert_eq!((prefix.as_str(), left.len()), ("V.Combined", 3));
+        let both = [pass("A.Combined"), pass("Composite.Combined")].concat();
+        assert_eq!(take(&both.iter().map(String::as_str).collect::<Vec<_>>()).unwrap().0, "Composite.Combined");
+        let both = [pass("A.Combined"), pass("B.Combined")].concat();
+        assert!(
+            take(&both.iter().map(String::as_str).collect::<Vec<_>>())
+                .unwrap_err()
+                .to_string()
+                .contains("'B.Combined'")
+        );
         assert_eq!(take(&["Y"]).unwrap().0, "");
         assert_eq!(take(&["A", "X", "Y", "Z"]).unwrap().1, ["A"]);
         assert!(take(&["Y", "RY", "BY"]).is_err() && take(&["R", "G"]).is_err());

@@ -6,6 +6,9 @@ use ndarray::Array2;
 
 use super::{reading::DepthKind, stated::Stated};
 
+/// The picture that Blender's compositor makes of its view layers.
+pub(super) const COMPOSITE: &str = "Composite.Combined";
+
 /// What the name of a channel says that it counts: `….T` of Mitsuba is a way along a ray.
 pub(super) fn kind_of(name: &str) -> DepthKind {
     let last = name.rsplit('.').next().unwrap_or(name);
@@ -27,8 +30,10 @@ pub(super) fn note_of_kind(path: &Path, name: &str) -> Option<String> {
 pub(super) fn depth_name<'a>(names: impl Iterator<Item = &'a str>, prefix: &str) -> Option<(String, DepthKind)> {
     let names: Vec<&str> = names.collect();
     let mut wanted = vec![];
-    if let Some(layer) = prefix.strip_suffix("Combined") {
-        wanted.extend(["Z", "V"].map(|letter| format!("{layer}Depth.{letter}")));
+    if prefix.contains("Combined") {
+        // An eye may stand behind it.
+        let depth = prefix.replacen("Combined", "Depth", 1);
+        wanted.extend(["Z", "V"].map(|letter| format!("{depth}.{letter}")));
     } else if !prefix.is_empty() {
         wanted.push(format!("{prefix}.Z"));
     }
@@ -41,7 +46,7 @@ pub(super) fn depth_name<'a>(names: impl Iterator<Item = &'a str>, prefix: &str)
     if let Some(name) = wanted.into_iter().find(|name| names.contains(&name.as_str()) && !is_of_three(name)) {
         return Some((name, DepthKind::Axial));
     }
-    if prefix.is_empty() {
+    if prefix.is_empty() || prefix == COMPOSITE {
         let is_depth = |name: &&&str| name.ends_with(".Depth.Z") || name.ends_with(".Depth.V");
         let found: Vec<&&str> = names.iter().filter(is_depth).collect();
         if let [one] = found[..] {
@@ -100,6 +105,10 @@ mod tests {
         check(&["A.Depth.Z", "B.Denoising Depth.Z"], "B.Combined", None);
         check(&["V.Denoising Depth.Z", "V.Depth.V"], "V.Combined", Some("V.Depth.V"));
         check(&["A.Depth.Z", "B.Depth.Z"], "", None);
+        check(&["A.Depth.left.Z", "A.Depth.right.Z"], "A.Combined.right", Some("A.Depth.right.Z"));
+        // That of the only view layer.
+        check(&["A.Depth.Z", "A.Combined.R"], "Composite.Combined", Some("A.Depth.Z"));
+        check(&["A.Depth.Z", "B.Depth.Z"], "Composite.Combined", None);
         check(&["A.Depth.Z", "A.Noisy.R"], "", Some("A.Depth.Z"));
         check(&["distance", "Z"], "", Some("Z"));
         check(&["X", "Y", "Z"], "", None);

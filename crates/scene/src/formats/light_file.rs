@@ -12,7 +12,7 @@ use super::{
     mat::{has_variable, read_mat_matrices},
     stated::short,
     unusable::unreadable,
-    wavelength_unit::{comments_of, unit_in, unit_of_waves, wavelengths_of_column},
+    wavelength_unit::{behind_unit, comments_of, unit_in, unit_of_waves, wavelengths_of_column},
 };
 use crate::SceneError;
 
@@ -78,7 +78,7 @@ pub fn read_light(path: &Path) -> Result<Illuminant, SceneError> {
 /// Returns the unit of a light's numbers, by the name of their column or, where that has none, by what comments say.
 ///
 /// # Errors
-/// When it is none of a power, or of photons, or free words speak of photons.
+/// When it is none of a power, or of photons, or free words speak of photons or of a share.
 fn unit_of_power<'a>(name: &str, comments: impl Iterator<Item = &'a str>) -> Result<LightUnit, String> {
     if let Some(unit) = power_in(name).map_err(|what| format!("its column {what}"))? {
         return Ok(unit);
@@ -90,8 +90,10 @@ fn unit_of_power<'a>(name: &str, comments: impl Iterator<Item = &'a str>) -> Res
             return Ok(unit);
         }
         let lower = comment.to_lowercase();
-        let is_of_photons = |word: &str| ["photon", "quanta", "pfd", "ppfd"].iter().any(|own| word.starts_with(own));
-        if lower.split(|c: char| !c.is_alphabetic()).any(is_of_photons) {
+        const OTHERS: [&str; 9] =
+            ["photon", "quanta", "pfd", "ppfd", "reflectance", "transmittance", "absorbance", "albedo", "counts"];
+        let is_other = |word: &str| OTHERS.iter().any(|own| word.starts_with(own));
+        if lower.split(|c: char| !c.is_alphabetic()).any(is_other) {
             return Err(format!(
                 "it says '{}': expected the name of its second column to say whether its numbers are photons or watts",
                 short(comment)
@@ -116,10 +118,8 @@ fn power_in(name: &str) -> Result<Option<LightUnit>, String> {
 /// Returns what of a comment is about the numbers of a light: what stands behind the word for a unit, the last of the names of columns, or all of
 /// one that is short.
 fn said_of_power(comment: &str) -> Option<&str> {
-    let lower = comment.to_lowercase();
-    if let Some(at) = lower.rfind("unit") {
-        let rest = comment.get(at + "unit".len()..)?.trim_start_matches(['s', ')', ':', '=', ' ']);
-        return Some(rest).filter(|rest| unit_in(rest).is_none_or(|unit| unit != *rest));
+    if let Some(rest) = behind_unit(comment) {
+        return Some(rest).filter(|rest| unit_in(rest) != Some(rest));
     }
     let names: Vec<&str> = comment.split([',', ';', '\t']).map(str::trim).collect();
     if names.len() > 1 && unit_of_waves(names[0]).is_some() {
@@ -146,7 +146,7 @@ fn light_of(wavelengths_nm: &[f64], values: &[f64]) -> Result<Illuminant, String
 /// Reads a light of `ISETCam`: `wavelength`, nm, and `data`, energy, as `ieReadSpectra.m` has them.
 fn of_iset(path: &Path) -> Result<Illuminant, SceneError> {
     const WAVES: [&str; 2] = ["wavelength", "wave"];
-    if let Some(name) = ["units", "unit"].into_iter().find(|name| has_variable(path, name)) {
+    if let Some(name) = ["units", "unit", "quantity"].into_iter().find(|name| has_variable(path, name)) {
         let reason = format!("its '{name}' is not read: expected energy a nanometre, and the file without it");
         return Err(unreadable(path, reason));
     }
@@ -208,6 +208,8 @@ mod tests {
             "Wavelength (Å)  Power [W/nm]\n4000 1\n5000 2\n8000 1\n",
             "wavelength in Angstroms\n4000 1\n5000 2\n8000 1\n",
             "% Angstrom power\n4000 1\n5000 2\n8000 1\n",
+            "# units: Angstrom\n4000 1\n5000 2\n8000 1\n",
+            "Units: Å\nx, y\n4000, 1\n5000, 2\n8000, 1\n",
             "# Wavelength (Angstroms), flux\n4000 1\n5000 2\n8000 1\n",
             "nm, quantum flux\n400, 400\n500, 1000\n800, 800\n",
             "nm, PPFD\n400, 400\n500, 1000\n800, 800\n",
@@ -242,6 +244,7 @@ mod tests {
             ("nm,f_nu\n400, 1\n500, 2\n", "'f_nu' is no power"),
             ("# Units: counts\n400 1\n500 2\n", "'counts' is no power"),
             ("# dB\n400 1\n500 2\n", "'dB' is no power"),
+            ("# reflectance of white tile\n400 1\n500 2\n", "'reflectance of white tile'"),
             ("# not photons\n400 1\n500 2\n", "'not photons'"),
             ("Pixel,power\n400, 1\n500, 2\n", "'Pixel' holds no wavelengths"),
             ("Light in photons\nnm, a\n400, 1\n500, 2\n", "photons"),

@@ -83,7 +83,12 @@ impl LightUnit {
 fn endings(text: &str) -> impl Iterator<Item = (&str, &str)> {
     let is_between = |c: char| c.is_whitespace() || "([:=,".contains(c);
     let inner = text.char_indices().filter(move |(_, c)| is_between(*c)).map(|(at, c)| at + c.len_utf8());
-    std::iter::once(0).chain(inner).map(|at| {
+    // What is in brackets follows by itself.
+    let is_whole = |at: &usize| {
+        let rest = text[*at..].trim();
+        rest.starts_with('(') && group(rest).is_some_and(|(.., behind)| behind.is_empty() && rest.ends_with(')'))
+    };
+    std::iter::once(0).chain(inner).filter(move |at| !is_whole(at)).map(|at| {
         let (before, rest) = text.split_at(at);
         let rest = rest.trim();
         let n = |signs: [char; 2]| rest.matches(signs).count();
@@ -96,6 +101,8 @@ fn endings(text: &str) -> impl Iterator<Item = (&str, &str)> {
 fn symbols(text: &str) -> String {
     let raised = [('⁻', "-"), ('⁰', "0"), ('¹', "1"), ('²', "2"), ('³', "3")];
     let text = raised.iter().fold(text.to_owned(), |text, (from, to)| text.replace(*from, to));
+    // Exponents of LaTeX.
+    let text = text.replace(['{', '}', '$'], "");
     let mut result = String::new();
     let mut is_square = false;
     let mut rest = text.as_str();
@@ -142,30 +149,39 @@ fn symbols(text: &str) -> String {
     result
 }
 
-/// Whether what is read stands below a line of a fraction.
-#[derive(Clone, Copy, PartialEq)]
-enum Below {
-    No,
-    Next,
-    Group,
-}
-
 /// Splits `cm^-2 …` into its name, its exponent and the rest.
 fn power(text: &str) -> Option<(&str, i32, &str)> {
     let end = text.find(|c: char| !c.is_alphabetic()).unwrap_or(text.len());
     let (name, rest) = text.split_at(end);
-    let rest = rest.strip_prefix("**").or_else(|| rest.strip_prefix('^')).unwrap_or(rest);
+    let (exponent, rest) = exponent(rest)?;
+    (!name.is_empty()).then_some((name, exponent, rest))
+}
+
+/// Splits `(cm^-1)^-1 …` into what is in the brackets, its exponent and the rest.
+fn group(text: &str) -> Option<(&str, i32, &str)> {
+    let mut depth = 0;
+    let (end, _) = text.char_indices().find(|(_, c)| {
+        depth += i32::from(*c == '(') - i32::from(*c == ')');
+        depth == 0
+    })?;
+    let (exponent, rest) = exponent(&text[end + 1..])?;
+    Some((&text[1..end], exponent, rest))
+}
+
+/// Splits `^-2 …` into the number and the rest; 1 where there is none.
+fn exponent(text: &str) -> Option<(i32, &str)> {
+    let rest = text.strip_prefix("**").or_else(|| text.strip_prefix('^')).unwrap_or(text);
     let digits = rest.strip_prefix(['-', '+', '−']).unwrap_or(rest);
     let n_digits = digits.bytes().take_while(u8::is_ascii_digit).count();
-    if name.is_empty() || n_digits > 2 {
-        return None;
+    match n_digits {
+        0 => Some((1, rest)),
+        1 | 2 => {
+            let number: i32 = digits[..n_digits].parse().ok()?;
+            let sign = if rest.starts_with(['-', '−']) { -1 } else { 1 };
+            Some((sign * number, &digits[n_digits..]))
+        }
+        _ => None,
     }
-    if n_digits == 0 {
-        return Some((name, 1, rest));
-    }
-    let number: i32 = digits[..n_digits].parse().ok()?;
-    let sign = if rest.starts_with(['-', '−']) { -1 } else { 1 };
-    Some((name, sign * number, &digits[n_digits..]))
 }
 
 /// Exponents of what a unit is made of, and its factor.
@@ -188,28 +204,32 @@ struct Sum {
 impl Sum {
     /// Returns the sum of the exponents of a text; `None` of what is no product of units.
     fn of(text: &str) -> Option<Self> {
-        let text = symbols(text);
         let mut sum = Self::default();
+        sum.add_product(&symbols(text), 1)?;
+        Some(sum)
+    }
+
+    /// Adds the exponents of a product of units, so many times.
+    fn add_product(&mut self, text: &str, times: i32) -> Option<()> {
         let mut rest = text.trim();
-        let mut below = Below::No;
+        let mut sign = 1;
         while let Some(first) = rest.chars().next() {
             match first {
-                '/' => (below, rest) = (Below::Next, &rest[1..]),
-                '(' if below == Below::Next => (below, rest) = (Below::Group, &rest[1..]),
-                ')' if below == Below::Group => (below, rest) = (Below::No, &rest[1..]),
+                '/' if sign == 1 => (sign, rest) = (-1, &rest[1..]),
                 _ if first.is_whitespace() || matches!(first, '.' | '*' | '·') => rest = &rest[first.len_utf8()..],
+                '(' => {
+                    let (inner, exponent, after) = group(rest)?;
+                    self.add_product(inner, times * sign * exponent)?;
+                    (sign, rest) = (1, after);
+                }
                 _ => {
                     let (name, exponent, after) = power(rest)?;
-                    let sign = if below == Below::No { 1 } else { -1 };
-                    sum.add(name, sign * exponent)?;
-                    if below == Below::Next {
-                        below = Below::No;
-                    }
-                    rest = after;
+                    self.add(name, times * sign * exponent)?;
+                    (sign, rest) = (1, after);
                 }
             }
         }
-        (below == Below::No).then_some(sum)
+        (sign == 1).then_some(())
     }
 
     fn add(&mut self, name: &str, exponent: i32) -> Option<()> {
@@ -361,6 +381,11 @@ mod tests {
             ("W/m2/cm-1/sr", 40.0),
             ("W m-2 sr-1 cm", 40.0),
             ("mW/(m^2 sr cm^-1)", 0.04),
+            ("W m-2 sr-1 (cm-1)-1", 40.0),
+            ("W m-2 sr-1 (cm^-1)^-1", 40.0),
+            ("(W/m^2/sr)/(cm^-1)", 40.0),
+            ("W m^{-2} sr^{-1} (cm^{-1})^{-1}", 40.0),
+            ("mW/(m^2/sr^-1)/cm^-1", 0.04),
             ("W/m^2/sr/THz", 1.199_169_832),
             ("W/m2/sr/eV", 4.959_367_936e-3),
             ("erg/s/cm2/sr/A", 1e-2),

@@ -8,7 +8,7 @@ use super::{
 };
 use crate::SceneError;
 
-const MAGIC: &[u8] = b"\x93NUMPY";
+pub(super) const MAGIC: &[u8] = b"\x93NUMPY";
 
 /// An array of real numbers.
 #[derive(Clone, Debug, PartialEq)]

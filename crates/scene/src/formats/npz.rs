@@ -14,10 +14,10 @@ use super::{
     contents::Cube,
     depth_names::is_called,
     mat::{DEPTHS, Nearness, nearest_list, rank_of_waves},
-    npy::{NpyArray, is_array_of, npy_bytes, parse, parse_complex},
+    npy::{self, NpyArray, is_array_of, npy_bytes, parse, parse_complex},
     read_options::ReadOptions,
     stated::{Noted, name_of, note_of, short},
-    unusable::{check_memory, fault, open_new, unreadable, unwritable},
+    unusable::{check_memory, fault, open_new, starts_with, unreadable, unwritable},
     wavelength_unit::{listed_nm, unit_in},
 };
 use crate::SceneError;
@@ -41,6 +41,9 @@ impl<'a> Archive<'a> {
         let wrong = |reason: String| unreadable(path, reason);
         let file = File::open(path).map_err(|error| unreadable(path, error))?;
         let length = file.metadata().map_err(|error| unreadable(path, error))?.len();
+        if starts_with(path, npy::MAGIC)? {
+            return Err(wrong("it is one array of NumPy, expected the ending .npy".to_owned()));
+        }
         let zip = ZipArchive::new(BufReader::new(file)).map_err(|error| wrong(of_zip(&error)))?;
         let names = zip.file_names().map(|name| Ok(name?.into_owned())).collect::<Result<Vec<String>, ZipError>>();
         let names = names.map_err(|error| wrong(of_zip(&error)))?;

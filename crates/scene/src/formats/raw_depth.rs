@@ -85,7 +85,7 @@ impl RawDepth {
             DepthUnit::Metres(_) => !(is_disparity || is_inverse && words.unit.is_some_and(is_length)),
         };
         if fits {
-            return self.between_anchors();
+            return self.between_anchors(words.unit.is_some());
         }
         Err(SceneError::Setting {
             what: "the unit of the depth",
@@ -95,18 +95,35 @@ impl RawDepth {
         })
     }
 
-    /// Makes inverse distances of numbers whose largest and smallest are told: those of all the file, before a part of them is taken.
-    fn between_anchors(mut self) -> Result<Self, SceneError> {
-        let DepthKind::InverseBetween { near_m, far_m } = self.kind else { return Ok(self) };
-        let finite = self.values.iter().copied().filter(|v| v.is_finite());
-        let (low, high) = finite.fold((f32::INFINITY, f32::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)));
+    /// Makes inverse distances of numbers between two that are told: the smallest and the largest, those of all the file before a part of them is
+    /// taken, or the ends of a depth buffer, of which a unit may be told.
+    fn between_anchors(mut self, has_unit: bool) -> Result<Self, SceneError> {
+        let one = match (self.unit, self.top.filter(|_| !has_unit)) {
+            (_, Some(top)) => top,
+            (DepthUnit::Metres(factor) | DepthUnit::Samples(factor), None) => 1.0 / factor,
+        };
+        let ([low, high], [low_m, high_m]) = match self.kind {
+            DepthKind::InverseBetween { near_m, far_m } => {
+                let finite = self.values.iter().copied().filter(|v| v.is_finite()).map(f64::from);
+                let ends = finite.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], v| [a.min(v), b.max(v)]);
+                (ends, [far_m, near_m])
+            }
+            DepthKind::Buffer { near_m, far_m } => ([0.0, one], [near_m, far_m]),
+            DepthKind::Ndc { near_m, far_m } => ([-one, one], [near_m, far_m]),
+            _ => return Ok(self),
+        };
         if high.partial_cmp(&low) != Some(std::cmp::Ordering::Greater) {
             return Err(unreadable(&self.file, "its numbers are all alike, expected some between two anchors"));
         }
-        let (near, far) = (1.0 / near_m, 1.0 / far_m);
+        // Rounding may leave the ends.
+        let ends = low - 1e-6 * (high - low)..=high + 1e-6 * (high - low);
+        if let Some(other) = self.values.iter().find(|v| v.is_finite() && !ends.contains(&f64::from(**v))) {
+            let reason = format!("it holds {other}, expected numbers from {low} to {high}, as depth buffers have them");
+            return Err(unreadable(&self.file, reason));
+        }
         self.values.mapv_inplace(|v| {
-            let share = f64::from(v - low) / f64::from(high - low);
-            if v.is_finite() { (far + share * (near - far)) as f32 } else { v }
+            let share = (f64::from(v) - low) / (high - low);
+            if v.is_finite() { (1.0 / low_m + share * (1.0 / high_m - 1.0 / low_m)) as f32 } else { v }
         });
         self.unit = DepthUnit::Metres(1.0);
         Ok(self)
@@ -195,7 +212,10 @@ impl RawDepth {
                 })
             }
             // The inverse of nothing is the sky; what is no number was not measured.
-            DepthKind::Inverse | DepthKind::InverseBetween { .. } => self.values.mapv(|v| {
+            DepthKind::Inverse
+            | DepthKind::InverseBetween { .. }
+            | DepthKind::Buffer { .. }
+            | DepthKind::Ndc { .. } => self.values.mapv(|v| {
                 let inverse = f64::from(v) * factor;
                 // The sum has no 0 below 0.
                 if v.is_finite() { along(1.0 / (inverse + 0.0)) } else { 0.0 }
@@ -219,6 +239,7 @@ impl RawDepth {
             DepthKind::Axial => "along the axis",
             DepthKind::Radial => "from distances from the camera",
             DepthKind::Inverse | DepthKind::InverseBetween { .. } => "from inverse distances",
+            DepthKind::Buffer { .. } | DepthKind::Ndc { .. } => "from a depth buffer",
             DepthKind::Disparity { .. } => "from disparities",
         };
         format!("{kind}, of {}", self.from)

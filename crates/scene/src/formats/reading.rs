@@ -259,6 +259,20 @@ pub enum DepthKind {
         /// The axial distance of the smallest, m; `inf` for the sky.
         far_m: f64,
     },
+    /// The depth buffer of a renderer, evenly in 1 over the distance along the axis, or so many whole numbers in place of 1.
+    Buffer {
+        /// The axial distance of 0, m: of the near plane, or of the far one where the buffer is reversed; `inf` for none.
+        near_m: f64,
+        /// The axial distance of 1, m.
+        far_m: f64,
+    },
+    /// Normalized device coordinates: as `Buffer`, from -1 to 1.
+    Ndc {
+        /// The axial distance of -1, m.
+        near_m: f64,
+        /// The axial distance of 1, m.
+        far_m: f64,
+    },
     /// The shift between two cameras side by side, samples: focal length × baseline / distance.
     Disparity {
         /// The distance between the cameras, m.
@@ -279,6 +293,12 @@ impl DepthKind {
             Self::InverseBetween { near_m, far_m } if !(near_m > 0.0 && near_m.is_finite() && far_m > near_m) => {
                 Err(setting("the pair of anchors of the depth", &format!("{near_m} m and {far_m} m"), "0 < near < far"))
             }
+            Self::Buffer { near_m, far_m } | Self::Ndc { near_m, far_m }
+                if !(near_m > 0.0 && far_m > 0.0 && near_m != far_m) =>
+            {
+                let value = format!("{near_m} m and {far_m} m");
+                Err(setting("the pair of planes of the depth", &value, "two distances above 0"))
+            }
             Self::Disparity { baseline_m, offset_px } => {
                 positive("the baseline of the disparity", baseline_m)?;
                 if offset_px.is_finite() {
@@ -294,10 +314,12 @@ impl DepthKind {
 impl FromStr for DepthKind {
     type Err = SceneError;
 
-    /// Reads `axial`, `radial`, `inverse`, `inverse:NEAR_M,FAR_M` or `disparity:BASELINE_M[,OFFSET_PX]`.
+    /// Reads `axial`, `radial`, `inverse`, `inverse:NEAR_M,FAR_M`, `buffer:NEAR_M,FAR_M`, `ndc:NEAR_M,FAR_M` or
+    /// `disparity:BASELINE_M[,OFFSET_PX]`.
     fn from_str(text: &str) -> Result<Self, SceneError> {
         let wrong = || {
-            let expected = "axial, radial, inverse, inverse:NEAR_M,FAR_M or disparity:BASELINE_M[,OFFSET_PX]";
+            let expected = "axial, radial, inverse, inverse:NEAR_M,FAR_M, buffer:NEAR_M,FAR_M, ndc:NEAR_M,FAR_M or \
+                            disparity:BASELINE_M[,OFFSET_PX]";
             setting("the kind of depth", &format!("'{text}'"), expected)
         };
         let (word, numbers) = text.trim().split_once(':').unwrap_or((text.trim(), ""));
@@ -309,6 +331,8 @@ impl FromStr for DepthKind {
             ("radial", []) => Self::Radial,
             ("inverse", []) => Self::Inverse,
             ("inverse", &[near_m, far_m]) => Self::InverseBetween { near_m, far_m },
+            ("buffer", &[near_m, far_m]) => Self::Buffer { near_m, far_m },
+            ("ndc", &[near_m, far_m]) => Self::Ndc { near_m, far_m },
             ("disparity", &[baseline_m]) => Self::Disparity { baseline_m, offset_px: 0.0 },
             ("disparity", &[baseline_m, offset_px]) => Self::Disparity { baseline_m, offset_px },
             _ => return Err(wrong()),
@@ -486,7 +510,18 @@ mod tests {
 
     #[test]
     fn words_that_are_none_are_refused() {
-        for text in ["", "inverse:1", "inverse:2,1", "disparity", "disparity:0", "axial:1", "inverse:a,b", "z"] {
+        for text in [
+            "",
+            "inverse:1",
+            "inverse:2,1",
+            "disparity",
+            "disparity:0",
+            "axial:1",
+            "inverse:a,b",
+            "z",
+            "buffer:1",
+            "ndc:0,1",
+        ] {
             assert!(text.parse::<DepthKind>().is_err(), "{text}");
         }
         for text in ["", "0/m", "-1/m", "nan/m", "inch", "/m", "5000"] {

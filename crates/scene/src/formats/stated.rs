@@ -29,9 +29,9 @@ impl<T> Stated<T> {
         self.take_where(|own| own == name).map(|(_, value)| value)
     }
 
-    /// Takes the first entry of the first of these names that is there.
-    pub(super) fn take_any(&mut self, names: &[&str]) -> Option<T> {
-        names.iter().find_map(|name| self.take(name))
+    /// Takes the first entry of the first of these names that is there however it is written: `imagewidth` for `image_width` and `imageWidth`.
+    pub(super) fn take_called(&mut self, names: &[&str]) -> Option<(String, T)> {
+        names.iter().find_map(|name| self.take_where(|own| bare(own) == *name))
     }
 
     /// Takes the first entry whose name is wanted; the others keep their order.
@@ -140,6 +140,11 @@ pub(super) fn note_of(file: &Path, kind: &str, names: &[String]) -> Option<Strin
     };
     let (plural, are) = if names.len() == 1 { ("", "is") } else { ("s", "are") };
     Some(format!("{}: its {kind}{plural} {}{more} {are} not used", name_of(file), shown.join(", ")))
+}
+
+/// Returns the letters and digits of a name, in small letters.
+pub(super) fn bare(name: &str) -> String {
+    name.chars().filter(|c| c.is_alphanumeric()).flat_map(char::to_lowercase).collect()
 }
 
 /// Returns the name of a file, for a note.

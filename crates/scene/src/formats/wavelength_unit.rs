@@ -161,8 +161,17 @@ pub(super) fn comments_of(text: &str) -> impl Iterator<Item = &str> {
     text.lines().filter_map(|line| line.strip_prefix('#')).map(str::trim).filter(|comment| !comment.is_empty())
 }
 
-/// Returns the first unit behind a word for wavelengths, or that which a text begins with, as names of columns do.
+/// Returns what stands behind the last word for a unit.
+pub(super) fn behind_unit(text: &str) -> Option<&str> {
+    let at = text.to_lowercase().rfind("unit")?;
+    Some(text.get(at + "unit".len()..)?.trim_start_matches(['s', ')', ':', '=', ' ']))
+}
+
+/// Returns the first unit behind a word for wavelengths, or one alone behind a word for a unit, or that which a text begins with, as names of columns do.
 pub(super) fn unit_of_waves(text: &str) -> Option<&str> {
+    if let Some(unit) = behind_unit(text).filter(|own| unit_in(own) == Some(own)) {
+        return Some(unit);
+    }
     let lower = text.to_lowercase();
     let at = ["wavelength", "lambda", "wavenumber", "frequency"].iter().find_map(|word| lower.find(word));
     let mut words = text.get(at.unwrap_or(0)..)?.split(|c: char| c.is_whitespace() || ",;:=[]()".contains(c));
