@@ -306,7 +306,13 @@ impl Reader<'_> {
             }
         };
         let Some(image) = image else { return Ok(None) };
-        let sampler = index(texture, "sampler").and_then(|sampler| list(self.root, "samplers").get(sampler));
+        let sampler = index(texture, "sampler").and_then(|number| {
+            let sampler = list(self.root, "samplers").get(number);
+            if sampler.is_none() {
+                self.builder.note_of("samplers that are named and not there, pictures repeat", &number.to_string());
+            }
+            sampler
+        });
         let wrap = |word: &str| match sampler.and_then(|sampler| sampler.get(word)).and_then(Value::as_u64) {
             Some(33071) => Wrap::Clamp,
             Some(33648) => Wrap::Mirror,

@@ -24,7 +24,7 @@ use serde_json::Value;
 
 use self::{
     accessors::{Rows, Source},
-    json::{EXTENSIONS, Unknown, extension, index, list, number, number_or, numbers},
+    json::{Left, extension, index, is_read, list, number, number_or, numbers},
 };
 use super::read_bytes;
 use crate::{
@@ -55,7 +55,7 @@ pub(super) fn read(path: &Path, place: DAffine3, cancel: &Cancel) -> Result<Worl
     let bytes = read_bytes(path, MAX_BYTES)?;
     let (text, binary) = parts(&bytes).map_err(unreadable)?;
     let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text);
-    let root: Value = serde_json::from_slice(text).map_err(|e| match e.line() {
+    let mut root: Value = serde_json::from_slice(text).map_err(|e| match e.line() {
         0 => unreadable(e.to_string()),
         line => WorldError::Line { file: path.to_owned(), line, reason: e.to_string() },
     })?;
@@ -70,6 +70,7 @@ pub(super) fn read(path: &Path, place: DAffine3, cancel: &Cancel) -> Result<Worl
             format!("it needs the extension {name}, which isn't supported; expected a file exported without it");
         return Err(unreadable(reason));
     }
+    let left = Left::out_of(&mut root);
     let mut reader = Reader {
         builder: WorldBuilder::new(),
         root: &root,
@@ -94,7 +95,7 @@ pub(super) fn read(path: &Path, place: DAffine3, cancel: &Cancel) -> Result<Worl
         };
         reader.buffers.push(data);
     }
-    reader.note_unknown();
+    reader.note_left(left);
     reader.scene(place)?;
     Ok(reader.builder)
 }
@@ -178,15 +179,17 @@ impl Reader<'_> {
         source.rows(accessor).map_err(|reason| self.fault(reason))
     }
 
-    fn note_unknown(&mut self) {
-        let unknown = Unknown::of(self.root);
-        for word in &unknown.words {
-            self.builder.note_of("words that aren't known, left out", word);
-        }
+    fn note_left(&mut self, left: Left) {
         let used = list(self.root, "extensionsUsed").iter().filter_map(Value::as_str);
-        let used = used.filter(|name| !EXTENSIONS.contains(name)).map(str::to_owned);
-        for name in unknown.extensions.into_iter().chain(used) {
-            self.builder.note_of("extensions that aren't supported, left out", &name);
+        let used = used.filter(|name| !is_read(name)).map(str::to_owned);
+        let extensions = left.extensions.into_iter().chain(used).collect();
+        for (sentence, words) in [
+            ("words that aren't known, left out", left.words),
+            ("words whose values aren't what glTF has there, left out", left.wrong),
+            ("numbers beyond what glTF allows, the nearest in their place", left.near),
+            ("extensions that aren't supported, left out", extensions),
+        ] {
+            words.iter().for_each(|word| self.builder.note_of(sentence, word));
         }
         if !list(self.root, "animations").is_empty() {
             self.builder.note("animations: not followed, everything stands as it is written");
@@ -195,7 +198,11 @@ impl Reader<'_> {
 
     fn scene(&mut self, place: DAffine3) -> Result<(), WorldError> {
         let (scenes, nodes) = (list(self.root, "scenes"), list(self.root, "nodes"));
-        let scene = index(self.root, "scene").and_then(|scene| scenes.get(scene)).or(scenes.first());
+        let default = index(self.root, "scene");
+        if let Some(number) = default.filter(|number| *number >= scenes.len()) {
+            self.builder.note(format!("scene {number}, of which there are {}: the first one is read", scenes.len()));
+        }
+        let scene = default.and_then(|scene| scenes.get(scene)).or(scenes.first());
         let children: HashSet<usize> = nodes.iter().flat_map(|node| numbers_of(node, "children")).collect();
         let first: Vec<usize> = match scene {
             Some(scene) => numbers_of(scene, "nodes"),
@@ -274,6 +281,9 @@ impl Reader<'_> {
         let curve = SpectralCurve::from_rgb_light(color).scaled((intensity / (LUMENS_PER_WATT * 106.857)) as f32);
         let direction = place.transform_vector3(DVec3::NEG_Z).normalize_or(DVec3::NEG_Z);
         let position = place.translation;
+        if light.get("range").is_some() {
+            self.builder.note("ranges of lights: left out, all fall off by the square of the distance and never end");
+        }
         let light = match light.get("type").and_then(Value::as_str) {
             Some("directional") => Light::Distant { direction, irradiance: curve },
             Some("point") => Light::Point { position, intensity: curve },

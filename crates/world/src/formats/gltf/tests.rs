@@ -209,3 +209,115 @@ mod shared {
         );
     }
 }
+
+/// A file that has most words, over the triangle of [`file`].
+fn wordy() -> Value {
+    let mut root: Value = serde_json::from_str(&file("3", 3)).unwrap();
+    let picture = r#"{"index":0,"texCoord":0,"extensions":{"KHR_texture_transform":{"offset":[0,0],"rotation":0,"scale":[1,1],"texCoord":0}}}"#;
+    let material = r#"{"name":"all","alphaMode":"MASK","alphaCutoff":0.4,"doubleSided":true,"emissiveFactor":[0.1,0,0],
+        "emissiveTexture":PICTURE,"normalTexture":PICTURE,"occlusionTexture":PICTURE,
+        "pbrMetallicRoughness":{"baseColorFactor":[0.5,0.5,0.5,1],"baseColorTexture":PICTURE,"metallicFactor":0.3,"roughnessFactor":0.4,
+            "metallicRoughnessTexture":PICTURE},
+        "extensions":{"KHR_materials_ior":{"ior":1.4},"KHR_materials_dispersion":{"dispersion":0.2},
+            "KHR_materials_specular":{"specularFactor":0.5,"specularColorFactor":[1,0.5,0.5],"specularTexture":PICTURE},
+            "KHR_materials_transmission":{"transmissionFactor":0.4,"transmissionTexture":PICTURE},
+            "KHR_materials_volume":{"thicknessFactor":0.1,"attenuationDistance":0.3,"attenuationColor":[1,0.4,0.4]},
+            "KHR_materials_clearcoat":{"clearcoatFactor":0.6,"clearcoatRoughnessFactor":0.1,"clearcoatTexture":PICTURE},
+            "KHR_materials_emissive_strength":{"emissiveStrength":3}}}"#;
+    root["materials"] = serde_json::from_str(&format!("[{}]", material.replace("PICTURE", picture))).unwrap();
+    root["textures"] = serde_json::from_str(r#"[{"source":0,"sampler":0}]"#).unwrap();
+    root["samplers"] =
+        serde_json::from_str(r#"[{"wrapS":33071,"wrapT":10497,"magFilter":9729,"minFilter":9729}]"#).unwrap();
+    let bytes = include_bytes!("../../../tests/corpus/picture.png");
+    let uri = format!("data:image/png;base64,{}", BASE64_STANDARD.encode(bytes));
+    root["images"] = Value::Array(vec![Value::Object([("uri".to_owned(), Value::from(uri))].into_iter().collect())]);
+    root["nodes"][0]["rotation"] = serde_json::from_str("[0,0,0,1]").unwrap();
+    root["nodes"][0]["scale"] = serde_json::from_str("[1,1,1]").unwrap();
+    root["meshes"][0]["primitives"][0]["mode"] = Value::from(4);
+    root
+}
+
+/// Every object of a file, by the way to it.
+fn objects(value: &Value, way: &str, found: &mut Vec<String>) {
+    match value {
+        Value::Object(object) => {
+            found.push(way.to_owned());
+            object.iter().for_each(|(key, value)| objects(value, &format!("{way}/{key}"), found));
+        }
+        Value::Array(list) => {
+            list.iter().enumerate().for_each(|(number, value)| objects(value, &format!("{way}/{number}"), found));
+        }
+        _ => {}
+    }
+}
+
+/// A strange word in any object, and a strange value of any word, is told or refused; nothing is taken and ignored.
+#[test]
+fn strange_words_and_values_are_told_everywhere() {
+    let root = wordy();
+    let told = |root: &Value| read_text(&root.to_string()).map(|world| world.notes().to_vec());
+    let plain = told(&root).unwrap();
+    let mut ways = Vec::new();
+    objects(&root, "", &mut ways);
+    let mut n = 0;
+    for way in ways {
+        let is_free = way.ends_with("extensions") || way.ends_with("attributes");
+        let mut strange = root.clone();
+        strange.pointer_mut(&way).unwrap()["quux"] = Value::from(7);
+        if !is_free {
+            let notes = told(&strange).unwrap().join("\n");
+            assert!(notes.contains("quux"), "{way}: {notes}");
+        }
+        let words: Vec<String> = root.pointer(&way).unwrap().as_object().unwrap().keys().cloned().collect();
+        for word in words {
+            for value in
+                [Value::Null, Value::from("blarg"), Value::from(-7), Value::from(1e300), Value::from(vec![0.5; 9])]
+            {
+                let mut strange = root.clone();
+                strange.pointer_mut(&way).unwrap()[&word] = value.clone();
+                // Names and numbers without bounds may be that, and sides without sense.
+                let is_fine = ["name", "rotation", "scale", "uri", "max", "min"].contains(&word.as_str())
+                    || value == 1e300
+                        && [
+                            "emissiveStrength",
+                            "attenuationDistance",
+                            "thicknessFactor",
+                            "dispersion",
+                            "ior",
+                            "intensity",
+                            "znear",
+                            "zfar",
+                            "alphaCutoff",
+                        ]
+                        .contains(&word.as_str())
+                    || value == "blarg" && ["generator", "copyright"].contains(&word.as_str());
+                match told(&strange) {
+                    Ok(notes) if !is_fine => assert_ne!(notes, plain, "{way}/{word}: {value}"),
+                    _ => {}
+                }
+                n += 1;
+            }
+        }
+    }
+    assert!(n > 500, "{n}");
+}
+
+/// What is left out is left out: the default stands, or the nearest number.
+#[test]
+fn strange_values_leave_their_defaults() {
+    let with = |cutoff: &str| {
+        let text = file("3", 3).replace("\"metallicFactor\":0", &format!("\"metallicFactor\":{cutoff}"));
+        let world = read_text(&text).unwrap();
+        let bsdf = world.bsdf(&seen(&world, [0.2, 0.2]), Vec3::Z, &[450.0, 650.0]).albedo();
+        (bsdf, world.notes().join("\n"))
+    };
+    let (one, none) = (with("1").0, with("0").0);
+    assert_ne!(one, none);
+    for (value, expected, said) in
+        [("\"0\"", one, "left out: materials"), ("-3", none, "nearest"), ("12", one, "nearest")]
+    {
+        let (found, notes) = with(value);
+        assert_eq!(found, expected, "{value}");
+        assert!(notes.contains(said) && notes.contains("metallicFactor"), "{notes}");
+    }
+}

@@ -42,7 +42,7 @@ impl Glow {
 impl Reader<'_> {
     /// Returns a number above 0 that the fourth version has of lights, and earlier ones don't.
     fn of_fourth(&self, params: &Params<'_>, name: &str) -> Option<f64> {
-        (self.version == Version::Four).then(|| params.number(name).filter(|value| *value > 0.0))?
+        (self.version == Version::Four).then(|| params.within(name, [0.0, f64::MAX]).filter(|value| *value > 0.0))?
     }
 
     /// Returns the flux of a light, in the file's unit of radiance times area, where the file states one.
@@ -58,13 +58,20 @@ impl Reader<'_> {
     /// Returns what the light is multiplied by; a color, which earlier versions allow, by its mean.
     fn scale(&mut self, params: &Params<'_>) -> f64 {
         let Some(numbers) = params.numbers("scale") else { return 1.0 };
+        if numbers.iter().any(|n| *n < 0.0) {
+            self.builder.note("a light's 'scale' below 0: it is dark");
+            return 0.0;
+        }
         if numbers.iter().any(|n| *n != numbers[0]) {
             self.builder.note("a light's 'scale' that is a color: its mean stands for it");
         }
         numbers.iter().sum::<f64>() / numbers.len() as f64
     }
 
-    pub(super) fn glow(&mut self, params: &Params<'_>) -> Result<Glow, Fault> {
+    pub(super) fn glow(&mut self, kind: &str, params: &Params<'_>) -> Result<Glow, Fault> {
+        if !matches!(kind, "diffuse" | "area") {
+            self.builder.note_of("area lights of a kind that isn't known, as diffuse ones", kind);
+        }
         let scale = self.scale(params);
         let radiance = self.light_curve(params.find("L"), scale)?;
         let emission = Emission { radiance, is_two_sided: params.flag("twosided").unwrap_or(false) };
@@ -79,7 +86,7 @@ impl Reader<'_> {
         let place = self.place_m()?;
         let unit = self.metres_per_unit;
         let scale = self.scale(params);
-        let point = |name: &str, default: [f64; 3]| DVec3::from_array(params.three(name).unwrap_or(default));
+        let point = |name: &str, default: [f64; 3]| DVec3::from_array(params.exactly(name).unwrap_or(default));
         // A file in other units means the irradiance that its own lengths give.
         let of_point = scale * unit * unit;
         let light = match kind {
@@ -95,8 +102,10 @@ impl Reader<'_> {
                 let position = place.transform_point3(point("from", [0.0; 3]));
                 let aim = place.transform_point3(point("to", [0.0, 0.0, 1.0]));
                 let direction = (aim - position).try_normalize().ok_or("a spot light without direction".to_owned())?;
-                let outer_deg = params.number("coneangle").unwrap_or(30.0);
-                let inner_deg = outer_deg - params.number_of(&["conedeltaangle", "conedelta"]).unwrap_or(5.0);
+                let outer_deg = params.within("coneangle", [0.0, 180.0]).unwrap_or(30.0);
+                let delta_deg =
+                    ["conedeltaangle", "conedelta"].iter().find_map(|name| params.within(name, [0.0, 180.0]));
+                let inner_deg = outer_deg - delta_deg.unwrap_or(5.0);
                 let (inner_rad, outer_rad) =
                     (inner_deg.to_radians().clamp(0.0, PI), outer_deg.to_radians().clamp(0.0, PI));
                 // The edge of the cone counts half, as in pbrt.

@@ -252,7 +252,8 @@ impl Reader<'_> {
                 });
                 continue;
             }
-            let given = param.and_then(|param| param.numbers.first().map(|n| *n as f32)).unwrap_or(default).max(0.0);
+            let given = names.iter().find_map(|name| params.within(name, [0.0, f64::MAX]));
+            let given = given.map_or(default, |n| n as f32);
             let is_as_given = !is_remapped || given == 0.0 && (has_smooth || self.version == Version::Four);
             alphas.push(self.even(if is_as_given { given.min(1.0) } else { by.alpha(given) }));
         }

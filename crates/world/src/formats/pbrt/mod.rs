@@ -34,23 +34,28 @@ use crate::{GroupId, Material, MaterialId, SpectralCurve, Texture, TextureId, Wo
 const MAX_BYTES: u64 = 1 << 31;
 /// Words of films and cameras that change nothing here: names of files, their storage, and times of a still picture; bands and a
 /// sensor are chosen where a world is rendered.
-const NO_MATTER: [&str; 15] = [
-    "filename",
-    "savefp16",
-    "display",
-    "nbuckets",
-    "lambdamin",
-    "lambdamax",
-    "sensor",
-    "iso",
-    "scale",
-    "imagingratio",
-    "maxcomponentvalue",
-    "hither",
-    "yon",
-    "shutteropen",
-    "shutterclose",
-];
+const NO_MATTER: &str = "\
+    filename savefp16 display nbuckets lambdamin lambdamax sensor iso scale imagingratio maxcomponentvalue hither \
+    yon shutteropen shutterclose";
+/// Kinds of what computes a picture, and their parameters, of all versions.
+const OF_RENDERERS: &str = "\
+    02sequence B C adaptive aggregatetest alpha bdpt bestcandidate bidirectional bootstrapsamples box bvh \
+    causticphotons chains createprobes diffuseprt dimensions dipolesubsurface directsamples dodirectseparately \
+    emission emptybonus exphotonmap finalgather finalgathersamples gatherangle gaussian gdist glossyprt grid halton \
+    igi imagewritefrequency independent indirectdepth indirectphotons intersectcost irradiancecache iterations \
+    jitter kdtree lanczossinc largestepprobability lightpath lightsampler lightsamplestrategy lowdiscrepancy \
+    maxconsecutiverejects maxdepth maxdist maxerror maxmindist maxnodeprims maxphotondepth maxpixeldist maxprims \
+    maxsamples maxspeculardepth metadata method metropolis minpixeldist minsamples minweightangle mitchell mlt \
+    mutationsperpixel none nsamples nsets numCABands numcabands numiterations nused paddedsobol path photonmap \
+    photonsperiteration pixelbounds pixelsamples pmj02bn quickrender radius random randomization randomwalk \
+    refineimmediately regularize rrthreshold sample samplebsdf samplelights sampler samplesperpixel scramble seed \
+    sigma simplepath simplevolpath sinc single sobol spectralpath spectralvolpath splitmethod sppm stepsize strategy \
+    stratified surfacepoints tau traversalcost triangle useprobes visualizeobjectids visualizestrategies \
+    visualizeweights volpath volumephotons xradius xsamples xwidth yradius ysamples ywidth zsobol";
+/// Options that change nothing here.
+const OPTIONS: &str = "\
+    disablepixeljitter disabletexturefiltering disablewavelengthjitter displacementedgescale fullscreen gpu \
+    msereferenceimage msereferenceout pixelstats rendercoordsys seed wavefront";
 /// How deep files may include each other, and attributes be nested.
 const MAX_DEPTH: usize = 32;
 
@@ -270,7 +275,8 @@ impl<'c> Reader<'c> {
                 return Ok(());
             }
             "Option" => {
-                Params::read(tokens)?;
+                let unknown = Params::read(tokens)?.unused().into_iter().filter(|name| !has_word(OPTIONS, name));
+                unknown.for_each(|name| self.builder.note_of("options that aren't supported, left out", name));
                 return Ok(());
             }
             _ => return Err(format!("'{directive}' is no directive of pbrt").into()),
@@ -283,6 +289,9 @@ impl<'c> Reader<'c> {
                 self.places.insert("camera".to_owned(), self.attributes.place.inverse());
             }
             "Film" => {
+                if !matches!(kind, "rgb" | "gbuffer" | "spectral" | "image") {
+                    self.builder.note_of("films of a kind that isn't known, as an image", kind);
+                }
                 if self.camera.set_film(&params) {
                     self.builder
                         .note(format!("Film \"{kind}\": a part of the picture is asked for; all of it is the picture"));
@@ -290,7 +299,7 @@ impl<'c> Reader<'c> {
             }
             "Shape" => self.shape(kind, &params)?,
             "LightSource" => self.light(kind, &params)?,
-            "AreaLightSource" => self.attributes.glow = Some(self.glow(&params)?),
+            "AreaLightSource" => self.attributes.glow = Some(self.glow(kind, &params)?),
             "Material" => {
                 let material = self.material(kind, kind, &params)?;
                 self.attributes.material = material;
@@ -307,25 +316,37 @@ impl<'c> Reader<'c> {
                 self.builder.note_of(&format!("{directive}: not supported, left out"), kind);
                 return Ok(());
             }
-            "SurfaceIntegrator" | "VolumeIntegrator" | "Renderer" => {
-                self.version = Version::Two;
-                if kind == "directlighting" {
-                    self.builder.note(format!(
-                        "{directive} \"{kind}\": light that is scattered more than once is followed too, unless its scatterings are limited"
-                    ));
-                }
-                return Ok(());
-            }
-            // How a picture is computed is the renderer's affair.
-            _ => return Ok(()),
+            "Sampler" | "PixelFilter" | "Integrator" | "Accelerator" | "SurfaceIntegrator" | "VolumeIntegrator"
+            | "Renderer" => self.way_of_computing(directive, kind),
+            _ => {}
         }
         self.report_unused(directive, kind, &params);
         Ok(())
     }
 
+    /// How a picture is computed is the renderer's affair, unless other light is followed.
+    fn way_of_computing(&mut self, directive: &str, kind: &str) {
+        if directive.starts_with("Surface") || directive.starts_with("Volume") || directive == "Renderer" {
+            self.version = Version::Two;
+        }
+        if matches!(kind, "directlighting" | "whitted" | "ambientocclusion" | "ao") {
+            self.builder.note(format!(
+                "{directive} \"{kind}\": light that is scattered more than once is followed too, unless its scatterings are limited"
+            ));
+        } else if !has_word(OF_RENDERERS, kind) {
+            self.builder.note(format!("{directive} \"{kind}\": not known, left out"));
+        }
+    }
+
     /// Reports parameters that nobody asked for.
     fn report_unused(&mut self, directive: &str, kind: &str, params: &Params<'_>) {
-        let is_told = |name: &&str| !matches!(directive, "Film" | "Camera") || !NO_MATTER.contains(name);
+        let no_matter = match directive {
+            "Film" | "Camera" => NO_MATTER,
+            "Sampler" | "PixelFilter" | "Integrator" | "Accelerator" | "SurfaceIntegrator" | "VolumeIntegrator"
+            | "Renderer" => OF_RENDERERS,
+            _ => "",
+        };
+        let is_told = |name: &&str| !has_word(no_matter, name);
         let unused: Vec<&str> = params.unused().into_iter().filter(is_told).collect();
         if !unused.is_empty() {
             let unused = unused.join(", ");
@@ -444,6 +465,11 @@ fn unpacked(path: &Path, bytes: Vec<u8>, limit: u64) -> Result<Vec<u8>, WorldErr
         return Err(unreadable(format!("it unpacks to more than {limit} bytes")));
     }
     Ok(text)
+}
+
+/// Whether a word is one of a list.
+fn has_word(list: &str, word: &str) -> bool {
+    list.split_ascii_whitespace().any(|known| known == word)
 }
 
 fn no_begin(directive: &str) -> String {
