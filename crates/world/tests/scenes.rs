@@ -63,6 +63,26 @@ fn small_world_is_what_it_says() {
 }
 
 /// A part of a picture and words of cameras that are not known are reported; the whole as a part, and names of files, are not.
+/// Curves of one material are one mesh, met where they are; hair has the color of its pigment.
+#[test]
+fn curves_are_met_and_hair_is_brown() {
+    let text = "WorldBegin\nScale 2 2 2\nMaterial \"hair\" \"float eumelanin\" .5\n\
+                Shape \"curve\" \"point3 P\" [0 -1 0  0 0 0  0 1 0  0 2 0] \"float width\" .1\n\
+                Shape \"curve\" \"point3 P\" [1 -1 0  1 0 0  1 1 0  1 2 0] \"float width\" .1\n\
+                Material \"diffuse\"\nShape \"curve\" \"point3 P\" [2 -1 0  2 0 0  2 1 0]\n";
+    let world = read_text(text).unwrap();
+    assert_eq!(world.n_primitives(), 24);
+    let notes = world.notes().join("\n");
+    assert!(notes.contains("hair") && notes.contains("a curve of 3 points"), "{notes}");
+    for x in [0.0, 2.0] {
+        let found = hit(&world, [x, 0.0, -5.0], [0.0, 0.0, 1.0]).unwrap();
+        assert!((found.distance_m - 4.9).abs() < 0.015, "{}", found.distance_m);
+        let [blue, green, red] = world.bsdf(&found, Vec3::NEG_Z, &[450.0, 550.0, 650.0]).albedo();
+        assert!(red > 1.2 * green && green > 1.5 * blue && blue > 0.0, "{blue} {green} {red}");
+        assert!(hit(&world, [x + 0.11, 0.0, -5.0], [0.0, 0.0, 1.0]).is_none());
+    }
+}
+
 #[test]
 fn words_of_films_and_cameras_are_reported() {
     let notes = |film: &str, camera: &str| {

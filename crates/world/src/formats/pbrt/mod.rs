@@ -4,6 +4,7 @@
 //! `Renderer` is of version 2.
 
 mod camera;
+mod curves;
 mod lights;
 mod materials;
 mod params;
@@ -28,7 +29,9 @@ use self::{
     tokens::{Token, Tokens},
 };
 use super::read_bytes;
-use crate::{GroupId, Material, MaterialId, SpectralCurve, Texture, TextureId, WorldBuilder, WorldError};
+use crate::{
+    GroupId, Material, MaterialId, Shape, SpectralCurve, Texture, TextureId, TriangleMesh, WorldBuilder, WorldError,
+};
 
 /// The most bytes that a file and all that it includes may have.
 const MAX_BYTES: u64 = 1 << 31;
@@ -63,6 +66,7 @@ const MAX_DEPTH: usize = 32;
 pub(super) fn read(path: &Path, metres_per_unit: f64, cancel: &Cancel) -> Result<WorldBuilder, WorldError> {
     let mut reader = Reader::new(path, metres_per_unit, cancel);
     reader.read_file(path, 0)?;
+    reader.end_curves();
     Ok(reader.builder)
 }
 
@@ -121,6 +125,8 @@ struct Reader<'c> {
     object: Option<GroupId>,
     /// Materials of which a part is there, by the bits of a number or the number of a texture.
     covered: HashMap<(MaterialId, Coverage), MaterialId>,
+    /// Curves of one material and place, which are one mesh.
+    curves: Option<(Attributes, MaterialId, TriangleMesh)>,
     cancel: &'c Cancel,
 }
 
@@ -156,6 +162,7 @@ impl<'c> Reader<'c> {
             objects: HashMap::new(),
             object: None,
             covered: HashMap::new(),
+            curves: None,
             cancel,
         }
     }
@@ -187,6 +194,9 @@ impl<'c> Reader<'c> {
     }
 
     fn directive(&mut self, directive: &str, tokens: &mut Tokens<'_>, depth: usize) -> Result<(), Fault> {
+        if directive != "Shape" {
+            self.end_curves();
+        }
         match directive {
             "Include" | "Import" => return self.include(text(directive, tokens)?, depth),
             "WorldBegin" => self.begin_world()?,
@@ -352,6 +362,14 @@ impl<'c> Reader<'c> {
             let unused = unused.join(", ");
             self.builder.note(format!("{directive} \"{kind}\": not supported and left out: {unused}"));
         }
+    }
+
+    /// Adds the curves so far.
+    fn end_curves(&mut self) {
+        let Some((attributes, material, mesh)) = self.curves.take() else { return };
+        let place = DAffine3::from_scale(DVec3::splat(self.metres_per_unit)) * attributes.place;
+        let group = self.object.unwrap_or(GroupId::ROOT);
+        self.builder.add_shape_to(group, Shape::Mesh(mesh), place, material, None);
     }
 
     fn include(&mut self, name: &str, depth: usize) -> Result<(), Fault> {

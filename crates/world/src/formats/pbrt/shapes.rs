@@ -4,11 +4,15 @@ use std::f64::consts::PI;
 
 use glam::{DAffine3, DVec3, Vec2, Vec3};
 
-use super::{Coverage, Fault, Reader, params::Params, surfaces};
+use super::{Coverage, Fault, Reader, curves, params::Params, surfaces};
 use crate::{GroupId, Material, MaterialId, Shape, SpectralCurve, Texture, TriangleMesh};
 
 impl Reader<'_> {
     pub(super) fn shape(&mut self, kind: &str, params: &Params<'_>) -> Result<(), Fault> {
+        if kind == "curve" {
+            return self.curve_shape(params);
+        }
+        self.end_curves();
         let mut place = self.place_m()?;
         let number = |name: &str, default: f64| params.number(name).unwrap_or(default);
         let part = surfaces::quadric(kind, params)?;
@@ -86,6 +90,24 @@ impl Reader<'_> {
 }
 
 impl Reader<'_> {
+    fn curve_shape(&mut self, params: &Params<'_>) -> Result<(), Fault> {
+        self.checked_place()?;
+        if self.attributes.glow.is_some() {
+            self.builder.note("Shape \"curve\": the glow of curves is left out");
+        }
+        self.builder.note("Shape \"curve\": tubes of triangles, round where pbrt's turn to who looks");
+        let material = self.material_of_shape(params, false)?;
+        if self.curves.as_ref().is_some_and(|(_, known, _)| *known != material) {
+            self.end_curves();
+        }
+        let attributes = &self.attributes;
+        let (_, _, mesh) = self.curves.get_or_insert_with(|| (attributes.clone(), material, TriangleMesh::default()));
+        if let Err(reason) = curves::add(mesh, params) {
+            self.builder.note_of("curves that are none, left out", &reason);
+        }
+        Ok(())
+    }
+
     /// Returns the current material, of which so much is there as the shape's alpha says.
     fn material_of_shape(&mut self, params: &Params<'_>, glows: bool) -> Result<MaterialId, Fault> {
         let material = self.attributes.material;

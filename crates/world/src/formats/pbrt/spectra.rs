@@ -41,7 +41,10 @@ impl Reader<'_> {
         Ok(Some(match param.kind {
             "rgb" | "color" => colored(three()?),
             "xyz" => colored(Xyz(three()?).to_linear_srgb()),
-            "float" => SpectralCurve::constant(*param.numbers.first().ok_or_else(|| wrong("a number"))? as f32),
+            "float" => match *param.numbers {
+                [value] => SpectralCurve::constant(value as f32),
+                _ => return Err(wrong("one number")),
+            },
             "blackbody" => {
                 let kelvin = *param.numbers.first().ok_or_else(|| wrong("a temperature, K"))?;
                 if !(100.0..=1e6).contains(&kelvin) {

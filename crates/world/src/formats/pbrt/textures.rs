@@ -30,7 +30,7 @@ impl Reader<'_> {
             "mix" => {
                 let a = self.part(&params, &["tex1"], is_number, 0.0)?;
                 let b = self.part(&params, &["tex2"], is_number, 1.0)?;
-                Texture::Blend { of: [a, b], amount: self.part(&params, &["amount"], true, 0.5)? }
+                Texture::Blend { of: [a, b], amount: self.share(&params, "amount")? }
             }
             "checkerboard" => {
                 let a = self.part(&params, &["tex1"], is_number, 1.0)?;
@@ -108,6 +108,16 @@ impl Reader<'_> {
     ) -> Result<TextureId, Fault> {
         let found = self.part_if_any(params, names, is_number)?;
         Ok(found.unwrap_or_else(|| self.builder.add_texture(Texture::Curve(SpectralCurve::constant(default)))))
+    }
+
+    /// Returns a share, 0–1, as [`part`](Self::part) does.
+    pub(super) fn share(&mut self, params: &Params<'_>, name: &str) -> Result<TextureId, Fault> {
+        let is_even = params.find(name).is_some_and(|param| param.kind != "texture");
+        let even = if is_even { params.within(name, [0.0, 1.0]) } else { None };
+        match is_even {
+            true => Ok(self.builder.add_texture(Texture::Curve(SpectralCurve::constant(even.unwrap_or(0.5) as f32)))),
+            false => self.part(params, &[name], true, 0.5),
+        }
     }
 
     pub(super) fn part_if_any(
