@@ -55,7 +55,7 @@ pub use glam;
 pub use ids::{GroupId, InstanceId, LightId, MaterialId, ShapeId, TextureId};
 pub use image_texture::{Encoding, ImageTexture, Wrap};
 pub use lathe::Lathe;
-pub use light::{Emission, FallOff, Flux, Light, LightSample};
+pub use light::{Emission, FallOff, Flux, Layout, Light, LightSample};
 pub use material::{Material, Relief, Roughness};
 pub use mesh::TriangleMesh;
 pub use metals::MetalKind;

@@ -19,7 +19,7 @@ fn folder() -> tempfile::TempDir {
 }
 
 /// Directives of pbrt, and parameters with their values.
-const LINES: [(&str, &[[&str; 2]]); 18] = [
+const LINES: [(&str, &[[&str; 2]]); 19] = [
     ("Shape \"sphere\"", &[["float radius", "1"], ["float zmin", "-1"], ["float phimax", "360"], ["float alpha", "1"]]),
     ("Shape \"disk\"", &[["float radius", "1"], ["float height", "0"], ["float innerradius", ".1"]]),
     ("Shape \"cylinder\"", &[["float radius", "1"], ["float zmin", "-1"], ["float zmax", "1"]]),
@@ -34,6 +34,10 @@ const LINES: [(&str, &[[&str; 2]]); 18] = [
     ("LightSource \"spot\"", &[["rgb I", "[1 1 1]"], ["point3 to", "[0 0 1]"], ["float coneangle", "30"]]),
     ("LightSource \"distant\"", &[["rgb L", "[1 1 1]"], ["point3 from", "[0 1 0]"], ["float illuminance", "3"]]),
     ("LightSource \"infinite\"", &[["rgb L", "[1 1 1]"], ["float scale", "1"], ["float illuminance", "3"]]),
+    (
+        "LightSource \"projection\"",
+        &[["string filename", "\"picture.png\""], ["float fov", "40"], ["float scale", "2"], ["float power", "9"]],
+    ),
     ("AreaLightSource \"diffuse\"", &[["rgb L", "[1 1 1]"], ["float scale", "2"], ["bool twosided", "true"]]),
     ("Material \"diffuse\"", &[["rgb reflectance", "[.5 .5 .5]"]]),
     (

@@ -54,6 +54,8 @@ const WORDS: &[(&str, &str)] = &[
     ("skins", "inverseBindMatrices:index joints:indices skeleton:index"),
     ("texture", "index:index scale:1 strength:1=0|1 texCoord:index"),
     ("textures", "sampler:index source:index"),
+    ("EXT_mesh_gpu_instancing", "attributes:object"),
+    ("EXT_mesh_gpu_instancing.attributes", "*:index"),
     ("EXT_texture_webp", "source:index"),
     ("KHR_lights_punctual", "light:index lights:objects"),
     ("KHR_lights_punctual.lights", "color:3=0| intensity:1=0| range:1=0| spot:object type:text"),
@@ -80,6 +82,9 @@ const WORDS: &[(&str, &str)] = &[
         "KHR_materials_volume",
         "attenuationColor:3=0|1 attenuationDistance:1=0| thicknessFactor:1=0| thicknessTexture:object",
     ),
+    ("KHR_materials_variants", "mappings:objects variants:objects"),
+    ("KHR_materials_variants.mappings", "material:index variants:indices"),
+    ("KHR_materials_variants.variants", ""),
     ("KHR_mesh_quantization", ""),
     ("KHR_texture_transform", "offset:2 rotation:1 scale:2 texCoord:index"),
 ];

@@ -191,6 +191,10 @@ impl Reader<'_> {
         ] {
             words.iter().for_each(|word| self.builder.note_of(sentence, word));
         }
+        for variant in extension(self.root, "KHR_materials_variants").map_or(&[][..], |of| list(of, "variants")) {
+            let name = variant.get("name").and_then(Value::as_str).unwrap_or("without a name");
+            self.builder.note_of("variants of the materials, of which the file's own is shown", name);
+        }
         if !list(self.root, "animations").is_empty() {
             self.builder.note("animations: not followed, everything stands as it is written");
         }
@@ -214,7 +218,7 @@ impl Reader<'_> {
         }
         for node in nodes {
             if let Some(mesh) = index(node, "mesh").filter(|_| index(node, "skin").is_none()) {
-                *self.uses.entry(mesh).or_default() += 1;
+                *self.uses.entry(mesh).or_default() += self.instances(node)?.map_or(1, |instances| instances.len());
             }
         }
         // Where every node stands first: skins hang on others.
@@ -258,7 +262,9 @@ impl Reader<'_> {
             return Err(self.fault(format!("node {number} stands nowhere: its numbers aren't finite")));
         }
         if let Some(mesh) = index(node, "mesh") {
-            self.mesh(node, mesh, place)?;
+            for instance in self.instances(node)?.unwrap_or_else(|| vec![DAffine3::IDENTITY]) {
+                self.mesh(node, mesh, place * instance)?;
+            }
         }
         if let Some(light) = extension(node, "KHR_lights_punctual").and_then(|of| index(of, "light")) {
             self.light(light, place)?;
@@ -267,6 +273,34 @@ impl Reader<'_> {
             self.camera(camera, node, place)?;
         }
         numbers_of(node, "children").into_iter().try_for_each(|child| self.node(child, depth + 1))
+    }
+
+    /// Returns the places of a node's mesh in it, where it has many.
+    fn instances(&self, node: &Value) -> Result<Option<Vec<DAffine3>>, WorldError> {
+        let Some(attributes) = extension(node, "EXT_mesh_gpu_instancing").and_then(|of| of.get("attributes")) else {
+            return Ok(None);
+        };
+        let rows = |name: &str| index(attributes, name).map(|accessor| self.rows(accessor)).transpose();
+        let [translations, rotations, scales] = ["TRANSLATION", "ROTATION", "SCALE"].map(rows);
+        let (translations, rotations, scales) = (translations?, rotations?, scales?);
+        let n = [&translations, &rotations, &scales].into_iter().flatten().map(Rows::len).min().unwrap_or(0);
+        let number = |rows: &Option<Rows>, row: usize, column: usize, default: f64| {
+            rows.as_ref().and_then(|rows| rows.values.get(row * rows.width + column)).copied().unwrap_or(default)
+        };
+        let three = |rows: &Option<Rows>, row: usize, default: f64| {
+            DVec3::new(number(rows, row, 0, default), number(rows, row, 1, default), number(rows, row, 2, default))
+        };
+        let instance = |row: usize| {
+            let [x, y, z] = [0, 1, 2].map(|k| number(&rotations, row, k, 0.0));
+            let rotation = DQuat::from_xyzw(x, y, z, number(&rotations, row, 3, 1.0));
+            let rotation = if rotation.length_squared() > 0.0 { rotation.normalize() } else { DQuat::IDENTITY };
+            DAffine3::from_scale_rotation_translation(
+                three(&scales, row, 1.0),
+                rotation,
+                three(&translations, row, 0.0),
+            )
+        };
+        Ok(Some((0..n).map(instance).collect()))
     }
 
     /// Lights of glTF shine along −z, in candela or lux; their colors are those of daylight D65 tinted.

@@ -321,3 +321,19 @@ fn strange_values_leave_their_defaults() {
         assert!(notes.contains(said) && notes.contains("metallicFactor"), "{notes}");
     }
 }
+
+/// A mesh at many places of one node, by its accessor of places.
+#[test]
+fn instances_of_a_node_stand_where_it_says() {
+    // The places are the corners of the triangle itself.
+    let places = r#""mesh":0,"extensions":{"EXT_mesh_gpu_instancing":{"attributes":{"TRANSLATION":0}}},"#;
+    let text = file("3", 3).replace("\"mesh\":0,", places);
+    let world = read_text(&text).unwrap();
+    assert_eq!(world.n_primitives(), 3);
+    for corner in [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]] {
+        assert!((seen(&world, [corner[0] + 0.2, corner[1] + 0.2]).distance_m - 5.0).abs() < 1e-5);
+    }
+    let of_file = r#""KHR_materials_variants":{"variants":[{"name":"green"}]},"KHR_lights_punctual":{"lights""#;
+    let variants = file("3", 3).replace(r#""KHR_lights_punctual":{"lights""#, of_file);
+    assert!(read_text(&variants).unwrap().notes().iter().any(|note| note.ends_with(": green")));
+}
