@@ -54,6 +54,11 @@ const WORDS: &[(&str, &str)] = &[
     ("skins", "inverseBindMatrices:index joints:indices skeleton:index"),
     ("texture", "index:index scale:1 strength:1=0|1 texCoord:index"),
     ("textures", "sampler:index source:index"),
+    (
+        "EXT_meshopt_compression",
+        "buffer:index byteLength:index byteOffset:index byteStride:index count:index fallback:flag \
+         filter:text=NONE|OCTAHEDRAL|QUATERNION|EXPONENTIAL mode:text=ATTRIBUTES|TRIANGLES|INDICES",
+    ),
     ("EXT_mesh_gpu_instancing", "attributes:object"),
     ("EXT_mesh_gpu_instancing.attributes", "*:index"),
     ("EXT_texture_webp", "source:index"),

@@ -337,7 +337,8 @@ impl Reader<'_> {
             }
             (Some(uri), _) => ImageTexture::of_bytes(&self.resource(uri)?, encoding, Wrap::Repeat),
             (None, Some(view)) => {
-                let source = super::Source { root: self.root, buffers: &self.buffers, most_zeros: 0 };
+                let source =
+                    super::Source { root: self.root, buffers: &self.buffers, unpacked: &self.unpacked, most_zeros: 0 };
                 let (bytes, _) = source.view(view).map_err(|reason| self.fault(reason))?;
                 ImageTexture::of_bytes(bytes, encoding, Wrap::Repeat)
             }

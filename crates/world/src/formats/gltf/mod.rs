@@ -7,6 +7,7 @@ mod accessors;
 mod json;
 mod materials;
 mod meshes;
+mod meshopt;
 
 use std::{
     collections::{HashMap, HashSet},
@@ -47,7 +48,7 @@ const BASE64: GeneralPurpose = GeneralPurpose::new(
 );
 
 /// Extensions that geometry can't be read without.
-const OF_GEOMETRY: [&str; 3] = ["EXT_meshopt_compression", "KHR_draco_mesh_compression", "KHR_meshopt_compression"];
+const OF_GEOMETRY: [&str; 2] = ["KHR_draco_mesh_compression", "KHR_meshopt_compression"];
 
 /// Reads the default scene.
 pub(super) fn read(path: &Path, place: DAffine3, cancel: &Cancel) -> Result<WorldBuilder, WorldError> {
@@ -77,6 +78,7 @@ pub(super) fn read(path: &Path, place: DAffine3, cancel: &Cancel) -> Result<Worl
         file: path.to_owned(),
         folder: path.parent().unwrap_or(Path::new("")).to_owned(),
         buffers: Vec::new(),
+        unpacked: HashMap::new(),
         materials: HashMap::new(),
         images: HashMap::new(),
         groups: HashMap::new(),
@@ -94,6 +96,13 @@ pub(super) fn read(path: &Path, place: DAffine3, cancel: &Cancel) -> Result<Worl
             None => binary.filter(|_| number == 0).unwrap_or_default().to_vec(),
         };
         reader.buffers.push(data);
+    }
+    for (number, view) in list(&root, "bufferViews").iter().enumerate() {
+        let Some(packed) = extension(view, "EXT_meshopt_compression") else { continue };
+        let unpacked = meshopt::unpacked(packed, &reader.buffers);
+        let unpacked = unpacked.map_err(|reason| reader.fault(format!("packed buffer view {number} {reason}")))?;
+        reader.n_bytes += unpacked.0.len() as u64;
+        reader.unpacked.insert(number, unpacked);
     }
     reader.note_left(left);
     reader.scene(place)?;
@@ -131,6 +140,8 @@ struct Reader<'c> {
     file: PathBuf,
     folder: PathBuf,
     buffers: Vec<Vec<u8>>,
+    /// Buffer views that were packed, with the strides of their rows.
+    unpacked: HashMap<usize, (Vec<u8>, Option<usize>)>,
     /// By number, and whether the mesh has colors.
     materials: HashMap<MaterialUse, (MaterialId, Option<Emission>)>,
     /// By number, and whether it holds colors.
@@ -175,7 +186,7 @@ impl Reader<'_> {
 
     fn rows(&self, accessor: usize) -> Result<Rows, WorldError> {
         let most_zeros = 1 << 16 | usize::try_from(self.n_bytes).unwrap_or(usize::MAX).min(1 << 28);
-        let source = Source { root: self.root, buffers: &self.buffers, most_zeros };
+        let source = Source { root: self.root, buffers: &self.buffers, unpacked: &self.unpacked, most_zeros };
         source.rows(accessor).map_err(|reason| self.fault(reason))
     }
 
