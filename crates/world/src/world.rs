@@ -588,6 +588,16 @@ impl WorldBuilder {
         }
     }
 
+    /// Adds a material that is another, of shapes filled with a medium that takes so much from light, 1/m; none where it lets no light in.
+    pub(crate) fn add_filled(&mut self, of: MaterialId, per_m: SpectralCurve) -> Option<MaterialId> {
+        let surface = self.surfaces.get(of.0 as usize).cloned()?;
+        if !matches!(surface.material, Material::Dielectric { .. } | Material::Glass { .. }) {
+            return None;
+        }
+        self.surfaces.push(Surface { absorption: Some(per_m), ..surface });
+        Some(MaterialId(self.surfaces.len() as u32 - 1))
+    }
+
     /// Stands a shape in the world.
     pub fn add_shape(
         &mut self,

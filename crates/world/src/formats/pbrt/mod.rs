@@ -7,6 +7,7 @@ mod camera;
 mod curves;
 mod lights;
 mod materials;
+mod media;
 mod params;
 mod shapes;
 mod spectra;
@@ -103,6 +104,8 @@ struct Attributes {
     material: MaterialId,
     glow: Option<lights::Glow>,
     is_reversed: bool,
+    /// The medium that fills shapes.
+    inside: String,
 }
 
 struct Reader<'c> {
@@ -125,6 +128,9 @@ struct Reader<'c> {
     object: Option<GroupId>,
     /// Materials of which a part is there, by the bits of a number or the number of a texture.
     covered: HashMap<(MaterialId, Coverage), MaterialId>,
+    /// What media that absorb alone take from light, 1/m, none of others; and materials that are filled with one.
+    media: HashMap<String, Option<SpectralCurve>>,
+    filled: HashMap<(MaterialId, String), MaterialId>,
     /// Curves of one material and place, which are one mesh.
     curves: Option<(Attributes, MaterialId, TriangleMesh)>,
     cancel: &'c Cancel,
@@ -143,7 +149,8 @@ impl<'c> Reader<'c> {
         builder.set_up(DVec3::Y, true);
         let half = builder.add_texture(Texture::Curve(SpectralCurve::constant(0.5)));
         let material = builder.add_material("default", Material::Matte { reflectance: half });
-        let attributes = Attributes { place: DAffine3::IDENTITY, material, glow: None, is_reversed: false };
+        let attributes =
+            Attributes { place: DAffine3::IDENTITY, material, glow: None, is_reversed: false, inside: String::new() };
         Self {
             builder,
             metres_per_unit,
@@ -162,6 +169,8 @@ impl<'c> Reader<'c> {
             objects: HashMap::new(),
             object: None,
             covered: HashMap::new(),
+            media: HashMap::new(),
+            filled: HashMap::new(),
             curves: None,
             cancel,
         }
@@ -278,10 +287,12 @@ impl<'c> Reader<'c> {
             | "Sampler" | "PixelFilter" | "Integrator" | "Accelerator" | "ColorSpace" | "MakeNamedMedium"
             | "Attribute" | "SurfaceIntegrator" | "VolumeIntegrator" | "Renderer" | "Volume" => {}
             "MediumInterface" => {
-                while let Some(Token::Text(_)) = tokens.peek()? {
+                let mut names = Vec::new();
+                while let Some(Token::Text(name)) = tokens.peek()? {
                     tokens.next()?;
+                    names.push(name);
                 }
-                self.builder.note("MediumInterface: media aren't followed; space is clear");
+                self.medium_interface(&names);
                 return Ok(());
             }
             "Option" => {
@@ -322,7 +333,16 @@ impl<'c> Reader<'c> {
             "ColorSpace" if kind != "srgb" => {
                 self.builder.note(format!("ColorSpace \"{kind}\": colors are taken as sRGB"));
             }
-            "MakeNamedMedium" | "Volume" | "Attribute" => {
+            "MakeNamedMedium" => {
+                let absorption = self.absorption(&params)?;
+                let is_clear = absorption.is_none();
+                self.media.insert(kind.to_owned(), absorption);
+                if is_clear {
+                    self.builder.note_of("media that scatter light or glow, left out: space is clear", kind);
+                    return Ok(());
+                }
+            }
+            "Volume" | "Attribute" => {
                 self.builder.note_of(&format!("{directive}: not supported, left out"), kind);
                 return Ok(());
             }
