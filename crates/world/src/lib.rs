@@ -44,6 +44,7 @@ mod texture;
 mod tree;
 mod triangle;
 mod uv;
+mod velvet;
 mod world;
 
 pub use bsdf::{Bsdf, BsdfSample};

@@ -10,6 +10,7 @@ use crate::{
     sampling::Frame,
     texture::Textures,
     uv::TexturePoint,
+    velvet,
 };
 use dioptric_optics::Glass;
 use dioptric_spectrum::{Spectrum, lanes};
@@ -131,6 +132,15 @@ pub enum Material {
         /// The square root of GGX's α of the coat, 0–1.
         roughness: TextureId,
     },
+    /// A material below the sheen of cloth, which takes what its fibers send back (`KHR_materials_sheen`).
+    Sheen {
+        /// What lies below.
+        base: MaterialId,
+        /// The color of the fibers, 0–1.
+        color: TextureId,
+        /// The square root of their α, 0–1.
+        roughness: TextureId,
+    },
     /// The light of two materials together.
     Sum {
         /// The two.
@@ -249,6 +259,7 @@ impl Material {
                 [*color, *metallic, *roughness, *mirrored, *edge].into_iter().chain(*transmission).collect()
             }
             Self::Clearcoat { amount, roughness, .. } => vec![*amount, *roughness],
+            Self::Sheen { color, roughness, .. } => vec![*color, *roughness],
             Self::Metal { roughness, .. } | Self::Dielectric { roughness, .. } => rough(roughness),
             Self::Coated { base, roughness, .. } => [vec![*base], rough(roughness)].concat(),
             Self::Blend { amount, .. } => vec![*amount],
@@ -260,7 +271,7 @@ impl Material {
     pub(crate) fn parts(&self) -> &[MaterialId] {
         match self {
             Self::Blend { of, .. } | Self::Sum { of } => of,
-            Self::Clearcoat { base, .. } => std::slice::from_ref(base),
+            Self::Clearcoat { base, .. } | Self::Sheen { base, .. } => std::slice::from_ref(base),
             _ => &[],
         }
     }
@@ -288,6 +299,7 @@ impl Surfaces<'_> {
         match &self.surfaces[material.0 as usize].material {
             Material::Matte { .. } | Material::RoughMatte { .. } | Material::Translucent { .. } => false,
             Material::Sum { of } | Material::Blend { of, .. } => of.iter().any(|&part| self.may_mirror(part)),
+            Material::Sheen { base, .. } => self.may_mirror(*base),
             _ => true,
         }
     }
@@ -449,6 +461,14 @@ impl Surfaces<'_> {
                 let coat = Lobe::Mirror { reflectance: [1.0; N], rough: Ggx::new(alpha, alpha) };
                 bsdf.push(share * mirrored, coat);
                 part(bsdf, *base, share * (1.0 - mirrored), is_term);
+                return;
+            }
+            Material::Sheen { base, color, roughness } => {
+                let (color, alpha) = (share_of(*color), number(*roughness).powi(2));
+                let most = color.iter().copied().fold(0.0, f32::max);
+                let sent_back = most * velvet::albedo(alpha, bsdf.cosine());
+                bsdf.push_term(share, Lobe::Velvet { color, alpha });
+                part(bsdf, *base, share * (1.0 - sent_back), true);
                 return;
             }
             Material::Sum { of } => {

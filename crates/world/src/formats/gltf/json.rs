@@ -78,6 +78,10 @@ const WORDS: &[(&str, &str)] = &[
         "diffuseFactor:4=0|1 diffuseTexture:object glossinessFactor:1=0|1 specularFactor:3=0|1 specularGlossinessTexture:object",
     ),
     (
+        "KHR_materials_sheen",
+        "sheenColorFactor:3=0|1 sheenColorTexture:object sheenRoughnessFactor:1=0|1 sheenRoughnessTexture:object",
+    ),
+    (
         "KHR_materials_specular",
         "specularColorFactor:3=0| specularColorTexture:object specularFactor:1=0|1 specularTexture:object",
     ),

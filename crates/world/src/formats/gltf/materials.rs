@@ -150,9 +150,13 @@ impl Reader<'_> {
         let is_coated = extension(material, "KHR_materials_clearcoat")
             .filter(|coat| number_or(Some(coat), "clearcoatFactor", 0.0) > 0.0);
         let is_filled = through.is_some() && volume.is_some();
+        let sheen = extension(material, "KHR_materials_sheen").filter(|sheen| {
+            numbers::<3>(sheen, "sheenColorFactor").is_some_and(|color| color.iter().any(|v| *v > 0.0))
+        });
         let relief_of = |is_last: bool| if is_last { relief } else { None };
-        let mut id = self.builder.add_material_with(name, base, relief_of(!is_filled && is_coated.is_none()));
-        if let (Some(through), Some(volume)) = (through, volume) {
+        let mut id =
+            self.builder.add_material_with(name, base, relief_of(!is_filled && is_coated.is_none() && sheen.is_none()));
+        if let (Some(through), true) = (through, volume.is_some()) {
             let alpha = self.builder.add_texture(Texture::Product([roughness, roughness]));
             let glass = Material::Glass {
                 reflectance: self.even(1.0),
@@ -166,10 +170,21 @@ impl Reader<'_> {
             let rest = self.builder.add_texture(Texture::Blend { of: [one, zero], amount: metallic });
             let amount = self.builder.add_texture(Texture::Product([through, rest]));
             let blend = Material::Blend { of: [id, glass], amount };
-            id = self.builder.add_material_with(name, blend, relief_of(is_coated.is_none()));
-            if let Some(per_m) = absorption(volume) {
-                self.builder.set_absorption(id, per_m);
+            id = self.builder.add_material_with(name, blend, relief_of(is_coated.is_none() && sheen.is_none()));
+        }
+        if let Some(sheen) = sheen {
+            let color = numbers::<3>(sheen, "sheenColorFactor").unwrap_or([0.0; 3]).map(|v| v as f32);
+            let mut of_fibers = self.curve(SpectralCurve::from_rgb_reflectance(color));
+            if let Some(Picture { image, mapping }) = self.picture(Some(sheen), "sheenColorTexture", Holds::Colors)? {
+                of_fibers = self.times(of_fibers, Texture::Image { image, mapping, scale: 1.0 }, color == [1.0; 3]);
             }
+            let rough = number_or(Some(sheen), "sheenRoughnessFactor", 0.0) as f32;
+            let roughness = match self.picture(Some(sheen), "sheenRoughnessTexture", Holds::Numbers)? {
+                Some(picture) => self.builder.add_texture(picture.channel(3, rough)),
+                None => self.even(rough),
+            };
+            let velvet = Material::Sheen { base: id, color: of_fibers, roughness };
+            id = self.builder.add_material_with(name, velvet, relief_of(is_coated.is_none()));
         }
         if let Some(coat) = is_coated {
             let amount = number_or(Some(coat), "clearcoatFactor", 0.0) as f32;
@@ -186,6 +201,9 @@ impl Reader<'_> {
                 self.builder.note_of("normal pictures of clear coats, which follow the base's", name);
             }
             id = self.builder.add_material_with(name, Material::Clearcoat { base: id, amount, roughness }, relief);
+        }
+        if let Some(per_m) = volume.filter(|_| is_filled).and_then(absorption) {
+            self.builder.set_absorption(id, per_m);
         }
         Ok(id)
     }

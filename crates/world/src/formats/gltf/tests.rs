@@ -337,3 +337,47 @@ fn instances_of_a_node_stand_where_it_says() {
     let variants = file("3", 3).replace(r#""KHR_lights_punctual":{"lights""#, of_file);
     assert!(read_text(&variants).unwrap().notes().iter().any(|note| note.ends_with(": green")));
 }
+
+/// Returns a world whose triangle has a black base and these extensions.
+fn extended(extensions: &str) -> World {
+    let dark = "\"baseColorFactor\":[0,0,0,1]";
+    let text = file("3", 3).replace("\"baseColorFactor\":[1,0,0,1]", dark);
+    let text = text.replace("\"emissiveFactor\":[0,0,1]", &format!("\"extensions\":{{{extensions}}}"));
+    read_text(&text).unwrap()
+}
+
+/// Blue fibers over a black base: blue is sent back as the table of sheens says, more towards the rim; what they send back the base lacks.
+#[test]
+fn cloth_has_a_sheen() {
+    let sheen = "\"KHR_materials_sheen\":{\"sheenColorFactor\":[0,0,1],\"sheenRoughnessFactor\":0.5}";
+    let (plain, cloth) = (extended(""), extended(sheen));
+    assert_eq!(cloth.notes(), [""; 0]);
+    for cos in [1.0_f32, 0.5, 0.2] {
+        let outgoing = Vec3::new((1.0 - cos * cos).sqrt(), 0.0, cos);
+        let [of_plain, of_cloth] =
+            [&plain, &cloth].map(|world| world.bsdf(&seen(world, [0.2, 0.2]), outgoing, &[450.0, 620.0]).albedo());
+        let fibers = crate::velvet::albedo(0.25, cos);
+        let expected = of_plain[0] * (1.0 - fibers) + fibers;
+        assert!((of_cloth[0] - expected).abs() < 0.05 * expected, "{cos}: {of_cloth:?} {expected}");
+        assert!(of_cloth[1] < of_cloth[0] && of_cloth[1] > 0.0, "{of_cloth:?}");
+    }
+}
+
+/// Glass takes light below its coat and its sheen too.
+#[test]
+fn volumes_are_kept_below_coats_and_sheens() {
+    let volume = "\"KHR_materials_transmission\":{\"transmissionFactor\":1},\"KHR_materials_volume\":{\"thicknessFactor\":1,\
+                  \"attenuationDistance\":2,\"attenuationColor\":[0.5,0.5,0.5]}";
+    for more in [
+        "",
+        ",\"KHR_materials_clearcoat\":{\"clearcoatFactor\":1}",
+        ",\"KHR_materials_sheen\":{\"sheenColorFactor\":[1,1,1]}",
+    ] {
+        let world = extended(&format!("{volume}{more}"));
+        // From behind, and so from within, 4 m on.
+        let ray = Ray { origin: Vec3::new(0.2, 0.2, -7.0), direction: Vec3::Z };
+        let hit = world.intersect(&ray, f32::INFINITY).unwrap();
+        let left = world.transmittance(&hit, &ray, &[550.0]).expect("a volume that absorbs")[0];
+        assert!((left - 0.25).abs() < 1e-4, "{more}: {left}");
+    }
+}
