@@ -120,7 +120,7 @@ const MOST_CORNERS: usize = 4096;
 /// Returns the triangles of a polygon, in its corners' numbers: a fan, or, where it isn't convex, ear by ear.
 pub(crate) fn polygon(corners: &[Vec3]) -> Vec<[usize; 3]> {
     let n = corners.len();
-    if n < 4 || n > MOST_CORNERS {
+    if !(4..=MOST_CORNERS).contains(&n) {
         return (2..n).map(|k| [0, k - 1, k]).collect();
     }
     // Seen along Newell's normal, in f64, counterclockwise.

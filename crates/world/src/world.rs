@@ -580,6 +580,13 @@ impl WorldBuilder {
         }
     }
 
+    /// Says how far what is brushed is turned from u, counterclockwise, rad.
+    pub fn set_turn(&mut self, material: MaterialId, turn_rad: f32) {
+        if let Some(surface) = self.surfaces.get_mut(material.0 as usize) {
+            surface.turn_rad = turn_rad;
+        }
+    }
+
     /// Says what the medium that fills shapes of a material takes from light, 1/m. Shapes must be closed, and their material
     /// let light in.
     pub fn set_absorption(&mut self, material: MaterialId, per_m: SpectralCurve) {

@@ -494,6 +494,7 @@ impl Library {
                 mirrored: self.builder.add_texture(Texture::Curve(layer)),
                 edge: self.even(largest.max(if has_layer { 1.0 } else { 0.0 })),
                 transmission: None,
+                brushed: None,
             }
         };
         let relief = self.relief(words);

@@ -404,7 +404,7 @@ mod tests {
         assert!(refused(&format!("{HEADER}{vertices}3 0 1 9\n")).contains("[0, 1, 9]"));
     }
 
-    /// What MeshLab and trimesh write: texture coordinates and colors of faces, and the name of a picture.
+    /// What `MeshLab` and trimesh write: texture coordinates and colors of faces, and the name of a picture.
     #[test]
     fn faces_have_coordinates_and_colors_of_their_own() {
         let folder = tempfile::tempdir().unwrap();

@@ -12,7 +12,7 @@ use crate::{TriangleMesh, WorldError};
 const HEADER: usize = 80;
 const TRIANGLE: usize = 50;
 
-/// Reads the mesh of an STL file, with the colors that VisCAM's and Magics' binary files have. Its normals are left out: they are those
+/// Reads the mesh of an STL file, with the colors that `VisCAM`'s and Magics' binary files have. Its normals are left out: they are those
 /// of the triangles.
 ///
 /// # Errors
@@ -76,7 +76,7 @@ fn binary(bytes: &[u8]) -> Contents {
 }
 
 /// Returns a color a triangle from the two bytes behind each, or none, and what isn't known of them. Magics' header has the color of the
-/// whole, which triangles with the highest bit have; VisCAM's highest bit says that there is a color.
+/// whole, which triangles with the highest bit have; `VisCAM`'s highest bit says that there is a color.
 fn colors(header: &[u8], codes: &[u16]) -> (Vec<[f32; 3]>, Vec<String>) {
     if codes.iter().all(|code| *code == 0) && !header.windows(6).any(|word| word == b"COLOR=") {
         return (Vec::new(), Vec::new());
@@ -184,7 +184,7 @@ mod tests {
         assert!(read(b"nothing").unwrap_err().to_string().contains("solid"));
     }
 
-    /// The two bytes behind a triangle: red by VisCAM, blue by Magics, whose whole is green; and no color at all.
+    /// The two bytes behind a triangle: red by `VisCAM`, blue by Magics, whose whole is green; and no color at all.
     #[test]
     fn colors_are_those_of_either_program() {
         let with = |header: &[u8], codes: [u16; 2]| {

@@ -65,6 +65,7 @@ const WORDS: &[(&str, &str)] = &[
     ("KHR_lights_punctual", "light:index lights:objects"),
     ("KHR_lights_punctual.lights", "color:3=0| intensity:1=0| range:1=0| spot:object type:text"),
     ("KHR_lights_punctual.lights.spot", "innerConeAngle:1=0|1.5708 outerConeAngle:1=0|1.5708"),
+    ("KHR_materials_anisotropy", "anisotropyRotation:1 anisotropyStrength:1=0|1 anisotropyTexture:object"),
     (
         "KHR_materials_clearcoat",
         "clearcoatFactor:1=0|1 clearcoatNormalTexture:object clearcoatRoughnessFactor:1=0|1 clearcoatRoughnessTexture:object \

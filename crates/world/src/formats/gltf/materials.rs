@@ -146,7 +146,11 @@ impl Reader<'_> {
             .filter(|volume| number_or(Some(volume), "thicknessFactor", 0.0) > 0.0);
         let relief = self.relief(material)?;
         let thin = through.filter(|_| volume.is_none());
-        let base = Material::MetallicRoughness { color, metallic, roughness, mirrored, edge, transmission: thin };
+        let brushed = extension(material, "KHR_materials_anisotropy");
+        let turn_rad = number_or(brushed, "anisotropyRotation", 0.0) as f32;
+        let brushed = self.brushed(brushed)?;
+        let base =
+            Material::MetallicRoughness { color, metallic, roughness, mirrored, edge, transmission: thin, brushed };
         let is_coated = extension(material, "KHR_materials_clearcoat")
             .filter(|coat| number_or(Some(coat), "clearcoatFactor", 0.0) > 0.0);
         let is_filled = through.is_some() && volume.is_some();
@@ -202,10 +206,29 @@ impl Reader<'_> {
             }
             id = self.builder.add_material_with(name, Material::Clearcoat { base: id, amount, roughness }, relief);
         }
+        if brushed.is_some() {
+            self.builder.set_turn(id, turn_rad);
+        }
         if let Some(per_m) = volume.filter(|_| is_filled).and_then(absorption) {
             self.builder.set_absorption(id, per_m);
         }
         Ok(id)
+    }
+
+    /// Returns how strongly a surface is brushed.
+    fn brushed(&mut self, of: Option<&Value>) -> Result<Option<TextureId>, WorldError> {
+        let strength = number_or(of, "anisotropyStrength", 0.0) as f32;
+        if strength <= 0.0 {
+            return Ok(None);
+        }
+        Ok(Some(match self.picture(of, "anisotropyTexture", Holds::Numbers)? {
+            Some(picture) => {
+                self.builder
+                    .note("directions in pictures of how surfaces are brushed: left out, all is brushed one way");
+                self.builder.add_texture(picture.channel(2, strength))
+            }
+            None => self.even(strength),
+        }))
     }
 
     fn transmission(&mut self, material: &Value) -> Result<Option<TextureId>, WorldError> {

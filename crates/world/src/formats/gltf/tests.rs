@@ -381,3 +381,34 @@ fn volumes_are_kept_below_coats_and_sheens() {
         assert!((left - 0.25).abs() < 1e-4, "{more}: {left}");
     }
 }
+
+/// Brushed metal: towards the side along u the highlight is as wide as of the rougher α, across as of the finer, turned by its rotation.
+#[test]
+fn brushed_metal_spreads_light_along_its_turn() {
+    let with = |extension: &str| {
+        let metal = r#""baseColorFactor":[1,1,1,1],"metallicFactor":1,"roughnessFactor":0.4"#;
+        let text = file("3", 3).replace(r#""baseColorFactor":[1,0,0,1],"metallicFactor":0"#, metal);
+        let world =
+            read_text(&text.replace(r#""emissiveFactor":[0,0,1]"#, &format!(r#""extensions":{{{extension}}}"#)))
+                .unwrap();
+        let bsdf = world.bsdf(&seen(&world, [0.2, 0.2]), Vec3::Z, &[550.0]);
+        [Vec3::X, Vec3::Y].map(|side| bsdf.eval((Vec3::Z + 0.5 * side).normalize())[0])
+    };
+    let even = with("");
+    assert!((even[0] / even[1] - 1.0).abs() < 1e-4, "{even:?}");
+    let brushed = |turn: &str| with(&format!(r#""KHR_materials_anisotropy":{{"anisotropyStrength":0.7{turn}}}"#));
+    // GGX's density and masking by α of 0.16 and 0.16 + 0.84 · 0.49, at a tilt whose tangent is tan(atan(0.5)/2).
+    let tan = (0.5_f64.atan() / 2.0).tan();
+    let value = |along: f64, across: f64| {
+        let root = 1.0 + (tan / along).powi(2);
+        let lambda = 0.5 * ((1.0 + (0.5 * along).powi(2)).sqrt() - 1.0);
+        let cos = tan.atan().cos();
+        1.0 / (std::f64::consts::PI * along * across * root * root * cos.powi(4)) / (1.0 + lambda) / 4.0
+    };
+    let (fine, rough) = (0.16, 0.16 + 0.84 * 0.49);
+    let [along, across] = brushed("");
+    assert!((f64::from(along) / value(rough, fine) - 1.0).abs() < 1e-3, "{along} {}", value(rough, fine));
+    assert!((f64::from(across) / value(fine, rough) - 1.0).abs() < 1e-3, "{across} {}", value(fine, rough));
+    let turned = brushed(r#","anisotropyRotation":1.5707963"#);
+    assert!((turned[0] / across - 1.0).abs() < 1e-3 && (turned[1] / along - 1.0).abs() < 1e-3, "{turned:?}");
+}

@@ -193,6 +193,7 @@ impl Reader<'_> {
             mirrored: self.even(mirrored as f32),
             edge: self.even(1.0),
             transmission: None,
+            brushed: None,
         })
     }
 
