@@ -114,6 +114,12 @@ impl TriangleMesh {
     }
 }
 
+/// Returns twice the area of a polygon along its normal (Newell's).
+pub(crate) fn area_vector(corners: &[Vec3]) -> DVec3 {
+    let from_first = |k: usize| (corners[k] - corners[0]).as_dvec3();
+    (2..corners.len()).map(|k| from_first(k - 1).cross(from_first(k))).sum()
+}
+
 /// The most corners of a polygon that isn't convex and is cut by its ears.
 const MOST_CORNERS: usize = 4096;
 
@@ -125,7 +131,7 @@ pub(crate) fn polygon(corners: &[Vec3]) -> Vec<[usize; 3]> {
     }
     // Seen along Newell's normal, in f64, counterclockwise.
     let next = |k: usize| (k + 1) % n;
-    let normal: DVec3 = (0..n).map(|k| corners[k].as_dvec3().cross(corners[next(k)].as_dvec3())).sum();
+    let normal = area_vector(corners);
     let (across, up) = normal.try_normalize().unwrap_or(DVec3::Z).any_orthonormal_pair();
     let flat: Vec<DVec2> = corners.iter().map(|p| DVec2::new(p.as_dvec3().dot(across), p.as_dvec3().dot(up))).collect();
     let turn = |a: usize, b: usize, c: usize| (flat[b] - flat[a]).perp_dot(flat[c] - flat[b]);

@@ -14,7 +14,8 @@ use glam::{DAffine3, DVec3, Vec2, Vec3};
 use super::{MAX_BYTES, read_bytes};
 use crate::{
     Emission, Encoding, ImageTexture, Material, MaterialId, Relief, Shape, SpectralCurve, Texture, TextureId,
-    TriangleMesh, UvMapping, WorldBuilder, WorldError, Wrap, mesh::polygon,
+    TriangleMesh, UvMapping, WorldBuilder, WorldError, Wrap,
+    mesh::{area_vector, polygon},
 };
 
 /// Triangles of one object and material.
@@ -208,7 +209,7 @@ impl Contents {
         });
         let Part { mesh, known, smoothed, has: part_has, .. } = &mut self.parts[index];
         let places: Vec<Vec3> = corners.iter().map(|[p, ..]| self.positions[*p as usize]).collect();
-        let flat: Vec3 = (0..places.len()).map(|k| places[k].cross(places[(k + 1) % places.len()])).sum();
+        let flat = area_vector(&places).as_vec3();
         let mut triangles = std::mem::take(&mut mesh.triangles);
         let mut vertex = |corner: [u32; 3]| {
             let mut smooth = NONE;
@@ -258,21 +259,42 @@ impl Part {
         }
         match has_normals {
             false => mesh.normals.clear(),
-            true => {
-                for triangle in &mesh.triangles {
-                    let [a, b, c] = triangle.map(|v| mesh.positions[v as usize]);
-                    let flat = (b - a).cross(c - a).normalize_or_zero();
-                    for &vertex in triangle {
-                        let normal = &mut mesh.normals[vertex as usize];
-                        if *normal == Vec3::ZERO || !normal.is_finite() {
-                            *normal = flat;
-                        }
-                    }
-                }
-            }
+            true => with_flat_normals(&mut mesh),
         }
         mesh.check().map_err(|e| WorldError::Unreadable { file: path.to_owned(), reason: e.to_string() })?;
         Ok(mesh)
+    }
+}
+
+/// Gives vertices without a normal that of their face; where faces of several directions share one, each has its own.
+fn with_flat_normals(mesh: &mut TriangleMesh) {
+    let lacks: Vec<bool> = mesh.normals.iter().map(|n| *n == Vec3::ZERO || !n.is_finite()).collect();
+    if !lacks.contains(&true) {
+        return;
+    }
+    let mut is_given = vec![false; lacks.len()];
+    for triangle in &mut mesh.triangles {
+        let [a, b, c] = triangle.map(|v| mesh.positions[v as usize]);
+        let flat = (b - a).cross(c - a).normalize_or_zero();
+        for vertex in triangle {
+            let v = *vertex as usize;
+            if !lacks[v] || is_given[v] && mesh.normals[v] == flat {
+                continue;
+            }
+            if !is_given[v] {
+                (is_given[v], mesh.normals[v]) = (true, flat);
+                continue;
+            }
+            *vertex = mesh.positions.len() as u32;
+            mesh.positions.push(mesh.positions[v]);
+            mesh.normals.push(flat);
+            if !mesh.uvs.is_empty() {
+                mesh.uvs.push(mesh.uvs[v]);
+            }
+            if !mesh.colors.is_empty() {
+                mesh.colors.push(mesh.colors[v]);
+            }
+        }
     }
 }
 
@@ -780,6 +802,15 @@ mod tests {
         assert_eq!(sharp.positions.len(), 8);
         assert!(sharp.normals[0].abs_diff_eq(Vec3::new(1.0, 1.0, 0.0).normalize(), 1e-6), "{:?}", sharp.normals);
         assert!(normals(["off", "0"]).normals.is_empty());
+        // Beside a smoothed face those without a group keep their edges.
+        let text = format!("{roof}s 1\nf 1 2 4 3\ns off\nf 2 1 5 6\nf 5 6 4 3\n");
+        let mesh = read_text(text.as_bytes()).unwrap().remove(0).1;
+        for t in 0..mesh.triangles.len() {
+            let [a, b, c] = mesh.corners(t);
+            let flat = (b - a).cross(c - a).normalize();
+            let is_flat = |v: u32| mesh.normals[v as usize].abs_diff_eq(flat, 1e-6);
+            assert!(mesh.triangles[t].into_iter().all(is_flat), "{t}: {:?}", mesh.normals);
+        }
     }
 
     /// Reads one triangle across the origin of a material; returns its albedo, seen along −z, and whether it is met.

@@ -9,7 +9,7 @@ const GROUP: usize = 16;
 const MOST_OF_BLOCK: usize = 256;
 const BYTES_OF_BLOCK: usize = 8192;
 /// What the packed bytes may become at most, a byte.
-const MOST_EXPANSION: usize = 100;
+const MOST_EXPANSION: usize = 32;
 
 /// Returns the bytes of a packed buffer view, and the stride of its rows.
 pub(super) fn unpacked(view: &Value, buffers: &[Vec<u8>]) -> Result<(Vec<u8>, Option<usize>), String> {

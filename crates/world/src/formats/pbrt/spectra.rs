@@ -42,8 +42,13 @@ impl Reader<'_> {
             "rgb" | "color" => colored(three()?),
             "xyz" => colored(Xyz(three()?).to_linear_srgb()),
             "float" => match *param.numbers {
-                [value] => SpectralCurve::constant(value as f32),
-                _ => return Err(wrong("one number")),
+                [value, ref more @ ..] => {
+                    if !more.is_empty() {
+                        self.builder.note_of("numbers of parameters behind the first, left out", param.name);
+                    }
+                    SpectralCurve::constant(value as f32)
+                }
+                [] => return Err(wrong("a number")),
             },
             "blackbody" => {
                 let kelvin = *param.numbers.first().ok_or_else(|| wrong("a temperature, K"))?;
