@@ -31,8 +31,9 @@ pub(super) fn add(mesh: &mut TriangleMesh, params: &Params<'_>) -> Result<(), St
     let n_points = points.len();
     let n_pieces = if is_spline { n_points.saturating_sub(degree) } else { n_points.saturating_sub(1) / degree };
     let is_whole = if is_spline { n_pieces > 0 } else { n_pieces > 0 && n_pieces * degree + 1 == n_points };
-    if !is_whole || n_points > MOST_POINTS {
-        return Err(format!("a curve of {n_points} points and degree {degree}"));
+    let n_numbers = params.numbers("P").map_or(0, <[f64]>::len);
+    if !is_whole || n_points > MOST_POINTS || n_numbers != 3 * n_points {
+        return Err(format!("a curve of {n_points} points ({n_numbers} numbers) and degree {degree}"));
     }
     if is_ribbon && normals.len() != n_pieces + 1 {
         return Err(format!(
@@ -179,6 +180,8 @@ mod tests {
             let ends = if degree == 2 { (0.5, 4.5) } else { (1.0, 4.0) };
             assert!((low - ends.0).abs() < 1e-4 && (high - ends.1).abs() < 1e-4, "{degree}: {low} {high}");
         }
-        assert!(mesh("\"point3 P\" [0 0 0 1 0 0]").unwrap_err().contains("2 points"));
+        for numbers in ["0 0 0 1 0 0", "0 0 0 1 0 0 2 0 0 3 0 0 4"] {
+            assert!(mesh(&format!("\"point3 P\" [{numbers}]")).unwrap_err().contains("points"));
+        }
     }
 }
