@@ -10,6 +10,7 @@ use crate::{
     fresnel,
     microfacet::Ggx,
     sampling::{Frame, ONE_MINUS_EPSILON, cosine_hemisphere},
+    velvet,
 };
 
 /// The scattering function of one point of a surface, for light that leaves it in one direction, at `N` wavelengths.
@@ -99,6 +100,11 @@ pub(crate) enum Lobe<const N: usize> {
         diffuse: [f32; N],
         mirrored: [f32; N],
         rough: Option<Ggx>,
+    },
+    /// The sheen of cloth (`velvet.rs`).
+    Velvet {
+        color: [f32; N],
+        alpha: f32,
     },
     Open,
 }
@@ -234,6 +240,7 @@ impl<const N: usize> Bsdf<N> {
         self.lobes().iter().all(|(_, lobe)| match lobe {
             Lobe::Diffuse { .. }
             | Lobe::RoughDiffuse { .. }
+            | Lobe::Velvet { .. }
             | Lobe::Coated { .. }
             | Lobe::Layered { .. }
             | Lobe::Substrate { .. } => false,
@@ -275,6 +282,7 @@ impl<const N: usize> Bsdf<N> {
         let is_opaque = |lobe: &Lobe<N>| match lobe {
             Lobe::Diffuse { transmittance, .. } => transmittance.iter().all(|&t| t == 0.0),
             Lobe::RoughDiffuse { .. }
+            | Lobe::Velvet { .. }
             | Lobe::Mirror { .. }
             | Lobe::Glossy { .. }
             | Lobe::Metal { .. }
@@ -321,6 +329,10 @@ impl<const N: usize> Lobe<N> {
                 let steeper = o.z.abs().max(i.z.abs()).max(1e-6);
                 let shape = a + b * along.max(0.0) * sin_o * sin_i / steeper;
                 lanes(|lane| reflectance[lane] * shape * FRAC_1_PI * i.z.abs())
+            }
+            Self::Velvet { color, alpha } if is_reflection => {
+                let value = velvet::value(*alpha, o, i);
+                color.map(|c| c * value)
             }
             Self::Mirror { reflectance, rough: Some(ggx) } if is_reflection => {
                 let (common, _) = facet_reflection(ggx, o, i);
@@ -386,7 +398,7 @@ impl<const N: usize> Lobe<N> {
                 let p = self.diffuse_reflection_probability();
                 (if is_reflection { p } else { 1.0 - p }) * FRAC_1_PI * i.z.abs()
             }
-            Self::RoughDiffuse { .. } if is_reflection => FRAC_1_PI * i.z.abs(),
+            Self::RoughDiffuse { .. } | Self::Velvet { .. } if is_reflection => FRAC_1_PI * i.z.abs(),
             Self::Mirror { rough: Some(ggx), .. }
             | Self::Glossy { rough: Some(ggx), .. }
             | Self::Metal { rough: Some(ggx), .. }
@@ -419,7 +431,7 @@ impl<const N: usize> Lobe<N> {
     /// Whether the number means a mirror direction.
     fn is_delta_for(&self, u_lobe: f32, o: Vec3) -> bool {
         match self {
-            Self::Diffuse { .. } | Self::RoughDiffuse { .. } => false,
+            Self::Diffuse { .. } | Self::RoughDiffuse { .. } | Self::Velvet { .. } => false,
             Self::Mirror { rough, .. }
             | Self::Glossy { rough, .. }
             | Self::Metal { rough, .. }
@@ -448,7 +460,7 @@ impl<const N: usize> Lobe<N> {
             Self::Diffuse { .. } => {
                 Some(diffuse(if u_lobe < self.diffuse_reflection_probability() { side } else { -side }))
             }
-            Self::RoughDiffuse { .. } => Some(diffuse(side)),
+            Self::RoughDiffuse { .. } | Self::Velvet { .. } => Some(diffuse(side)),
             Self::Mirror { rough, .. } | Self::Glossy { rough, .. } | Self::Metal { rough, .. } => {
                 mirrored(rough.as_ref()?)
             }
@@ -526,7 +538,7 @@ impl<const N: usize> Lobe<N> {
                 Some(Mirrored { incident, value, probability: 1.0 - probability, is_dispersed })
             }
             Self::Open => Some(Mirrored { incident: -o, value: [1.0; N], probability: 1.0, is_dispersed: false }),
-            Self::Diffuse { .. } | Self::RoughDiffuse { .. } => None,
+            Self::Diffuse { .. } | Self::RoughDiffuse { .. } | Self::Velvet { .. } => None,
         }
     }
 
@@ -558,6 +570,10 @@ impl<const N: usize> Lobe<N> {
                 lanes(|lane| {
                     diffuse[lane] * (1.0 - mirrored[lane]) * base + fresnel::between(mirrored[lane], 1.0, tail)
                 })
+            }
+            Self::Velvet { color, alpha } => {
+                let albedo = velvet::albedo(*alpha, cos);
+                color.map(|c| c * albedo)
             }
             Self::Open => [1.0; N],
             Self::Coated { diffuse, index, inside, .. } => {
@@ -719,6 +735,7 @@ mod tests {
             coated(0.7, rough),
             coated(0.7, None),
             Lobe::RoughDiffuse { reflectance: [0.6], constants: [0.8, 0.3] },
+            Lobe::Velvet { color: [0.8], alpha: 0.25 },
             Lobe::Glossy { reflectance: [0.8], index: [1.5], rough },
             Lobe::Pane { reflectance: [0.2], transmittance: [0.7], rough },
             Lobe::Layered { diffuse: [0.5], mirrored: [0.1], edge: 0.9, lost: [0.04, 1.0], rough },
@@ -795,6 +812,16 @@ mod tests {
                     .sum();
                 assert!((integral - mean).abs() < 0.02 * integral + 2e-3, "{lobe:?} {cos}: {integral} {mean}");
             }
+        }
+    }
+
+    /// What a sheen sends back, by its table and by draws.
+    #[test]
+    fn sheen_sends_back_what_its_table_says() {
+        for (alpha, cos) in [(0.09, 0.3), (0.25, 0.8), (0.5, 0.5), (1.0, 0.2), (1.0, 1.0)] {
+            let total = furnace(Lobe::Velvet { color: [1.0], alpha }, direction(cos, 1.0));
+            let table = f64::from(velvet::albedo(alpha, cos));
+            assert!((total - table).abs() < 0.01, "{alpha} {cos}: {total} {table}");
         }
     }
 

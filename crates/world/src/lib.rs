@@ -44,6 +44,7 @@ mod texture;
 mod tree;
 mod triangle;
 mod uv;
+mod velvet;
 mod world;
 
 pub use bsdf::{Bsdf, BsdfSample};
@@ -55,7 +56,7 @@ pub use glam;
 pub use ids::{GroupId, InstanceId, LightId, MaterialId, ShapeId, TextureId};
 pub use image_texture::{Encoding, ImageTexture, Wrap};
 pub use lathe::Lathe;
-pub use light::{Emission, FallOff, Flux, Light, LightSample};
+pub use light::{Emission, FallOff, Flux, Layout, Light, LightSample};
 pub use material::{Material, Relief, Roughness};
 pub use mesh::TriangleMesh;
 pub use metals::MetalKind;

@@ -1,11 +1,17 @@
 //! What gives light.
 
-use glam::{DVec3, Vec3};
-use std::f32::consts::{PI, TAU};
+use std::{
+    f32::consts::{PI, TAU},
+    sync::Arc,
+};
 
-use dioptric_spectrum::{Observer, Spectrum, WavelengthGrid};
+use dioptric_spectrum::{Observer, SmoothReflectance, Spectrum, WavelengthGrid, lanes};
+use glam::{DMat3, DVec2, DVec3, Vec3};
 
-use crate::{Beyond, LightId, SkyImage, SpectralCurve, WorldError, light_tree::LightBounds, sampling::cone};
+use crate::{
+    Beyond, ImageTexture, LightId, SkyImage, SkyMapping, SpectralCurve, WorldError, light_tree::LightBounds,
+    sampling::cone, sky::luminance,
+};
 
 /// A light that is no shape.
 #[derive(Clone, Debug, PartialEq)]
@@ -32,6 +38,19 @@ pub enum Light {
         /// How it falls between the two.
         fall_off: FallOff,
     },
+    /// A point that shines by a picture of its directions: a lamp by its measured distribution, or a projector.
+    Pictured {
+        /// Where it is, m.
+        position: DVec3,
+        /// Radiant intensity where the picture is white, W sr⁻¹ nm⁻¹.
+        intensity: SpectralCurve,
+        /// The picture.
+        picture: Arc<ImageTexture>,
+        /// Which direction is where in it.
+        layout: Layout,
+        /// Turns the picture's directions into those of the world; orthonormal.
+        world_from_light: DMat3,
+    },
     /// Parallel light from far away, like the sun's.
     Distant {
         /// Where the light goes, of length 1.
@@ -46,6 +65,63 @@ pub enum Light {
     },
     /// The radiance of a picture of all directions.
     SkyImage(SkyImage),
+}
+
+/// Where the directions of a lamp lie on its picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Layout {
+    /// All of them; the mean of its channels counts.
+    Around(SkyMapping),
+    /// Those ahead, along +z, in color: right and left, up and down to these tangents, with +x at the right and +y at the top.
+    Ahead {
+        /// Of half the width.
+        tan_x: f64,
+        /// Of half the height.
+        tan_y: f64,
+    },
+}
+
+impl Layout {
+    /// Returns what the intensity in a direction is multiplied by.
+    fn share<const N: usize>(self, picture: &ImageTexture, d: DVec3, wavelengths_nm: &[f32; N]) -> [f32; N] {
+        match self {
+            Self::Around(mapping) => {
+                let rgb = picture.rgb_at(mapping.uv_of(d.as_vec3()));
+                [rgb.iter().sum::<f32>() / 3.0; N]
+            }
+            Self::Ahead { tan_x, tan_y } => {
+                let at = DVec2::new(d.x / tan_x, d.y / tan_y) / d.z;
+                if d.z <= 0.0 || at.abs().max_element() > 1.0 {
+                    return [0.0; N];
+                }
+                let rgb = picture.rgb_at((0.5 * (at + 1.0)).as_vec2());
+                let largest = rgb.into_iter().fold(0.0, f32::max);
+                if !(largest > 0.0 && largest.is_finite()) {
+                    return [0.0; N];
+                }
+                SmoothReflectance::of_rgb(rgb.map(|v| v / largest)).at(wavelengths_nm).map(|share| largest * share)
+            }
+        }
+    }
+
+    /// Returns the flux, in lumens, of a lamp of such a picture whose intensity is 1 cd where it is white.
+    pub(crate) fn flux(self, picture: &ImageTexture) -> f64 {
+        let Self::Ahead { tan_x, tan_y } = self else {
+            let Self::Around(mapping) = self else { return 0.0 };
+            return 4.0 * std::f64::consts::PI * mapping.mean_of(picture);
+        };
+        let (columns, rows) = picture.size();
+        let mut sum = 0.0;
+        for y in 0..rows {
+            for x in 0..columns {
+                let at = DVec2::new((x as f64 + 0.5) / columns as f64, (y as f64 + 0.5) / rows as f64);
+                let way = (2.0 * at - 1.0) * DVec2::new(tan_x, tan_y);
+                // Of an element of the plane at distance 1 the solid angle is cos³.
+                sum += luminance(picture.rgb_at(at.as_vec2())) * (1.0 + way.length_squared()).powf(-1.5);
+            }
+        }
+        sum * 4.0 * tan_x * tan_y / (columns * rows) as f64
+    }
 }
 
 /// How a spot falls to 0 between its two angles, as a function of t, which goes from 0 to 1 with the cosine.
@@ -127,7 +203,7 @@ impl Light {
     /// Returns where it is and shines to; `None` of lights that are far away.
     pub(crate) fn bounds(&self) -> Option<LightBounds> {
         match self {
-            Self::Point { position, intensity } => {
+            Self::Point { position, intensity } | Self::Pictured { position, intensity, .. } => {
                 let at = position.as_vec3();
                 Some(LightBounds::all_around(at, at, 4.0 * PI * visible_power(intensity)))
             }
@@ -169,6 +245,13 @@ impl Light {
                     let cos = -f64::from(to_light.dot(direction.as_vec3()));
                     fall_off.at(outer_rad.cos(), inner_rad.cos(), cos) as f32
                 })
+            }
+            Self::Pictured { position, intensity, picture, layout, world_from_light } => {
+                let mut sample = point(*position, intensity, &|_| 1.0)?;
+                let ahead = world_from_light.transpose() * -sample.direction.as_dvec3();
+                let share = layout.share(picture, ahead, wavelengths_nm);
+                sample.radiance = lanes(|lane| sample.radiance[lane] * share[lane]);
+                sample.radiance.iter().any(|v| *v > 0.0).then_some(sample)
             }
             Self::Distant { direction, irradiance } => Some(LightSample {
                 direction: -direction.as_vec3(),
@@ -269,5 +352,44 @@ mod tests {
         };
         assert!((at(0.0) - 1.0).abs() < 1e-6 && (at(19.5) - 1.0).abs() < 1e-6);
         assert!(at(25.0) > 0.4 && at(25.0) < 0.6 && at(30.5) == 0.0 && at(180.0) == 0.0);
+    }
+
+    fn pictured(columns: usize, rgb: Vec<[f32; 3]>, layout: Layout) -> Light {
+        Light::Pictured {
+            position: DVec3::ZERO,
+            intensity: SpectralCurve::constant(2.0),
+            picture: Arc::new(ImageTexture::from_linear(columns, rgb, crate::Wrap::Clamp).unwrap()),
+            layout,
+            world_from_light: DMat3::IDENTITY,
+        }
+    }
+
+    /// Shadows of a picture fall where it says, and its flux is that of all directions together.
+    #[test]
+    fn pictured_lamps_shine_where_their_picture_is_bright() {
+        let (white, black, red) = ([1.0; 3], [0.0; 3], [1.0, 0.0, 0.0]);
+        // Bright above the horizon, dark below, of 4 rows.
+        let lamp = pictured(1, vec![white, white, black, black], Layout::Around(SkyMapping::LatLong));
+        let at = |light: &Light, d: Vec3, nm: f32| {
+            light.sample(d, [0.5; 2], &[nm], 1.0, LightId(0)).map_or(0.0, |seen| seen.radiance[0])
+        };
+        assert!((at(&lamp, Vec3::Z * 2.0, 550.0) - 0.5).abs() < 1e-6);
+        assert_eq!(at(&lamp, -Vec3::Z, 550.0), 0.0);
+        let even = pictured(2, vec![white; 4], Layout::Around(SkyMapping::EqualArea));
+        assert_eq!(at(&even, Vec3::new(0.6, 0.0, -0.8), 550.0), 2.0);
+        // A projector of 90° by 53°: red at the top right, white at the bottom left.
+        let layout = Layout::Ahead { tan_x: 1.0, tan_y: 0.5 };
+        let projector = pictured(2, vec![black, red, white, black], layout);
+        let [right, left] = [Vec3::new(0.7, 0.35, 1.0), Vec3::new(-0.7, -0.35, 1.0)];
+        assert!(at(&projector, right, 650.0) > 5.0 * at(&projector, right, 450.0));
+        assert!((at(&projector, left, 450.0) * left.length_squared() - 2.0).abs() < 0.02);
+        assert_eq!(at(&projector, Vec3::new(0.7, -0.4, 1.0), 550.0), at(&projector, Vec3::new(-0.7, 0.4, 1.0), 550.0));
+        assert_eq!([at(&projector, -left, 550.0), at(&projector, Vec3::new(1.1, 0.0, 1.0), 550.0)], [0.0; 2]);
+        // The solid angle of a rectangle, 4 asin(sin a sin b) of its half angles.
+        let flux = layout.flux(&ImageTexture::from_linear(64, vec![white; 64 * 64], crate::Wrap::Clamp).unwrap());
+        let expected = 4.0 * (1.0_f64.atan().sin() * 0.5_f64.atan().sin()).asin();
+        assert!((flux / expected - 1.0).abs() < 1e-3, "{flux} {expected}");
+        let Light::Pictured { picture, layout, .. } = &lamp else { panic!("a lamp by its picture") };
+        assert!((layout.flux(picture) - 2.0 * std::f64::consts::PI).abs() < 1e-5);
     }
 }

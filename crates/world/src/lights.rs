@@ -310,7 +310,8 @@ impl Source {
             Self::Alone(Light::Distant { irradiance, .. }) => Some(power(irradiance)),
             Self::Alone(Light::Sky { radiance }) => Some(PI * power(radiance)),
             Self::Sky(sky) => Some(PI * sky.mean()),
-            Self::Alone(Light::Point { .. } | Light::Spot { .. } | Light::SkyImage(_)) | Self::Area(_) => None,
+            Self::Alone(Light::Point { .. } | Light::Spot { .. } | Light::Pictured { .. } | Light::SkyImage(_))
+            | Self::Area(_) => None,
         }
     }
 }

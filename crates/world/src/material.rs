@@ -10,6 +10,7 @@ use crate::{
     sampling::Frame,
     texture::Textures,
     uv::TexturePoint,
+    velvet,
 };
 use dioptric_optics::Glass;
 use dioptric_spectrum::{Spectrum, lanes};
@@ -121,6 +122,8 @@ pub enum Material {
         edge: TextureId,
         /// The share of the base that lets light through; none for 0.
         transmission: Option<TextureId>,
+        /// How strongly it is brushed, 0–1: along u α goes towards 1 by the square of it; none for 0 (`KHR_materials_anisotropy`).
+        brushed: Option<TextureId>,
     },
     /// A material below a clear coat of index 1.5 that takes what it mirrors (`KHR_materials_clearcoat`).
     Clearcoat {
@@ -129,6 +132,15 @@ pub enum Material {
         /// The share of the surface that is coated, 0–1.
         amount: TextureId,
         /// The square root of GGX's α of the coat, 0–1.
+        roughness: TextureId,
+    },
+    /// A material below the sheen of cloth, which takes what its fibers send back (`KHR_materials_sheen`).
+    Sheen {
+        /// What lies below.
+        base: MaterialId,
+        /// The color of the fibers, 0–1.
+        color: TextureId,
+        /// The square root of their α, 0–1.
         roughness: TextureId,
     },
     /// The light of two materials together.
@@ -215,6 +227,8 @@ pub(crate) struct Surface {
     pub(crate) glow: Option<TextureId>,
     /// What a medium that fills the shape takes from light, 1/m.
     pub(crate) absorption: Option<SpectralCurve>,
+    /// How far what is brushed is turned from u, counterclockwise, rad.
+    pub(crate) turn_rad: f32,
     /// Whether rays may pass as if the surface weren't there.
     pub(crate) has_gaps: bool,
 }
@@ -226,7 +240,7 @@ impl Surface {
             _ => None,
         };
         let has_gaps = material == Material::Open;
-        Self { name, material, relief, inside, coverage: None, glow: None, absorption: None, has_gaps }
+        Self { name, material, relief, inside, coverage: None, glow: None, absorption: None, turn_rad: 0.0, has_gaps }
     }
 }
 
@@ -245,10 +259,12 @@ impl Material {
                 [vec![*reflectance, *transmittance], rough(roughness)].concat()
             }
             Self::Substrate { base, coat, roughness } => [vec![*base, *coat], rough(roughness)].concat(),
-            Self::MetallicRoughness { color, metallic, roughness, mirrored, edge, transmission } => {
-                [*color, *metallic, *roughness, *mirrored, *edge].into_iter().chain(*transmission).collect()
+            Self::MetallicRoughness { color, metallic, roughness, mirrored, edge, transmission, brushed } => {
+                let parts = [*color, *metallic, *roughness, *mirrored, *edge];
+                parts.into_iter().chain(*transmission).chain(*brushed).collect()
             }
             Self::Clearcoat { amount, roughness, .. } => vec![*amount, *roughness],
+            Self::Sheen { color, roughness, .. } => vec![*color, *roughness],
             Self::Metal { roughness, .. } | Self::Dielectric { roughness, .. } => rough(roughness),
             Self::Coated { base, roughness, .. } => [vec![*base], rough(roughness)].concat(),
             Self::Blend { amount, .. } => vec![*amount],
@@ -260,7 +276,7 @@ impl Material {
     pub(crate) fn parts(&self) -> &[MaterialId] {
         match self {
             Self::Blend { of, .. } | Self::Sum { of } => of,
-            Self::Clearcoat { base, .. } => std::slice::from_ref(base),
+            Self::Clearcoat { base, .. } | Self::Sheen { base, .. } => std::slice::from_ref(base),
             _ => &[],
         }
     }
@@ -288,6 +304,7 @@ impl Surfaces<'_> {
         match &self.surfaces[material.0 as usize].material {
             Material::Matte { .. } | Material::RoughMatte { .. } | Material::Translucent { .. } => false,
             Material::Sum { of } | Material::Blend { of, .. } => of.iter().any(|&part| self.may_mirror(part)),
+            Material::Sheen { base, .. } => self.may_mirror(*base),
             _ => true,
         }
     }
@@ -300,7 +317,7 @@ impl Surfaces<'_> {
         outgoing: Vec3,
         wavelengths_nm: &[f32; N],
     ) -> Bsdf<N> {
-        let frame = self.frame(hit, at);
+        let frame = self.frame(hit, at).turned(self.surfaces[hit.material.0 as usize].turn_rad);
         let mut bsdf = Bsdf::new(frame, hit.geometric_normal, outgoing);
         self.add_lobes(&mut bsdf, hit.material, at, (1.0, false), wavelengths_nm);
         // Where a part of a mixture is open, the hit is one of the rest.
@@ -418,11 +435,12 @@ impl Surfaces<'_> {
             Material::Substrate { base, coat, roughness } => {
                 Lobe::Substrate { diffuse: share_of(*base), mirrored: share_of(*coat), rough: rough(roughness) }
             }
-            Material::MetallicRoughness { color, metallic, roughness, mirrored, edge, transmission } => {
+            Material::MetallicRoughness { color, metallic, roughness, mirrored, edge, transmission, brushed } => {
                 let (color, metallic, alpha) = (share_of(*color), number(*metallic), number(*roughness).powi(2));
                 let (mirrored, edge) = (share_of(*mirrored), number(*edge));
                 let through = transmission.map_or(0.0, number);
-                let rough = Ggx::new(alpha, alpha);
+                let strength = brushed.map_or(0.0, number);
+                let rough = Ggx::new(alpha + (1.0 - alpha) * strength * strength, alpha);
                 let lost = [mirrored.iter().copied().fold(0.0, f32::max), edge];
                 let base = (1.0 - metallic) * (1.0 - through);
                 let layered = Lobe::Layered {
@@ -449,6 +467,14 @@ impl Surfaces<'_> {
                 let coat = Lobe::Mirror { reflectance: [1.0; N], rough: Ggx::new(alpha, alpha) };
                 bsdf.push(share * mirrored, coat);
                 part(bsdf, *base, share * (1.0 - mirrored), is_term);
+                return;
+            }
+            Material::Sheen { base, color, roughness } => {
+                let (color, alpha) = (share_of(*color), number(*roughness).powi(2));
+                let most = color.iter().copied().fold(0.0, f32::max);
+                let sent_back = most * velvet::albedo(alpha, bsdf.cosine());
+                bsdf.push_term(share, Lobe::Velvet { color, alpha });
+                part(bsdf, *base, share * (1.0 - sent_back), true);
                 return;
             }
             Material::Sum { of } => {

@@ -1,6 +1,6 @@
 //! Triangle meshes.
 
-use glam::{DAffine3, DMat3, DVec3, Vec2, Vec3};
+use glam::{DAffine3, DMat3, DVec2, DVec3, Vec2, Vec3};
 
 use crate::WorldError;
 
@@ -114,6 +114,55 @@ impl TriangleMesh {
     }
 }
 
+/// Returns twice the area of a polygon along its normal (Newell's).
+pub(crate) fn area_vector(corners: &[Vec3]) -> DVec3 {
+    let from_first = |k: usize| (corners[k] - corners[0]).as_dvec3();
+    (2..corners.len()).map(|k| from_first(k - 1).cross(from_first(k))).sum()
+}
+
+/// The most corners of a polygon that isn't convex and is cut by its ears.
+const MOST_CORNERS: usize = 4096;
+
+/// Returns the triangles of a polygon, in its corners' numbers: a fan, or, where it isn't convex, ear by ear.
+pub(crate) fn polygon(corners: &[Vec3]) -> Vec<[usize; 3]> {
+    let n = corners.len();
+    if !(4..=MOST_CORNERS).contains(&n) {
+        return (2..n).map(|k| [0, k - 1, k]).collect();
+    }
+    // Seen along Newell's normal, in f64, counterclockwise.
+    let next = |k: usize| (k + 1) % n;
+    let normal = area_vector(corners);
+    let (across, up) = normal.try_normalize().unwrap_or(DVec3::Z).any_orthonormal_pair();
+    let flat: Vec<DVec2> = corners.iter().map(|p| DVec2::new(p.as_dvec3().dot(across), p.as_dvec3().dot(up))).collect();
+    let turn = |a: usize, b: usize, c: usize| (flat[b] - flat[a]).perp_dot(flat[c] - flat[b]);
+    let least = -1e-9 * normal.length();
+    if (0..n).all(|k| turn(k, next(k), next(next(k))) >= least) {
+        return (2..n).map(|k| [0, k - 1, k]).collect();
+    }
+    let mut left: Vec<usize> = (0..n).collect();
+    let mut triangles = Vec::with_capacity(n - 2);
+    while left.len() > 3 {
+        let m = left.len();
+        let triple = |k: usize| [left[(k + m - 1) % m], left[k], left[(k + 1) % m]];
+        let is_inside = |p: usize, [a, b, c]: [usize; 3]| {
+            ![a, b, c].iter().any(|q| flat[*q] == flat[p])
+                && [(a, b), (b, c), (c, a)]
+                    .iter()
+                    .all(|&(from, to)| (flat[to] - flat[from]).perp_dot(flat[p] - flat[from]) >= 0.0)
+        };
+        let is_ear = |k: usize| {
+            let [a, b, c] = triple(k);
+            turn(a, b, c) > 0.0 && !left.iter().any(|&p| p != a && p != b && p != c && is_inside(p, [a, b, c]))
+        };
+        // Where none is left, what remains has no area, or crosses itself.
+        let ear = (1..m).chain([0]).find(|k| is_ear(*k)).unwrap_or(1);
+        triangles.push(triple(ear));
+        left.remove(ear);
+    }
+    triangles.push([left[0], left[1], left[2]]);
+    triangles
+}
+
 /// Returns the matrix that moves normals: the inverse transpose, up to a positive factor.
 pub(crate) fn normal_matrix(placement: &DAffine3) -> DMat3 {
     let m = placement.matrix3;
@@ -165,5 +214,38 @@ mod tests {
         assert!(with(|m| m.triangles[1][2] = 4).contains("[0, 2, 4]"));
         assert!(with(|m| m.positions[2].y = f32::NAN).contains("vertex 2"));
         assert!(with(|m| m.uvs.truncate(1)).contains("1 texture coordinates"));
+    }
+
+    /// Polygons that aren't convex: an L of area 3, an arrowhead of area 1, seen from either side and turned in space.
+    #[test]
+    fn polygons_are_cut_into_what_they_cover() {
+        let l = [[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, 2.0], [0.0, 2.0]];
+        let arrow = [[0.0, 0.0], [2.0, -1.0], [1.0, 0.0], [2.0, 1.0]];
+        let turned = |[x, y]: &[f32; 2]| Vec3::new(0.6 * x + 5.0, *y, 0.8 * x);
+        for (corners, area) in [(&l[..], 3.0), (&arrow[..], 1.0)] {
+            for first in 0..corners.len() {
+                let mut places: Vec<Vec3> = corners.iter().map(turned).collect();
+                places.rotate_left(first);
+                for _ in 0..2 {
+                    places.reverse();
+                    let outwards: Vec3 =
+                        (0..places.len()).map(|k| places[k].cross(places[(k + 1) % places.len()])).sum();
+                    let triangles = polygon(&places);
+                    assert_eq!(triangles.len(), places.len() - 2);
+                    let areas: Vec<f32> = triangles
+                        .iter()
+                        .map(|t| {
+                            let [a, b, c] = t.map(|k| places[k]);
+                            0.5 * (b - a).cross(c - a).dot(outwards.normalize())
+                        })
+                        .collect();
+                    // None is turned over, and together they are the whole.
+                    assert!(areas.iter().all(|a| *a >= -1e-6), "{areas:?}");
+                    assert!((areas.iter().sum::<f32>() - area).abs() < 1e-5, "{areas:?}");
+                }
+            }
+        }
+        assert_eq!(polygon(&[Vec3::ZERO; 2]), [[0; 3]; 0]);
+        assert_eq!(polygon(&[Vec3::ZERO; 5]).len(), 3);
     }
 }

@@ -52,6 +52,15 @@ impl Frame {
         if x == Vec3::ZERO { Self::about(z) } else { Self { x, y: z.cross(x), z } }
     }
 
+    /// Returns it turned about its z axis, counterclockwise.
+    pub(crate) fn turned(self, rad: f32) -> Self {
+        if rad == 0.0 {
+            return self;
+        }
+        let (sin, cos) = rad.sin_cos();
+        Self { x: cos * self.x + sin * self.y, y: cos * self.y - sin * self.x, z: self.z }
+    }
+
     pub(crate) fn to_local(self, v: Vec3) -> Vec3 {
         Vec3::new(self.x.dot(v), self.y.dot(v), self.z.dot(v))
     }

@@ -48,7 +48,7 @@ impl SkyImage {
 }
 
 /// The luminance of a linear sRGB color, 1 of white.
-fn luminance([r, g, b]: [f32; 3]) -> f64 {
+pub(crate) fn luminance([r, g, b]: [f32; 3]) -> f64 {
     f64::from(0.2126 * r + 0.7152 * g + 0.0722 * b)
 }
 
@@ -72,6 +72,38 @@ impl SkyMapping {
             }
             Self::EqualArea => sphere_of_square(glam::DVec2::new(s, t).as_vec2()),
         }
+    }
+
+    /// Returns the texture coordinates at which a direction, of length 1, lies.
+    pub(crate) fn uv_of(self, d: Vec3) -> Vec2 {
+        match self {
+            Self::LatLong => {
+                let azimuth = d.y.atan2(d.x);
+                let azimuth = if azimuth < 0.0 { azimuth + TAU } else { azimuth };
+                // By the arc tangent, which is exact near the poles too.
+                Vec2::new(azimuth / TAU, 1.0 - d.truncate().length().atan2(d.z) / PI)
+            }
+            Self::EqualArea => {
+                let at = square_of_sphere(d);
+                Vec2::new(at.x, 1.0 - at.y)
+            }
+        }
+    }
+
+    /// Returns the mean over all directions of a picture's channels.
+    pub(crate) fn mean_of(self, image: &ImageTexture) -> f64 {
+        let (columns, rows) = image.size();
+        let (mut sum, mut weights) = (0.0, 0.0);
+        for y in 0..rows {
+            let down = (y as f32 + 0.5) / rows as f32;
+            let weight = if self == Self::LatLong { f64::from((PI * down).sin()) } else { 1.0 };
+            for x in 0..columns {
+                let rgb = image.rgb_at(Vec2::new((x as f32 + 0.5) / columns as f32, 1.0 - down));
+                sum += weight * f64::from(rgb.iter().sum::<f32>() / 3.0);
+                weights += weight;
+            }
+        }
+        sum / weights
     }
 }
 
@@ -167,19 +199,7 @@ impl SampledSky {
 
     /// Returns the texture coordinates of a direction, v upwards.
     fn uv_of(&self, direction: Vec3) -> Vec2 {
-        let d = self.own(direction);
-        match self.sky.mapping {
-            SkyMapping::LatLong => {
-                let azimuth = d.y.atan2(d.x);
-                let azimuth = if azimuth < 0.0 { azimuth + TAU } else { azimuth };
-                // By the arc tangent, which is exact near the poles too.
-                Vec2::new(azimuth / TAU, 1.0 - d.truncate().length().atan2(d.z) / PI)
-            }
-            SkyMapping::EqualArea => {
-                let at = square_of_sphere(d);
-                Vec2::new(at.x, 1.0 - at.y)
-            }
-        }
+        self.sky.mapping.uv_of(self.own(direction))
     }
 }
 

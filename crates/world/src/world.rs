@@ -580,12 +580,29 @@ impl WorldBuilder {
         }
     }
 
+    /// Says how far what is brushed is turned from u, counterclockwise, rad.
+    pub fn set_turn(&mut self, material: MaterialId, turn_rad: f32) {
+        if let Some(surface) = self.surfaces.get_mut(material.0 as usize) {
+            surface.turn_rad = turn_rad;
+        }
+    }
+
     /// Says what the medium that fills shapes of a material takes from light, 1/m. Shapes must be closed, and their material
     /// let light in.
     pub fn set_absorption(&mut self, material: MaterialId, per_m: SpectralCurve) {
         if let Some(surface) = self.surfaces.get_mut(material.0 as usize) {
             surface.absorption = Some(per_m);
         }
+    }
+
+    /// Adds a material that is another, of shapes filled with a medium that takes so much from light, 1/m; none where it lets no light in.
+    pub(crate) fn add_filled(&mut self, of: MaterialId, per_m: SpectralCurve) -> Option<MaterialId> {
+        let surface = self.surfaces.get(of.0 as usize).cloned()?;
+        if !matches!(surface.material, Material::Dielectric { .. } | Material::Glass { .. }) {
+            return None;
+        }
+        self.surfaces.push(Surface { absorption: Some(per_m), ..surface });
+        Some(MaterialId(self.surfaces.len() as u32 - 1))
     }
 
     /// Stands a shape in the world.

@@ -63,6 +63,54 @@ fn small_world_is_what_it_says() {
 }
 
 /// A part of a picture and words of cameras that are not known are reported; the whole as a part, and names of files, are not.
+/// A ball of glass filled with a dye: a ray through its middle is left exp(−σ d), by the file's unit; milk and open shells are noted.
+#[test]
+fn media_that_absorb_alone_fill_glass() {
+    let text = "WorldBegin\nMakeNamedMedium \"dye\" \"string type\" \"homogeneous\" \"spectrum sigma_a\" [400 3 700 3] \"rgb sigma_s\" [0 0 0] \"float scale\" 2\n\
+                MakeNamedMedium \"ink\" \"string type\" \"homogeneous\" \"rgb sigma_a\" [1 4 4] \"rgb sigma_s\" [0 0 0]\n\
+                MakeNamedMedium \"milk\" \"string type\" \"homogeneous\" \"rgb sigma_a\" [1 1 1]\n\
+                Material \"dielectric\"\nMediumInterface \"dye\" \"\"\nShape \"sphere\" \"float radius\" .1\n\
+                AttributeBegin\nMediumInterface \"ink\" \"\"\nTranslate 1 0 0\nShape \"sphere\" \"float radius\" .1\nAttributeEnd\n\
+                Material \"diffuse\"\nTranslate 3 0 0\nShape \"sphere\"\n";
+    let world = read_text(text).unwrap();
+    let left = |x: f32, nm: f32| {
+        let ray = Ray { origin: Vec3::new(x, 0.0, 0.0), direction: Vec3::Z };
+        let wall = world.intersect(&ray, f32::INFINITY).unwrap();
+        world.transmittance(&wall, &ray, &[nm]).map_or(1.0, |left| left[0])
+    };
+    assert!((left(0.0, 550.0) - (-6.0_f32 * 0.1).exp()).abs() < 1e-5, "{}", left(0.0, 550.0));
+    // A color says but roughly what is left of each wavelength.
+    let [red, blue] = [left(1.0, 650.0), left(1.0, 450.0)];
+    assert!((red - (-0.1_f32).exp()).abs() < 0.03 && (blue - (-0.4_f32).exp()).abs() < 0.03, "{red} {blue}");
+    assert_eq!(left(3.0, 550.0), 1.0);
+    let notes = world.notes().join("\n");
+    assert!(
+        notes.contains("glow, left out: space is clear: milk")
+            && notes.contains("aren't of glass; they are clear: dye"),
+        "{notes}"
+    );
+}
+
+/// Curves of one material are one mesh, met where they are; hair has the color of its pigment.
+#[test]
+fn curves_are_met_and_hair_is_brown() {
+    let text = "WorldBegin\nScale 2 2 2\nMaterial \"hair\" \"float eumelanin\" .5\n\
+                Shape \"curve\" \"point3 P\" [0 -1 0  0 0 0  0 1 0  0 2 0] \"float width\" .1\n\
+                Shape \"curve\" \"point3 P\" [1 -1 0  1 0 0  1 1 0  1 2 0] \"float width\" .1\n\
+                Material \"diffuse\"\nShape \"curve\" \"point3 P\" [2 -1 0  2 0 0  2 1 0]\n";
+    let world = read_text(text).unwrap();
+    assert_eq!(world.n_primitives(), 24);
+    let notes = world.notes().join("\n");
+    assert!(notes.contains("hair") && notes.contains("a curve of 3 points"), "{notes}");
+    for x in [0.0, 2.0] {
+        let found = hit(&world, [x, 0.0, -5.0], [0.0, 0.0, 1.0]).unwrap();
+        assert!((found.distance_m - 4.9).abs() < 0.015, "{}", found.distance_m);
+        let [blue, green, red] = world.bsdf(&found, Vec3::NEG_Z, &[450.0, 550.0, 650.0]).albedo();
+        assert!(red > 1.2 * green && green > 1.5 * blue && blue > 0.0, "{blue} {green} {red}");
+        assert!(hit(&world, [x + 0.11, 0.0, -5.0], [0.0, 0.0, 1.0]).is_none());
+    }
+}
+
 #[test]
 fn words_of_films_and_cameras_are_reported() {
     let notes = |film: &str, camera: &str| {

@@ -74,12 +74,14 @@ pub(super) fn read(inputs: &WorldInputs, watch: &Watch<'_>) -> Result<World, Pip
         }
         None => {}
     }
-    let is_gltf = inputs
-        .file
-        .extension()
-        .is_some_and(|kind| kind.eq_ignore_ascii_case("gltf") || kind.eq_ignore_ascii_case("glb"));
+    let kind = inputs.file.extension().map(|kind| kind.to_ascii_lowercase());
+    let most_likely_m = match kind.as_ref().and_then(|kind| kind.to_str()) {
+        Some("gltf" | "glb") => f64::INFINITY,
+        Some("stl") => MOST_LIKELY_OF_STL_M,
+        _ => MOST_LIKELY_M,
+    };
     let extent_m = builder.extent_m();
-    if !is_gltf && inputs.unit_m == 1.0 && extent_m > MOST_LIKELY_M {
+    if inputs.unit_m == 1.0 && extent_m > most_likely_m {
         builder.note(format!(
             "the file says no unit: in metres, as it is taken, all of it is {extent_m:.0} m wide; --unit-m 0.001 takes millimetres"
         ));
@@ -87,8 +89,9 @@ pub(super) fn read(inputs: &WorldInputs, watch: &Watch<'_>) -> Result<World, Pip
     Ok(builder.build()?)
 }
 
-/// Worlds wider than this are seldom in metres.
+/// Worlds wider than this are seldom in metres, and what is made for printers.
 const MOST_LIKELY_M: f64 = 1000.0;
+const MOST_LIKELY_OF_STL_M: f64 = 10.0;
 
 /// The most columns of a view of the still life that is no more than the summary of a picture.
 const SUMMARY_COLUMNS: usize = 270;

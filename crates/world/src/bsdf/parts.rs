@@ -60,7 +60,8 @@ impl<const N: usize> Bsdf<N> {
                 Lobe::Diffuse { transmittance, .. } if transmittance.iter().any(|&t| t > 0.0) => {
                     Lobe::Diffuse { reflectance: [0.0; N], transmittance }
                 }
-                Lobe::Mirror { rough: Some(_), .. }
+                Lobe::Velvet { .. }
+                | Lobe::Mirror { rough: Some(_), .. }
                 | Lobe::Glossy { rough: Some(_), .. }
                 | Lobe::Metal { rough: Some(_), .. }
                 | Lobe::Pane { rough: Some(_), .. }
@@ -123,6 +124,7 @@ impl<const N: usize> Bsdf<N> {
                 }
                 Lobe::Diffuse { .. }
                 | Lobe::RoughDiffuse { .. }
+                | Lobe::Velvet { .. }
                 | Lobe::Mirror { .. }
                 | Lobe::Glossy { .. }
                 | Lobe::Metal { .. }
@@ -164,6 +166,7 @@ impl<const N: usize> Lobe<N> {
             | Self::Metal { .. }
             | Self::Pane { .. }
             | Self::Dielectric { .. }
+            | Self::Velvet { .. }
             | Self::Open => [0.0; N],
         }
     }
@@ -214,6 +217,7 @@ mod tests {
             Lobe::Diffuse { reflectance: [0.5], transmittance: [0.2] },
             Lobe::Dielectric { index: [1.5], reflectance: [0.8], transmittance: [0.9], rough: None },
             Lobe::RoughDiffuse { reflectance: [0.6], constants: [0.9, 0.2] },
+            Lobe::Velvet { color: [0.6], alpha: 0.3 },
             layered(None),
             layered(Ggx::new(0.3, 0.3)),
             Lobe::Substrate { diffuse: [0.6], mirrored: [0.1], rough: None },

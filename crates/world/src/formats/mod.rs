@@ -13,7 +13,10 @@ use dioptric_spectrum::Cancel;
 use glam::{DAffine3, DVec3};
 
 pub use self::{obj::read_obj, ply::read_ply, stl::read_stl};
-use crate::{Material, MaterialId, Shape, SpectralCurve, Texture, TriangleMesh, World, WorldBuilder, WorldError};
+use crate::{
+    Encoding, Material, MaterialId, Shape, SpectralCurve, Texture, TriangleMesh, UvMapping, World, WorldBuilder,
+    WorldError,
+};
 
 /// How a world file is read.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -62,8 +65,14 @@ pub fn open_world(path: &Path, options: &ReadOptions, cancel: &Cancel) -> Result
         #[cfg(not(feature = "gltf"))]
         Some("gltf" | "glb") => return Err(WorldError::LacksFeature { file: path.to_owned(), feature: "gltf" }),
         Some("obj") => obj::read(path, unit)?,
-        Some("ply") => bare(path, read_ply(path)?, scale, DVec3::Y),
-        Some("stl") => bare(path, read_stl(path)?, scale, DVec3::Z),
+        Some("ply") => {
+            let ply::Contents { mesh, pictures, left } = ply::read(path)?;
+            bare(path, mesh, (scale, DVec3::Y), &pictures, &left)
+        }
+        Some("stl") => {
+            let (mesh, left) = stl::read(path)?;
+            bare(path, mesh, (scale, DVec3::Z), &[], &left)
+        }
         _ => return Err(WorldError::UnknownKind { file: path.to_owned() }),
     };
     cancel.check()?;
@@ -73,12 +82,35 @@ pub fn open_world(path: &Path, options: &ReadOptions, cancel: &Cancel) -> Result
     Ok(builder)
 }
 
-/// A mesh without a material, gray or of its own colors.
-fn bare(path: &Path, mesh: TriangleMesh, place: DAffine3, up: DVec3) -> WorldBuilder {
+/// A mesh without a material: of the picture that it names, gray or of its own colors; with what of its file isn't read.
+fn bare(
+    path: &Path,
+    mesh: TriangleMesh,
+    (place, up): (DAffine3, DVec3),
+    pictures: &[String],
+    left: &[String],
+) -> WorldBuilder {
     let mut builder = WorldBuilder::new();
     builder.set_up(up, false);
     builder.add_source(path);
-    let material = plain(&mut builder, !mesh.colors.is_empty());
+    left.iter().for_each(|word| builder.note_of("of the file isn't read", word));
+    if pictures.len() > 1 {
+        builder.note(format!("of {} pictures the first is laid over all of the mesh", pictures.len()));
+    }
+    let picture = pictures.first().filter(|_| !mesh.uvs.is_empty());
+    let picture =
+        picture.and_then(|name| obj::picture(&mut builder, &obj::beside(path.parent()?, name), Encoding::Srgb));
+    let material = match picture {
+        Some(image) => {
+            if !mesh.colors.is_empty() {
+                builder.note("colors beside a picture: left out");
+            }
+            let texture = Texture::Image { image, mapping: UvMapping::IDENTITY, scale: 1.0 };
+            let reflectance = builder.add_texture(texture);
+            builder.add_material("picture", Material::Matte { reflectance })
+        }
+        None => plain(&mut builder, !mesh.colors.is_empty()),
+    };
     builder.add_shape(Shape::Mesh(mesh), place, material, None);
     builder
 }

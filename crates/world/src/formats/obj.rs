@@ -6,14 +6,16 @@
 use std::{
     collections::HashMap,
     path::{Path, PathBuf},
+    sync::Arc,
 };
 
 use glam::{DAffine3, DVec3, Vec2, Vec3};
 
 use super::{MAX_BYTES, read_bytes};
 use crate::{
-    Emission, Encoding, ImageTexture, Material, MaterialId, Relief, Shape, SpectralCurve, Texture, TriangleMesh,
-    UvMapping, WorldBuilder, WorldError, Wrap,
+    Emission, Encoding, ImageTexture, Material, MaterialId, Relief, Shape, SpectralCurve, Texture, TextureId,
+    TriangleMesh, UvMapping, WorldBuilder, WorldError, Wrap,
+    mesh::{area_vector, polygon},
 };
 
 /// Triangles of one object and material.
@@ -21,8 +23,10 @@ struct Part {
     object: String,
     material: Option<String>,
     mesh: TriangleMesh,
-    /// The vertex of each triple of the file's numbers.
-    known: HashMap<[u32; 3], u32>,
+    /// The vertex of each triple of the file's numbers, and of its normal smoothed.
+    known: HashMap<[u32; 4], u32>,
+    /// Vertices whose normal is a smoothed one, with its number.
+    smoothed: Vec<(u32, u32)>,
     has: [bool; 3],
 }
 
@@ -34,6 +38,9 @@ struct Contents {
     colors: Vec<[f32; 4]>,
     uvs: Vec<Vec2>,
     normals: Vec<Vec3>,
+    /// The sums of the faces' normals at each position of a smoothing group.
+    smooth_normals: Vec<Vec3>,
+    smooth: HashMap<(u32, u32), u32>,
     parts: Vec<Part>,
     by_name: HashMap<(String, Option<String>), usize>,
     libraries: Vec<String>,
@@ -51,7 +58,8 @@ const NONE: u32 = u32::MAX;
 /// When the file can't be read, or a mesh isn't sound.
 pub fn read_obj(path: &Path) -> Result<Vec<(String, TriangleMesh)>, WorldError> {
     let contents = Contents::read(path)?;
-    contents.parts.into_iter().map(|part| Ok((part.object.clone(), part.finished(path)?))).collect()
+    let Contents { parts, smooth_normals, .. } = contents;
+    parts.into_iter().map(|part| Ok((part.object.clone(), part.finished(path, &smooth_normals)?))).collect()
 }
 
 /// Reads a file with the materials that it names.
@@ -63,39 +71,29 @@ pub(super) fn read(path: &Path, unit: f64) -> Result<WorldBuilder, WorldError> {
         builder.note("points and lines, which have no area: left out");
     }
     for word in &contents.unknown {
-        builder.note_of("words that aren't known, left out", word);
+        builder.note_of("of the file isn't read", word);
     }
     let folder = path.parent().unwrap_or(Path::new(""));
-    let mut library = Library { builder, materials: HashMap::new(), glows: HashMap::new() };
+    let mut library = Library { builder, materials: HashMap::new(), made: HashMap::new() };
     for name in &contents.libraries {
         library.read(folder, name)?;
     }
-    let Library { mut builder, materials, glows } = library;
     let place = DAffine3::from_scale(DVec3::splat(unit));
-    let mut plain: HashMap<bool, MaterialId> = HashMap::new();
-    for part in contents.parts {
+    let Contents { parts, smooth_normals, .. } = contents;
+    for part in parts {
         let name = part.material.clone();
-        let mesh = part.finished(path)?;
-        let named = name.as_ref().and_then(|name| materials.get(name).copied());
-        if let (Some(name), None) = (&name, named) {
-            builder.note_of("materials that are named and not there, gray in their place", name);
-        }
-        let has_colors = !mesh.colors.is_empty();
-        let material = match named {
-            Some(material) => material,
-            None => *plain.entry(has_colors).or_insert_with(|| super::plain(&mut builder, has_colors)),
-        };
-        let glow = name.and_then(|name| glows.get(&name).cloned());
-        builder.add_shape(Shape::Mesh(mesh), place, material, glow);
+        let mesh = part.finished(path, &smooth_normals)?;
+        let (material, glow) = library.material(name.as_deref(), !mesh.colors.is_empty());
+        library.builder.add_shape(Shape::Mesh(mesh), place, material, glow);
     }
-    Ok(builder)
+    Ok(library.builder)
 }
 
 impl Contents {
     fn read(path: &Path) -> Result<Self, WorldError> {
         let text = dioptric_files::text::of_bytes(&read_bytes(path, MAX_BYTES)?);
         let mut contents = Self::default();
-        let (mut object, mut material) = (String::new(), None);
+        let (mut object, mut material, mut group) = (String::new(), None, 0);
         let mut corners = Vec::new();
         for (line, text) in lines(&text) {
             let wrong = |reason: String| WorldError::Line { file: path.to_owned(), line, reason };
@@ -113,24 +111,36 @@ impl Contents {
                 }
                 "f" | "fo" => {
                     corners.clear();
-                    for word in words {
+                    for word in words.take_while(|word| !word.starts_with('#')) {
                         corners.push(contents.corner(word).map_err(wrong)?);
                     }
-                    contents.face(&corners, (&object, &material));
+                    contents.face(&corners, (&object, &material), group);
                 }
                 "p" | "l" => contents.n_lines += 1,
                 "o" | "g" => object = rest(&text, word).to_owned(),
                 "usemtl" => material = Some(rest(&text, word).to_owned()).filter(|name| !name.is_empty()),
                 "mtllib" => contents.libraries.push(rest(&text, word).to_owned()),
-                // Smoothing, groups and what changes no picture.
-                "s" | "mg" | "vp" | "bevel" | "c_interp" | "d_interp" | "lod" | "usemap" | "maplib" | "shadow_obj"
-                | "trace_obj" | "csh" => {}
+                "s" => match words.next() {
+                    Some("off" | "null") | None => group = 0,
+                    Some("on") => group = 1,
+                    Some(number) => match number.parse() {
+                        Ok(number) => group = number,
+                        Err(_) => contents.note(&format!("s {number}")),
+                    },
+                },
+                // What changes no picture.
+                "mg" | "vp" | "bevel" | "c_interp" | "d_interp" | "lod" => {}
                 word if word.starts_with('#') => {}
-                other if contents.unknown.len() < 1000 => contents.unknown.push(other.chars().take(40).collect()),
-                _ => {}
+                other => contents.note(other),
             }
         }
         Ok(contents)
+    }
+
+    fn note(&mut self, word: &str) {
+        if self.unknown.len() < 1000 {
+            self.unknown.push(word.chars().take(40).collect());
+        }
     }
 
     fn vertex<'a>(&mut self, words: impl Iterator<Item = &'a str>) -> Result<(), String> {
@@ -144,7 +154,14 @@ impl Contents {
             self.colors.resize(self.positions.len(), [1.0; 4]);
             // Programs write them as they show them.
             let light = |code: f32| dioptric_spectrum::srgb_decode(f64::from(code.clamp(0.0, 1.0))) as f32;
-            self.colors.push([light(r), light(g), light(b), 1.0]);
+            if [r, g, b].iter().all(|v| v.is_finite()) {
+                self.colors.push([light(r), light(g), light(b), 1.0]);
+            } else {
+                self.note("colors of vertices that aren't numbers");
+                self.colors.push([1.0; 4]);
+            }
+        } else if numbers.len() > 4 {
+            self.note(&format!("{} numbers behind a vertex", numbers.len() - 3));
         }
         self.positions.push(Vec3::new(x, y, z));
         Ok(())
@@ -173,7 +190,7 @@ impl Contents {
         }
     }
 
-    fn face(&mut self, corners: &[[u32; 3]], (object, material): (&String, &Option<String>)) {
+    fn face(&mut self, corners: &[[u32; 3]], (object, material): (&String, &Option<String>), group: u32) {
         if corners.len() < 3 {
             self.n_lines += 1;
             return;
@@ -185,37 +202,55 @@ impl Contents {
                 material: material.clone(),
                 mesh: TriangleMesh::default(),
                 known: HashMap::new(),
+                smoothed: Vec::new(),
                 has: [false; 3],
             });
             self.parts.len() - 1
         });
-        let Part { mesh, known, has: part_has, .. } = &mut self.parts[index];
+        let Part { mesh, known, smoothed, has: part_has, .. } = &mut self.parts[index];
+        let places: Vec<Vec3> = corners.iter().map(|[p, ..]| self.positions[*p as usize]).collect();
+        let flat = area_vector(&places).as_vec3();
         let mut triangles = std::mem::take(&mut mesh.triangles);
         let mut vertex = |corner: [u32; 3]| {
-            *known.entry(corner).or_insert_with(|| {
+            let mut smooth = NONE;
+            if group != 0 && corner[2] == NONE {
+                let next = self.smooth_normals.len() as u32;
+                smooth = *self.smooth.entry((corner[0], group)).or_insert(next);
+                if smooth == next {
+                    self.smooth_normals.push(Vec3::ZERO);
+                }
+                self.smooth_normals[smooth as usize] += flat;
+            }
+            let [p, t, n] = corner;
+            *known.entry([p, t, n, smooth]).or_insert_with(|| {
                 let [p, t, n] = corner.map(|i| i as usize);
+                if smooth != NONE {
+                    smoothed.push((mesh.positions.len() as u32, smooth));
+                }
                 mesh.positions.push(self.positions[p]);
                 mesh.uvs.push(self.uvs.get(t).copied().unwrap_or(Vec2::ZERO));
                 mesh.normals.push(self.normals.get(n).copied().unwrap_or(Vec3::ZERO));
                 let color = self.colors.get(p).copied();
                 mesh.colors.push(color.unwrap_or([1.0; 4]));
-                let has = [self.uvs.get(t).is_some(), self.normals.get(n).is_some(), color.is_some()];
+                let has_normal = self.normals.get(n).is_some() || smooth != NONE;
+                let has = [self.uvs.get(t).is_some(), has_normal, color.is_some()];
                 *part_has = std::array::from_fn(|k| part_has[k] || has[k]);
                 mesh.positions.len() as u32 - 1
             })
         };
-        let first = vertex(corners[0]);
-        for pair in corners[1..].windows(2) {
-            triangles.push([first, vertex(pair[0]), vertex(pair[1])]);
-        }
+        let vertices: Vec<u32> = corners.iter().map(|corner| vertex(*corner)).collect();
+        triangles.extend(polygon(&places).into_iter().map(|triangle| triangle.map(|k| vertices[k])));
         mesh.triangles = triangles;
     }
 }
 
 impl Part {
     /// Returns the mesh, without what none of its vertices has; where some lack normals theirs are those of their faces.
-    fn finished(self, path: &Path) -> Result<TriangleMesh, WorldError> {
-        let Self { mut mesh, has: [has_uvs, has_normals, has_colors], .. } = self;
+    fn finished(self, path: &Path, smooth_normals: &[Vec3]) -> Result<TriangleMesh, WorldError> {
+        let Self { mut mesh, smoothed, has: [has_uvs, has_normals, has_colors], .. } = self;
+        for (vertex, smooth) in smoothed {
+            mesh.normals[vertex as usize] = smooth_normals[smooth as usize].normalize_or_zero();
+        }
         if !has_uvs {
             mesh.uvs.clear();
         }
@@ -224,21 +259,42 @@ impl Part {
         }
         match has_normals {
             false => mesh.normals.clear(),
-            true => {
-                for triangle in &mesh.triangles {
-                    let [a, b, c] = triangle.map(|v| mesh.positions[v as usize]);
-                    let flat = (b - a).cross(c - a).normalize_or_zero();
-                    for &vertex in triangle {
-                        let normal = &mut mesh.normals[vertex as usize];
-                        if *normal == Vec3::ZERO || !normal.is_finite() {
-                            *normal = flat;
-                        }
-                    }
-                }
-            }
+            true => with_flat_normals(&mut mesh),
         }
         mesh.check().map_err(|e| WorldError::Unreadable { file: path.to_owned(), reason: e.to_string() })?;
         Ok(mesh)
+    }
+}
+
+/// Gives vertices without a normal that of their face; where faces of several directions share one, each has its own.
+fn with_flat_normals(mesh: &mut TriangleMesh) {
+    let lacks: Vec<bool> = mesh.normals.iter().map(|n| *n == Vec3::ZERO || !n.is_finite()).collect();
+    if !lacks.contains(&true) {
+        return;
+    }
+    let mut is_given = vec![false; lacks.len()];
+    for triangle in &mut mesh.triangles {
+        let [a, b, c] = triangle.map(|v| mesh.positions[v as usize]);
+        let flat = (b - a).cross(c - a).normalize_or_zero();
+        for vertex in triangle {
+            let v = *vertex as usize;
+            if !lacks[v] || is_given[v] && mesh.normals[v] == flat {
+                continue;
+            }
+            if !is_given[v] {
+                (is_given[v], mesh.normals[v]) = (true, flat);
+                continue;
+            }
+            *vertex = mesh.positions.len() as u32;
+            mesh.positions.push(mesh.positions[v]);
+            mesh.normals.push(flat);
+            if !mesh.uvs.is_empty() {
+                mesh.uvs.push(mesh.uvs[v]);
+            }
+            if !mesh.colors.is_empty() {
+                mesh.colors.push(mesh.colors[v]);
+            }
+        }
     }
 }
 
@@ -279,8 +335,9 @@ fn at(numbers: &[f32], index: usize, default: f32) -> f32 {
 /// Materials of MTL files.
 struct Library {
     builder: WorldBuilder,
-    materials: HashMap<String, MaterialId>,
-    glows: HashMap<String, Emission>,
+    materials: HashMap<String, Words>,
+    /// By name, and whether the mesh has colors.
+    made: HashMap<(Option<String>, bool), (MaterialId, Option<Emission>)>,
 }
 
 /// What a material's lines say.
@@ -288,13 +345,48 @@ struct Library {
 struct Words {
     name: String,
     numbers: HashMap<String, Vec<f32>>,
-    pictures: HashMap<String, (PathBuf, f32)>,
+    pictures: HashMap<String, PictureWords>,
 }
 
-/// Words that are read, or change no picture: ambient light, the choice of a program's shading, its reflection of surroundings.
+impl Words {
+    fn number(&self, word: &str, default: f32) -> f32 {
+        self.numbers.get(word).map_or(default, |numbers| at(numbers, 0, default))
+    }
+
+    fn color(&self, word: &str) -> Option<[f32; 3]> {
+        let numbers = self.numbers.get(word)?;
+        let first = at(numbers, 0, 0.0);
+        Some([first, at(numbers, 1, first), at(numbers, 2, first)])
+    }
+
+    /// Returns how much of it is there.
+    fn opaque(&self) -> f32 {
+        match (self.numbers.get("d"), self.numbers.get("tr")) {
+            (Some(d), _) => at(d, 0, 1.0).clamp(0.0, 1.0),
+            // Meshlab and others write how opaque a material is: one of which nothing could be seen is theirs.
+            (None, Some(tr)) if at(tr, 0, 0.0) >= 1.0 => 1.0,
+            (None, Some(tr)) => 1.0 - at(tr, 0, 0.0).max(0.0),
+            (None, None) => 1.0,
+        }
+    }
+
+    /// Returns the share of clear matter in a material that refracts (`illum` 4, 6, 7 and 9), of which light that isn't refracted has none.
+    fn clear(&self) -> f32 {
+        let is_said = ["d", "tr"].iter().any(|word| self.numbers.contains_key(*word));
+        match self.number("illum", 2.0) as i32 {
+            4 | 6 | 7 | 9 if is_said => 1.0 - self.opaque(),
+            4 | 6 | 7 | 9 if self.numbers.contains_key("tf") => 1.0,
+            _ => 0.0,
+        }
+    }
+}
+
+/// Words that are read, or change no picture: ambient light, the choice of a program's shading.
 const OF_COLORS: [&str; 12] = ["kd", "ka", "ks", "ke", "ns", "ni", "d", "tr", "tf", "illum", "pr", "pm"];
 const OF_PICTURES: [&str; 12] =
     ["map_kd", "map_d", "map_ke", "map_bump", "bump", "norm", "map_pr", "map_pm", "map_ks", "map_ns", "map_ka", "refl"];
+/// Those whose numbers are shares.
+const SHARES: [&str; 5] = ["kd", "ks", "d", "pr", "pm"];
 
 impl Library {
     fn read(&mut self, folder: &Path, name: &str) -> Result<(), WorldError> {
@@ -313,113 +405,148 @@ impl Library {
             let mut words: Option<Words> = None;
             for (_, line) in lines(&text) {
                 let mut parts = line.split_ascii_whitespace();
-                let Some(word) = parts.next() else { continue };
+                let Some(word) = parts.next().filter(|word| !word.starts_with('#')) else { continue };
                 let lower = word.to_ascii_lowercase();
                 if lower == "newmtl" {
-                    self.finish(words.replace(Words { name: rest(&line, word).to_owned(), ..Words::default() }))?;
+                    self.keep(words.replace(Words { name: rest(&line, word).to_owned(), ..Words::default() }));
                     continue;
                 }
-                let Some(words) = &mut words else { continue };
-                if OF_COLORS.contains(&lower.as_str()) {
-                    match numbers(parts) {
-                        Ok(numbers) => {
-                            words.numbers.insert(lower, numbers);
-                        }
-                        Err(_) => self.builder.note_of("words of materials without numbers, left out", word),
-                    }
-                } else if OF_PICTURES.contains(&lower.as_str()) {
-                    let (file, strength) = picture_words(rest(&line, word));
-                    words.pictures.insert(lower, (beside(&folder, file), strength));
-                } else if !word.starts_with('#') {
+                let known = OF_COLORS.contains(&lower.as_str()) || OF_PICTURES.contains(&lower.as_str());
+                let Some(words) = words.as_mut().filter(|_| known) else {
                     self.builder.note_of("words of materials that aren't known, left out", word);
+                    continue;
+                };
+                if OF_PICTURES.contains(&lower.as_str()) {
+                    let (file, picture, left) = picture_words(rest(&line, word));
+                    for option in left {
+                        self.builder.note_of("options of pictures that aren't known, left out", option);
+                    }
+                    words.pictures.insert(lower, PictureWords { file: beside(&folder, file), ..picture });
+                    continue;
+                }
+                match numbers(parts) {
+                    Ok(mut numbers) if !numbers.is_empty() && numbers.iter().all(|v| v.is_finite()) => {
+                        if SHARES.contains(&lower.as_str()) && numbers.iter().any(|v| !(0.0..=1.0).contains(v)) {
+                            self.builder.note_of("shares of materials beyond 0 to 1, the nearest in their place", word);
+                            numbers.iter_mut().for_each(|v| *v = v.clamp(0.0, 1.0));
+                        }
+                        words.numbers.insert(lower, numbers);
+                    }
+                    _ => self.builder.note_of("words of materials without numbers, left out", word),
                 }
             }
-            self.finish(words)?;
+            self.keep(words);
         }
         Ok(())
     }
 
-    /// Adds a material: Lambert's base and a layer that mirrors as glTF's does, which has nearly the look of Phong's highlight.
-    fn finish(&mut self, words: Option<Words>) -> Result<(), WorldError> {
-        let Some(words) = words else { return Ok(()) };
-        let number = |word: &str, default: f32| words.numbers.get(word).map_or(default, |n| at(n, 0, default));
-        let color = |word: &str| {
-            let n = words.numbers.get(word)?;
-            let first = at(n, 0, 0.0);
-            Some([first, at(n, 1, first), at(n, 2, first)])
+    fn keep(&mut self, words: Option<Words>) {
+        if let Some(words) = words {
+            self.materials.insert(words.name.clone(), words);
+        }
+    }
+
+    /// Returns the material of a name and its glow; with the colors of a mesh.
+    fn material(&mut self, name: Option<&str>, has_colors: bool) -> (MaterialId, Option<Emission>) {
+        let key = (name.map(str::to_owned).filter(|name| self.materials.contains_key(name)), has_colors);
+        if let (Some(name), None) = (name, &key.0) {
+            self.builder.note_of("materials that are named and not there, gray in their place", name);
+        }
+        if let Some(made) = self.made.get(&key) {
+            return made.clone();
+        }
+        let words = key.0.as_ref().and_then(|name| self.materials.remove(name));
+        let made = match &words {
+            Some(words) => self.new_material(words, has_colors),
+            None => (super::plain(&mut self.builder, has_colors), None),
         };
+        self.keep(words);
+        self.made.insert(key, made.clone());
+        made
+    }
+
+    fn even(&mut self, value: f32) -> TextureId {
+        self.builder.add_texture(Texture::Curve(SpectralCurve::constant(value)))
+    }
+
+    /// Adds a material: Lambert's base and a layer that mirrors as glTF's does, which has nearly the look of Phong's highlight; or clear
+    /// matter.
+    fn new_material(&mut self, words: &Words, has_colors: bool) -> (MaterialId, Option<Emission>) {
         // Colors are written as they are shown by some programs and in linear light by others; most since 2010 the latter.
-        let base = color("kd").unwrap_or(if words.pictures.contains_key("map_kd") { [1.0; 3] } else { [0.8; 3] });
+        let has_picture = words.pictures.contains_key("map_kd");
+        let base = words.color("kd").unwrap_or(if has_picture { [1.0; 3] } else { [0.8; 3] });
         let mut diffuse = self.builder.add_texture(Texture::Curve(SpectralCurve::from_rgb_reflectance(base)));
-        let picture = self.picture(&words, "map_kd", Encoding::Srgb);
-        if let Some(image) = &picture {
-            let texture = self.builder.add_texture(laid(image));
+        let picture = self.picture(words, "map_kd", Encoding::Srgb);
+        if let Some(texture) = picture {
             // A picture replaces black, which exporters leave beside it.
             diffuse = match base {
                 [0.0, 0.0, 0.0] => texture,
                 _ => self.builder.add_texture(Texture::Product([diffuse, texture])),
             };
         }
-        let illum = number("illum", 2.0) as i32;
-        let shine = number("ns", 0.0).max(0.0);
-        let mirrored = color("ks").filter(|_| illum >= 2).unwrap_or([0.0; 3]);
-        let is_matte = mirrored == [0.0; 3] && !words.numbers.contains_key("pr") && !words.numbers.contains_key("pm");
-        let opaque = match (words.numbers.get("d"), words.numbers.get("tr")) {
-            (Some(d), _) => at(d, 0, 1.0),
-            // Meshlab and others write how opaque a material is: one of which nothing could be seen is theirs.
-            (None, Some(tr)) if at(tr, 0, 0.0) >= 1.0 => 1.0,
-            (None, Some(tr)) => 1.0 - at(tr, 0, 0.0),
-            (None, None) => 1.0,
-        };
-        let even = |builder: &mut WorldBuilder, value: f32| {
-            builder.add_texture(Texture::Curve(SpectralCurve::constant(value)))
-        };
+        if has_colors {
+            let colors = self.builder.add_texture(Texture::VertexColors);
+            diffuse = self.builder.add_texture(Texture::Product([diffuse, colors]));
+        }
+        let illum = words.number("illum", 2.0) as i32;
+        let shine = words.number("ns", 0.0).max(0.0);
+        let mirrored = words.color("ks").filter(|_| illum >= 2).unwrap_or([0.0; 3]);
+        if matches!(illum, 3 | 5 | 8) && mirrored != [0.0; 3] {
+            self.builder.note_of("materials that mirror what is around them: as their highlight does", &words.name);
+        }
+        let [has_roughness, has_metal] = [["pr", "map_pr"], ["pm", "map_pm"]]
+            .map(|[number, picture]| words.numbers.contains_key(number) || words.pictures.contains_key(picture));
+        let is_matte = mirrored == [0.0; 3] && !has_roughness && !has_metal;
         let material = if is_matte {
             Material::Matte { reflectance: diffuse }
         } else {
             // Phong's exponent as GGX's width: α² = 2/(Ns + 2); its highlight as that of a layer of index 1.5 at the most, where it is no
             // mirror. Ks of 1 is what exporters write for "as usual".
             let largest = mirrored.into_iter().fold(0.0, f32::max);
-            let metallic = number("pm", 0.0).clamp(0.0, 1.0);
-            let rough = match words.numbers.get("pr") {
-                Some(pr) => at(pr, 0, 0.5),
-                None => (2.0 / (shine + 2.0)).sqrt().sqrt(),
-            };
-            let layer = if words.numbers.contains_key("pr") { 0.04 } else { 0.04 * largest.min(1.0) };
-            let curve = SpectralCurve::constant(layer);
-            let of_picture =
-                |library: &mut Self, word: &str, factor: f32| match library.picture(&words, word, Encoding::Linear) {
-                    Some(image) => {
-                        let mapping = UvMapping::IDENTITY;
-                        library.builder.add_texture(Texture::Channel {
-                            image,
-                            channel: 0,
-                            mapping,
-                            scale: factor.max(1.0),
-                            offset: 0.0,
-                        })
-                    }
-                    None => even(&mut library.builder, factor),
-                };
+            let layer = if has_roughness { [1.0; 3] } else { mirrored };
+            let has_layer = layer != [0.0; 3];
+            let rough = if has_roughness { words.number("pr", 1.0) } else { (2.0 / (shine + 2.0)).sqrt().sqrt() };
+            let metallic = self.channel(words, "map_pm", words.number("pm", 0.0));
+            let roughness = self.channel(words, "map_pr", rough);
+            let layer = SpectralCurve::from_rgb_reflectance(layer).scaled(0.04);
             Material::MetallicRoughness {
                 color: diffuse,
-                metallic: of_picture(self, "map_pm", metallic),
-                roughness: of_picture(self, "map_pr", rough),
-                mirrored: self.builder.add_texture(Texture::Curve(curve)),
-                edge: even(&mut self.builder, largest.max(if layer > 0.0 { 1.0 } else { 0.0 }).min(1.0)),
+                metallic,
+                roughness,
+                mirrored: self.builder.add_texture(Texture::Curve(layer)),
+                edge: self.even(largest.max(if has_layer { 1.0 } else { 0.0 })),
                 transmission: None,
+                brushed: None,
             }
         };
-        let relief = self.relief(&words);
-        let id = self.builder.add_material_with(&words.name, material, relief);
-        let alpha = match self.picture(&words, "map_d", Encoding::Linear) {
-            Some(image) => {
-                let channel = if image.has_alpha() { 3 } else { 0 };
-                let mapping = UvMapping::IDENTITY;
-                Some(self.builder.add_texture(Texture::Channel { image, channel, mapping, scale: opaque, offset: 0.0 }))
+        let relief = self.relief(words);
+        let clear = words.clear();
+        let id = if clear > 0.0 {
+            let index = words.number("ni", 1.5).clamp(1.0, 4.0);
+            let filter = words.color("tf").unwrap_or([1.0; 3]).map(|v| v.clamp(0.0, 1.0));
+            let glass = Material::Glass {
+                reflectance: self.even(1.0),
+                transmittance: self.builder.add_texture(Texture::Curve(SpectralCurve::from_rgb_reflectance(filter))),
+                index: SpectralCurve::constant(index),
+                roughness: None,
+            };
+            let of = [material, glass].map(|part| self.builder.add_material(&words.name, part));
+            let amount = self.even(clear);
+            self.builder.add_material_with(&words.name, Material::Blend { of, amount }, relief)
+        } else {
+            if words.color("tf").is_some_and(|tf| tf != [1.0; 3] && tf != [0.0; 3]) {
+                self.builder.note_of(
+                    "filters of light that goes through, of materials that don't refract: left out",
+                    &words.name,
+                );
             }
-            None if opaque < 1.0 => Some(even(&mut self.builder, opaque.max(0.0))),
-            None => None,
+            self.builder.add_material_with(&words.name, material, relief)
+        };
+        let opaque = if clear > 0.0 { 1.0 } else { words.opaque() };
+        let alpha = match words.pictures.contains_key("map_d") {
+            true => Some(self.channel(words, "map_d", opaque)),
+            false if opaque < 1.0 => Some(self.even(opaque)),
+            false => None,
         };
         if let Some(alpha) = alpha {
             self.builder.set_coverage(id, alpha);
@@ -427,53 +554,92 @@ impl Library {
         for word in ["map_ks", "map_ns", "refl"].into_iter().filter(|word| words.pictures.contains_key(*word)) {
             self.builder.note_of("pictures of highlights and surroundings, left out", word);
         }
-        if let Some(glow) = color("ke").filter(|glow| glow.iter().any(|v| *v > 0.0)) {
+        let glow = words.color("ke").filter(|glow| glow.iter().any(|v| *v > 0.0)).map(|glow| {
             self.builder.note("a glow of 1 is taken as that of 1 W m⁻² sr⁻¹ nm⁻¹");
-            let radiance = SpectralCurve::from_rgb_light(glow);
-            self.glows.insert(words.name.clone(), Emission { radiance, is_two_sided: true });
-            if let Some(image) = self.picture(&words, "map_ke", Encoding::Srgb) {
-                let texture = self.builder.add_texture(laid(&image));
+            if let Some(texture) = self.picture(words, "map_ke", Encoding::Srgb) {
                 self.builder.set_glow(id, texture);
             }
+            Emission { radiance: SpectralCurve::from_rgb_light(glow), is_two_sided: true }
+        });
+        if glow.is_none() && words.pictures.contains_key("map_ke") {
+            self.builder.note_of("pictures of a glow without a Ke: left out", &words.name);
         }
-        self.materials.insert(words.name.clone(), id);
-        Ok(())
+        (id, glow)
     }
 
     fn relief(&mut self, words: &Words) -> Option<Relief> {
-        if let Some(image) = self.picture(words, "norm", Encoding::Linear) {
-            return Some(Relief::Normals(self.builder.add_texture(laid(&image))));
+        if let Some(texture) = self.picture(words, "norm", Encoding::Linear) {
+            return Some(Relief::Normals(texture));
         }
         let word = ["map_bump", "bump"].into_iter().find(|word| words.pictures.contains_key(*word))?;
         self.builder.note_of("heights of a unit that isn't said, left out", word);
         None
     }
 
-    fn picture(&mut self, words: &Words, word: &str, encoding: Encoding) -> Option<std::sync::Arc<ImageTexture>> {
-        let (path, _) = words.pictures.get(word)?;
-        self.builder.add_source(path);
-        match ImageTexture::read(path, encoding, Wrap::Repeat) {
-            Ok(image) => Some(std::sync::Arc::new(image)),
-            Err(error) => {
-                let name = path.file_name().unwrap_or_default().to_string_lossy();
-                if path.is_file() {
-                    self.builder.note_of("pictures that can't be read, left out", &error.of_picture(&name));
-                } else {
-                    self.builder.note_of("pictures that aren't there, left out", &name);
-                }
-                None
+    /// Returns the picture of a word, laid as its options say.
+    fn picture(&mut self, words: &Words, word: &str, encoding: Encoding) -> Option<TextureId> {
+        let of = words.pictures.get(word)?;
+        let image = Arc::new(picture(&mut self.builder, &of.file, encoding)?.sampled([of.wrap; 2], false));
+        if of.base != 0.0 {
+            self.builder.note_of("what is added to a picture's values, left out", word);
+        }
+        Some(self.builder.add_texture(Texture::Image { image, mapping: of.mapping, scale: of.gain }))
+    }
+
+    /// Returns the channel of a word's picture times a factor, or the factor alone.
+    fn channel(&mut self, words: &Words, word: &str, factor: f32) -> TextureId {
+        let found =
+            words.pictures.get(word).and_then(|of| Some((of, picture(&mut self.builder, &of.file, Encoding::Linear)?)));
+        let Some((of, image)) = found else { return self.even(factor) };
+        let channel = of.channel.unwrap_or(if word == "map_d" && image.has_alpha() { 3 } else { 0 });
+        // Exporters leave 0 beside a picture.
+        let factor = if word == "map_d" || factor > 0.0 { factor } else { 1.0 };
+        let image = Arc::new(image.sampled([of.wrap; 2], false));
+        let (scale, offset) = (of.gain * factor, of.base * factor);
+        self.builder.add_texture(Texture::Channel { image, channel, mapping: of.mapping, scale, offset })
+    }
+}
+
+/// Reads a picture; none, with a note, where it can't be read.
+pub(super) fn picture(builder: &mut WorldBuilder, path: &Path, encoding: Encoding) -> Option<Arc<ImageTexture>> {
+    builder.add_source(path);
+    match ImageTexture::read(path, encoding, Wrap::Repeat) {
+        Ok(image) => Some(Arc::new(image)),
+        Err(error) => {
+            let name = path.file_name().unwrap_or_default().to_string_lossy();
+            if path.is_file() {
+                builder.note_of("pictures that can't be read, left out", &error.of_picture(&name));
+            } else {
+                builder.note_of("pictures that aren't there, left out", &name);
             }
+            None
         }
     }
 }
 
-fn laid(image: &std::sync::Arc<ImageTexture>) -> Texture {
-    Texture::Image { image: image.clone(), mapping: UvMapping::IDENTITY, scale: 1.0 }
+/// A picture of a material and how it is laid: its values times a gain and more than a base.
+#[derive(Clone, Debug, PartialEq)]
+struct PictureWords {
+    file: PathBuf,
+    mapping: UvMapping,
+    wrap: Wrap,
+    base: f32,
+    gain: f32,
+    channel: Option<usize>,
 }
 
-/// Returns the name of a picture and its strength (`-bm`), after its options.
-fn picture_words(text: &str) -> (&str, f32) {
-    let (mut rest, mut strength) = (text.trim(), 1.0);
+/// Returns the name of a picture after its options, how it is laid, and the options that aren't known.
+fn picture_words(text: &str) -> (&str, PictureWords, Vec<&str>) {
+    let mut words = PictureWords {
+        file: PathBuf::new(),
+        mapping: UvMapping::IDENTITY,
+        wrap: Wrap::Repeat,
+        base: 0.0,
+        gain: 1.0,
+        channel: None,
+    };
+    let (mut rest, mut left) = (text.trim(), Vec::new());
+    let (mut offset, mut scale) = (Vec2::ZERO, Vec2::ONE);
     while let Some(option) = rest.strip_prefix('-') {
         let (name, after) = option.split_once(char::is_whitespace).unwrap_or((option, ""));
         let n_values = match name {
@@ -482,23 +648,35 @@ fn picture_words(text: &str) -> (&str, f32) {
             _ => 1,
         };
         rest = after.trim_start();
+        let (mut numbers, mut word) = (Vec::new(), "");
         for place in 0..n_values {
             let (value, after) = rest.split_once(char::is_whitespace).unwrap_or((rest, ""));
+            let number = value.parse::<f32>();
             // Offsets and scales may have fewer numbers than three.
-            if place > 0 && value.parse::<f32>().is_err() {
+            if place > 0 && number.is_err() {
                 break;
             }
-            if name == "bm" {
-                strength = value.parse().unwrap_or(1.0);
-            }
+            numbers.extend(number);
+            word = value;
             rest = after.trim_start();
         }
+        match (name, numbers.as_slice(), word) {
+            ("o", [x, more @ ..], _) => offset = Vec2::new(*x, at(more, 0, 0.0)),
+            ("s", [x, more @ ..], _) => scale = Vec2::new(*x, at(more, 0, 1.0)),
+            ("mm", [base, gain], _) => (words.base, words.gain) = (*base, *gain),
+            ("clamp", _, "on") => words.wrap = Wrap::Clamp,
+            ("imfchan", _, "r" | "g" | "b" | "m") => words.channel = "rgbm".find(word),
+            // Of how a picture is filtered, and how strong heights are, which are left out themselves.
+            ("clamp", _, "off") | ("blendu" | "blendv", _, "on" | "off") | ("boost" | "texres" | "bm", [_], _) => {}
+            _ => left.push(name),
+        }
     }
-    (rest, strength)
+    words.mapping = UvMapping::scaled(scale, offset);
+    (rest, words, left)
 }
 
 /// Returns a file that is named beside another, of Windows' separators too.
-fn beside(folder: &Path, name: &str) -> PathBuf {
+pub(super) fn beside(folder: &Path, name: &str) -> PathBuf {
     let name = name.trim_matches('"');
     let path = folder.join(name);
     if path.is_file() {
@@ -561,10 +739,19 @@ mod tests {
     }
 
     #[test]
-    fn options_of_pictures_are_passed_over() {
-        assert_eq!(picture_words("-s 2 2 1 -bm 0.5 my picture.png"), ("my picture.png", 0.5));
-        assert_eq!(picture_words("-o 0.1 -clamp on a.png"), ("a.png", 1.0));
-        assert_eq!(picture_words("a.png"), ("a.png", 1.0));
+    fn options_of_pictures_are_read() {
+        let laid = |text| {
+            let (name, words, left) = picture_words(text);
+            (name, words.mapping, words.wrap, left)
+        };
+        let even = UvMapping::IDENTITY;
+        let twice = UvMapping::scaled(Vec2::new(2.0, 3.0), Vec2::ZERO);
+        assert_eq!(laid("-s 2 3 1 -bm 0.5 my picture.png"), ("my picture.png", twice, Wrap::Repeat, vec![]));
+        let moved = UvMapping::scaled(Vec2::ONE, Vec2::new(0.1, 0.0));
+        assert_eq!(laid("-o 0.1 -clamp on a.png"), ("a.png", moved, Wrap::Clamp, vec![]));
+        assert_eq!(laid("-cc on -quux 3 a.png"), ("a.png", even, Wrap::Repeat, vec!["cc", "quux"]));
+        assert_eq!(laid("a.png"), ("a.png", even, Wrap::Repeat, vec![]));
+        assert_eq!(picture_words("-mm 0.1 0.5 -imfchan g a.png").1.channel, Some(1));
     }
 
     #[test]
@@ -598,5 +785,56 @@ mod tests {
             let ray = crate::Ray { origin: Vec3::Z, direction: Vec3::NEG_Z };
             assert_eq!(world.intersect(&ray, 9.0).is_some(), is_seen, "{words}");
         }
+    }
+
+    /// A roof of two faces at right angles: over its ridge normals are between them where a smoothing group holds both.
+    #[test]
+    fn smoothing_groups_have_normals_between_their_faces() {
+        let roof = "v 0 0 0\nv 0 0 1\nv 1 -1 0\nv 1 -1 1\nv -1 -1 0\nv -1 -1 1\n";
+        let normals = |groups: [&str; 2]| {
+            let text = format!("{roof}s {}\nf 1 2 4 3\ns {}\nf 2 1 5 6\n", groups[0], groups[1]);
+            read_text(text.as_bytes()).unwrap().remove(0).1
+        };
+        let smooth = normals(["7", "7"]);
+        assert_eq!(smooth.positions.len(), 6);
+        assert!(smooth.normals[0].abs_diff_eq(Vec3::Y, 1e-6), "{:?}", smooth.normals);
+        let sharp = normals(["1", "2"]);
+        assert_eq!(sharp.positions.len(), 8);
+        assert!(sharp.normals[0].abs_diff_eq(Vec3::new(1.0, 1.0, 0.0).normalize(), 1e-6), "{:?}", sharp.normals);
+        assert!(normals(["off", "0"]).normals.is_empty());
+        // Beside a smoothed face those without a group keep their edges.
+        let text = format!("{roof}s 1\nf 1 2 4 3\ns off\nf 2 1 5 6\nf 5 6 4 3\n");
+        let mesh = read_text(text.as_bytes()).unwrap().remove(0).1;
+        for t in 0..mesh.triangles.len() {
+            let [a, b, c] = mesh.corners(t);
+            let flat = (b - a).cross(c - a).normalize();
+            let is_flat = |v: u32| mesh.normals[v as usize].abs_diff_eq(flat, 1e-6);
+            assert!(mesh.triangles[t].into_iter().all(is_flat), "{t}: {:?}", mesh.normals);
+        }
+    }
+
+    /// Reads one triangle across the origin of a material; returns its albedo, seen along −z, and whether it is met.
+    fn albedo_of(material: &str, colors: &str) -> [f32; 2] {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("m.mtl"), format!("newmtl a\n{material}\n")).unwrap();
+        let path = folder.path().join("a.obj");
+        let text = format!("mtllib m.mtl\nusemtl a\nv -1 -1 0{colors}\nv 1 -1 0{colors}\nv 0 1 0{colors}\nf 1 2 3\n");
+        std::fs::write(&path, text).unwrap();
+        let world =
+            crate::read_world(&path, &crate::ReadOptions::default(), &dioptric_spectrum::Cancel::new()).unwrap();
+        let hit = world.intersect(&crate::Ray { origin: Vec3::Z, direction: Vec3::NEG_Z }, 9.0).unwrap();
+        world.bsdf(&hit, Vec3::Z, &[450.0, 650.0]).albedo()
+    }
+
+    /// Glass by the choice of illumination 7 takes nothing but by its filter; colors of vertices and the material's multiply.
+    #[test]
+    fn glass_and_colors_of_vertices_are_followed() {
+        let clear = albedo_of("Kd 0 0 0\nNi 1.5\nd 0\nillum 7", "");
+        assert!(clear.iter().all(|a| (a - 1.0).abs() < 1e-5), "{clear:?}");
+        // 4 % are mirrored, of the rest a tenth goes through.
+        let filtered = albedo_of("Kd 0 0 0\nNi 1.5\nTf 0.1 0.1 0.1\nillum 6", "");
+        assert!(filtered.iter().all(|a| (a - (0.04 + 0.096)).abs() < 2e-3), "{filtered:?}");
+        let [both, one] = [albedo_of("Kd 0.5 0.5 0.5", " 1 0 0"), albedo_of("Kd 1 1 1", " 1 0 0")];
+        assert!((both[1] - 0.5 * one[1]).abs() < 1e-3 && both[0] < 0.1 && one[1] > 0.9, "{both:?} {one:?}");
     }
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 use dioptric_spectrum::Cancel;
 use dioptric_world::{ReadOptions, read_world};
 
-const SEEDS: [(&str, &[u8]); 8] = [
+const SEEDS: [(&str, &[u8]); 12] = [
     ("small.pbrt", include_bytes!("../corpus/small.pbrt")),
     ("second.pbrt", include_bytes!("../corpus/second.pbrt")),
     ("square.ply", include_bytes!("../corpus/mesh.ply")),
@@ -14,18 +14,23 @@ const SEEDS: [(&str, &[u8]); 8] = [
     ("solid.stl", include_bytes!("../corpus/solid.stl")),
     ("world.gltf", include_bytes!("../corpus/world.gltf")),
     ("world.glb", include_bytes!("../corpus/world.glb")),
+    ("curves.pbrt", include_bytes!("../corpus/curves.pbrt")),
+    ("faces.ply", include_bytes!("../corpus/faces.ply")),
+    ("roof.obj", include_bytes!("../corpus/roof.obj")),
+    ("world.packed.glb", include_bytes!("../corpus/packed.glb")),
 ];
 
 /// Returns the seeds of the formats that are read here: name and bytes. The name's extension tells the format.
 pub(crate) fn seeds() -> impl Iterator<Item = (&'static str, &'static [u8])> {
-    SEEDS.into_iter().filter(|(name, _)| cfg!(feature = "gltf") || !name.starts_with("world.gl"))
+    SEEDS.into_iter().filter(|(name, _)| cfg!(feature = "gltf") || !name.starts_with("world."))
 }
 
 /// What they name.
-const BESIDE: [(&str, &[u8]); 4] = [
+const BESIDE: [(&str, &[u8]); 5] = [
     ("mesh.ply", include_bytes!("../corpus/mesh.ply")),
     ("none.mtl", include_bytes!("../corpus/none.mtl")),
     ("part.pbrt", include_bytes!("../corpus/part.pbrt")),
+    ("roof.mtl", include_bytes!("../corpus/roof.mtl")),
     ("picture.png", include_bytes!("../corpus/picture.png")),
 ];
 

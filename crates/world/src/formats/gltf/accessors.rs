@@ -1,5 +1,7 @@
 //! Numbers of glTF's buffers.
 
+use std::collections::HashMap;
+
 use serde_json::Value;
 
 use super::json::{index, list};
@@ -77,6 +79,8 @@ impl Component {
 pub(super) struct Source<'a> {
     pub(super) root: &'a Value,
     pub(super) buffers: &'a [Vec<u8>],
+    /// Buffer views that were packed, with the strides of their rows.
+    pub(super) unpacked: &'a HashMap<usize, (Vec<u8>, Option<usize>)>,
     /// The most numbers that an accessor without bytes may have.
     pub(super) most_zeros: usize,
 }
@@ -84,6 +88,9 @@ pub(super) struct Source<'a> {
 impl<'a> Source<'a> {
     /// Returns the bytes of a buffer view, and its stride.
     pub(super) fn view(&self, view: usize) -> Result<(&'a [u8], Option<usize>), String> {
+        if let Some((bytes, stride)) = self.unpacked.get(&view) {
+            return Ok((bytes, *stride));
+        }
         let wrong = |what: String| format!("buffer view {view} {what}");
         let of = list(self.root, "bufferViews").get(view).ok_or_else(|| wrong("is named and not there".to_owned()))?;
         let buffer = index(of, "buffer").unwrap_or(usize::MAX);

@@ -146,13 +146,21 @@ impl Reader<'_> {
             .filter(|volume| number_or(Some(volume), "thicknessFactor", 0.0) > 0.0);
         let relief = self.relief(material)?;
         let thin = through.filter(|_| volume.is_none());
-        let base = Material::MetallicRoughness { color, metallic, roughness, mirrored, edge, transmission: thin };
+        let brushed = extension(material, "KHR_materials_anisotropy");
+        let turn_rad = number_or(brushed, "anisotropyRotation", 0.0) as f32;
+        let brushed = self.brushed(brushed)?;
+        let base =
+            Material::MetallicRoughness { color, metallic, roughness, mirrored, edge, transmission: thin, brushed };
         let is_coated = extension(material, "KHR_materials_clearcoat")
             .filter(|coat| number_or(Some(coat), "clearcoatFactor", 0.0) > 0.0);
         let is_filled = through.is_some() && volume.is_some();
+        let sheen = extension(material, "KHR_materials_sheen").filter(|sheen| {
+            numbers::<3>(sheen, "sheenColorFactor").is_some_and(|color| color.iter().any(|v| *v > 0.0))
+        });
         let relief_of = |is_last: bool| if is_last { relief } else { None };
-        let mut id = self.builder.add_material_with(name, base, relief_of(!is_filled && is_coated.is_none()));
-        if let (Some(through), Some(volume)) = (through, volume) {
+        let mut id =
+            self.builder.add_material_with(name, base, relief_of(!is_filled && is_coated.is_none() && sheen.is_none()));
+        if let (Some(through), true) = (through, volume.is_some()) {
             let alpha = self.builder.add_texture(Texture::Product([roughness, roughness]));
             let glass = Material::Glass {
                 reflectance: self.even(1.0),
@@ -166,10 +174,21 @@ impl Reader<'_> {
             let rest = self.builder.add_texture(Texture::Blend { of: [one, zero], amount: metallic });
             let amount = self.builder.add_texture(Texture::Product([through, rest]));
             let blend = Material::Blend { of: [id, glass], amount };
-            id = self.builder.add_material_with(name, blend, relief_of(is_coated.is_none()));
-            if let Some(per_m) = absorption(volume) {
-                self.builder.set_absorption(id, per_m);
+            id = self.builder.add_material_with(name, blend, relief_of(is_coated.is_none() && sheen.is_none()));
+        }
+        if let Some(sheen) = sheen {
+            let color = numbers::<3>(sheen, "sheenColorFactor").unwrap_or([0.0; 3]).map(|v| v as f32);
+            let mut of_fibers = self.curve(SpectralCurve::from_rgb_reflectance(color));
+            if let Some(Picture { image, mapping }) = self.picture(Some(sheen), "sheenColorTexture", Holds::Colors)? {
+                of_fibers = self.times(of_fibers, Texture::Image { image, mapping, scale: 1.0 }, color == [1.0; 3]);
             }
+            let rough = number_or(Some(sheen), "sheenRoughnessFactor", 0.0) as f32;
+            let roughness = match self.picture(Some(sheen), "sheenRoughnessTexture", Holds::Numbers)? {
+                Some(picture) => self.builder.add_texture(picture.channel(3, rough)),
+                None => self.even(rough),
+            };
+            let velvet = Material::Sheen { base: id, color: of_fibers, roughness };
+            id = self.builder.add_material_with(name, velvet, relief_of(is_coated.is_none()));
         }
         if let Some(coat) = is_coated {
             let amount = number_or(Some(coat), "clearcoatFactor", 0.0) as f32;
@@ -187,7 +206,29 @@ impl Reader<'_> {
             }
             id = self.builder.add_material_with(name, Material::Clearcoat { base: id, amount, roughness }, relief);
         }
+        if brushed.is_some() {
+            self.builder.set_turn(id, turn_rad);
+        }
+        if let Some(per_m) = volume.filter(|_| is_filled).and_then(absorption) {
+            self.builder.set_absorption(id, per_m);
+        }
         Ok(id)
+    }
+
+    /// Returns how strongly a surface is brushed.
+    fn brushed(&mut self, of: Option<&Value>) -> Result<Option<TextureId>, WorldError> {
+        let strength = number_or(of, "anisotropyStrength", 0.0) as f32;
+        if strength <= 0.0 {
+            return Ok(None);
+        }
+        Ok(Some(match self.picture(of, "anisotropyTexture", Holds::Numbers)? {
+            Some(picture) => {
+                self.builder
+                    .note("directions in pictures of how surfaces are brushed: left out, all is brushed one way");
+                self.builder.add_texture(picture.channel(2, strength))
+            }
+            None => self.even(strength),
+        }))
     }
 
     fn transmission(&mut self, material: &Value) -> Result<Option<TextureId>, WorldError> {
@@ -306,7 +347,13 @@ impl Reader<'_> {
             }
         };
         let Some(image) = image else { return Ok(None) };
-        let sampler = index(texture, "sampler").and_then(|sampler| list(self.root, "samplers").get(sampler));
+        let sampler = index(texture, "sampler").and_then(|number| {
+            let sampler = list(self.root, "samplers").get(number);
+            if sampler.is_none() {
+                self.builder.note_of("samplers that are named and not there, pictures repeat", &number.to_string());
+            }
+            sampler
+        });
         let wrap = |word: &str| match sampler.and_then(|sampler| sampler.get(word)).and_then(Value::as_u64) {
             Some(33071) => Wrap::Clamp,
             Some(33648) => Wrap::Mirror,
@@ -331,7 +378,8 @@ impl Reader<'_> {
             }
             (Some(uri), _) => ImageTexture::of_bytes(&self.resource(uri)?, encoding, Wrap::Repeat),
             (None, Some(view)) => {
-                let source = super::Source { root: self.root, buffers: &self.buffers, most_zeros: 0 };
+                let source =
+                    super::Source { root: self.root, buffers: &self.buffers, unpacked: &self.unpacked, most_zeros: 0 };
                 let (bytes, _) = source.view(view).map_err(|reason| self.fault(reason))?;
                 ImageTexture::of_bytes(bytes, encoding, Wrap::Repeat)
             }

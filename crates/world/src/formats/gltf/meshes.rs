@@ -131,15 +131,23 @@ impl Reader<'_> {
         let mut mesh =
             TriangleMesh { positions: positions.first().map(Vec3::from_array).collect(), ..TriangleMesh::default() };
         let n = mesh.positions.len();
-        let of_all = |rows: Option<Rows>| rows.filter(|rows| rows.len() == n);
-        if let Some(normals) = of_all(rows(self, "NORMAL")?) {
+        let mut of_all = |name: &str| -> Result<Option<Rows>, WorldError> {
+            let found = rows(self, name)?;
+            let found_n = found.as_ref().map_or(n, Rows::len);
+            if found_n != n {
+                let sentence = "attributes of vertices of another number than the positions, left out";
+                self.builder.note_of(sentence, &format!("{name} ({found_n} for {n})"));
+            }
+            Ok(found.filter(|_| found_n == n))
+        };
+        if let Some(normals) = of_all("NORMAL")? {
             mesh.normals = normals.first().map(Vec3::from_array).collect();
         }
         // v runs down the picture in glTF.
         let uvs = |rows: Rows| rows.first().map(|[u, v]| Vec2::new(u, 1.0 - v)).collect();
-        mesh.uvs = of_all(rows(self, "TEXCOORD_0")?).map_or(Vec::new(), uvs);
-        mesh.second_uvs = of_all(rows(self, "TEXCOORD_1")?).map_or(Vec::new(), uvs);
-        if let Some(colors) = of_all(rows(self, "COLOR_0")?) {
+        mesh.uvs = of_all("TEXCOORD_0")?.map_or(Vec::new(), uvs);
+        mesh.second_uvs = of_all("TEXCOORD_1")?.map_or(Vec::new(), uvs);
+        if let Some(colors) = of_all("COLOR_0")? {
             let has_alpha = colors.width > 3;
             let color = |[r, g, b, a]: [f32; 4]| [r, g, b, if has_alpha { a } else { 1.0 }];
             mesh.colors = colors.first().map(color).collect();
@@ -154,7 +162,13 @@ impl Reader<'_> {
                 self.builder.note_of("attributes of vertices that aren't read, left out", name);
             }
         }
-        for (target, weight) in list(primitive, "targets").iter().zip(morphs).filter(|(_, weight)| **weight != 0.0) {
+        let targets = list(primitive, "targets");
+        for name in targets.iter().filter_map(Value::as_object).flat_map(serde_json::Map::keys) {
+            if !["POSITION", "NORMAL", "TANGENT"].contains(&name.as_str()) && !name.starts_with('_') {
+                self.builder.note_of("attributes of morph targets that aren't read, left out", name);
+            }
+        }
+        for (target, weight) in targets.iter().zip(morphs).filter(|(_, weight)| **weight != 0.0) {
             let moved = |name: &str| index(target, name).map(|accessor| self.rows(accessor)).transpose();
             let by = *weight as f32;
             for (name, values) in [("POSITION", &mut mesh.positions), ("NORMAL", &mut mesh.normals)] {

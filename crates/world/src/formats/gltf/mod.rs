@@ -7,6 +7,7 @@ mod accessors;
 mod json;
 mod materials;
 mod meshes;
+mod meshopt;
 
 use std::{
     collections::{HashMap, HashSet},
@@ -24,7 +25,7 @@ use serde_json::Value;
 
 use self::{
     accessors::{Rows, Source},
-    json::{EXTENSIONS, Unknown, extension, index, list, number, number_or, numbers},
+    json::{Left, extension, index, is_read, list, number, number_or, numbers},
 };
 use super::read_bytes;
 use crate::{
@@ -47,7 +48,7 @@ const BASE64: GeneralPurpose = GeneralPurpose::new(
 );
 
 /// Extensions that geometry can't be read without.
-const OF_GEOMETRY: [&str; 3] = ["EXT_meshopt_compression", "KHR_draco_mesh_compression", "KHR_meshopt_compression"];
+const OF_GEOMETRY: [&str; 2] = ["KHR_draco_mesh_compression", "KHR_meshopt_compression"];
 
 /// Reads the default scene.
 pub(super) fn read(path: &Path, place: DAffine3, cancel: &Cancel) -> Result<WorldBuilder, WorldError> {
@@ -55,7 +56,7 @@ pub(super) fn read(path: &Path, place: DAffine3, cancel: &Cancel) -> Result<Worl
     let bytes = read_bytes(path, MAX_BYTES)?;
     let (text, binary) = parts(&bytes).map_err(unreadable)?;
     let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text);
-    let root: Value = serde_json::from_slice(text).map_err(|e| match e.line() {
+    let mut root: Value = serde_json::from_slice(text).map_err(|e| match e.line() {
         0 => unreadable(e.to_string()),
         line => WorldError::Line { file: path.to_owned(), line, reason: e.to_string() },
     })?;
@@ -70,12 +71,14 @@ pub(super) fn read(path: &Path, place: DAffine3, cancel: &Cancel) -> Result<Worl
             format!("it needs the extension {name}, which isn't supported; expected a file exported without it");
         return Err(unreadable(reason));
     }
+    let left = Left::out_of(&mut root);
     let mut reader = Reader {
         builder: WorldBuilder::new(),
         root: &root,
         file: path.to_owned(),
         folder: path.parent().unwrap_or(Path::new("")).to_owned(),
         buffers: Vec::new(),
+        unpacked: HashMap::new(),
         materials: HashMap::new(),
         images: HashMap::new(),
         groups: HashMap::new(),
@@ -94,7 +97,14 @@ pub(super) fn read(path: &Path, place: DAffine3, cancel: &Cancel) -> Result<Worl
         };
         reader.buffers.push(data);
     }
-    reader.note_unknown();
+    for (number, view) in list(&root, "bufferViews").iter().enumerate() {
+        let Some(packed) = extension(view, "EXT_meshopt_compression") else { continue };
+        let unpacked = meshopt::unpacked(packed, &reader.buffers);
+        let unpacked = unpacked.map_err(|reason| reader.fault(format!("packed buffer view {number} {reason}")))?;
+        reader.n_bytes += unpacked.0.len() as u64;
+        reader.unpacked.insert(number, unpacked);
+    }
+    reader.note_left(left);
     reader.scene(place)?;
     Ok(reader.builder)
 }
@@ -130,6 +140,8 @@ struct Reader<'c> {
     file: PathBuf,
     folder: PathBuf,
     buffers: Vec<Vec<u8>>,
+    /// Buffer views that were packed, with the strides of their rows.
+    unpacked: HashMap<usize, (Vec<u8>, Option<usize>)>,
     /// By number, and whether the mesh has colors.
     materials: HashMap<MaterialUse, (MaterialId, Option<Emission>)>,
     /// By number, and whether it holds colors.
@@ -174,19 +186,25 @@ impl Reader<'_> {
 
     fn rows(&self, accessor: usize) -> Result<Rows, WorldError> {
         let most_zeros = 1 << 16 | usize::try_from(self.n_bytes).unwrap_or(usize::MAX).min(1 << 28);
-        let source = Source { root: self.root, buffers: &self.buffers, most_zeros };
+        let source = Source { root: self.root, buffers: &self.buffers, unpacked: &self.unpacked, most_zeros };
         source.rows(accessor).map_err(|reason| self.fault(reason))
     }
 
-    fn note_unknown(&mut self) {
-        let unknown = Unknown::of(self.root);
-        for word in &unknown.words {
-            self.builder.note_of("words that aren't known, left out", word);
-        }
+    fn note_left(&mut self, left: Left) {
         let used = list(self.root, "extensionsUsed").iter().filter_map(Value::as_str);
-        let used = used.filter(|name| !EXTENSIONS.contains(name)).map(str::to_owned);
-        for name in unknown.extensions.into_iter().chain(used) {
-            self.builder.note_of("extensions that aren't supported, left out", &name);
+        let used = used.filter(|name| !is_read(name)).map(str::to_owned);
+        let extensions = left.extensions.into_iter().chain(used).collect();
+        for (sentence, words) in [
+            ("words that aren't known, left out", left.words),
+            ("words whose values aren't what glTF has there, left out", left.wrong),
+            ("numbers beyond what glTF allows, the nearest in their place", left.near),
+            ("extensions that aren't supported, left out", extensions),
+        ] {
+            words.iter().for_each(|word| self.builder.note_of(sentence, word));
+        }
+        for variant in extension(self.root, "KHR_materials_variants").map_or(&[][..], |of| list(of, "variants")) {
+            let name = variant.get("name").and_then(Value::as_str).unwrap_or("without a name");
+            self.builder.note_of("variants of the materials, of which the file's own is shown", name);
         }
         if !list(self.root, "animations").is_empty() {
             self.builder.note("animations: not followed, everything stands as it is written");
@@ -195,7 +213,11 @@ impl Reader<'_> {
 
     fn scene(&mut self, place: DAffine3) -> Result<(), WorldError> {
         let (scenes, nodes) = (list(self.root, "scenes"), list(self.root, "nodes"));
-        let scene = index(self.root, "scene").and_then(|scene| scenes.get(scene)).or(scenes.first());
+        let default = index(self.root, "scene");
+        if let Some(number) = default.filter(|number| *number >= scenes.len()) {
+            self.builder.note(format!("scene {number}, of which there are {}: the first one is read", scenes.len()));
+        }
+        let scene = default.and_then(|scene| scenes.get(scene)).or(scenes.first());
         let children: HashSet<usize> = nodes.iter().flat_map(|node| numbers_of(node, "children")).collect();
         let first: Vec<usize> = match scene {
             Some(scene) => numbers_of(scene, "nodes"),
@@ -207,7 +229,7 @@ impl Reader<'_> {
         }
         for node in nodes {
             if let Some(mesh) = index(node, "mesh").filter(|_| index(node, "skin").is_none()) {
-                *self.uses.entry(mesh).or_default() += 1;
+                *self.uses.entry(mesh).or_default() += self.instances(node)?.map_or(1, |instances| instances.len());
             }
         }
         // Where every node stands first: skins hang on others.
@@ -251,7 +273,9 @@ impl Reader<'_> {
             return Err(self.fault(format!("node {number} stands nowhere: its numbers aren't finite")));
         }
         if let Some(mesh) = index(node, "mesh") {
-            self.mesh(node, mesh, place)?;
+            for instance in self.instances(node)?.unwrap_or_else(|| vec![DAffine3::IDENTITY]) {
+                self.mesh(node, mesh, place * instance)?;
+            }
         }
         if let Some(light) = extension(node, "KHR_lights_punctual").and_then(|of| index(of, "light")) {
             self.light(light, place)?;
@@ -260,6 +284,34 @@ impl Reader<'_> {
             self.camera(camera, node, place)?;
         }
         numbers_of(node, "children").into_iter().try_for_each(|child| self.node(child, depth + 1))
+    }
+
+    /// Returns the places of a node's mesh in it, where it has many.
+    fn instances(&self, node: &Value) -> Result<Option<Vec<DAffine3>>, WorldError> {
+        let Some(attributes) = extension(node, "EXT_mesh_gpu_instancing").and_then(|of| of.get("attributes")) else {
+            return Ok(None);
+        };
+        let rows = |name: &str| index(attributes, name).map(|accessor| self.rows(accessor)).transpose();
+        let [translations, rotations, scales] = ["TRANSLATION", "ROTATION", "SCALE"].map(rows);
+        let (translations, rotations, scales) = (translations?, rotations?, scales?);
+        let n = [&translations, &rotations, &scales].into_iter().flatten().map(Rows::len).min().unwrap_or(0);
+        let number = |rows: &Option<Rows>, row: usize, column: usize, default: f64| {
+            rows.as_ref().and_then(|rows| rows.values.get(row * rows.width + column)).copied().unwrap_or(default)
+        };
+        let three = |rows: &Option<Rows>, row: usize, default: f64| {
+            DVec3::new(number(rows, row, 0, default), number(rows, row, 1, default), number(rows, row, 2, default))
+        };
+        let instance = |row: usize| {
+            let [x, y, z] = [0, 1, 2].map(|k| number(&rotations, row, k, 0.0));
+            let rotation = DQuat::from_xyzw(x, y, z, number(&rotations, row, 3, 1.0));
+            let rotation = if rotation.length_squared() > 0.0 { rotation.normalize() } else { DQuat::IDENTITY };
+            DAffine3::from_scale_rotation_translation(
+                three(&scales, row, 1.0),
+                rotation,
+                three(&translations, row, 0.0),
+            )
+        };
+        Ok(Some((0..n).map(instance).collect()))
     }
 
     /// Lights of glTF shine along −z, in candela or lux; their colors are those of daylight D65 tinted.
@@ -274,6 +326,9 @@ impl Reader<'_> {
         let curve = SpectralCurve::from_rgb_light(color).scaled((intensity / (LUMENS_PER_WATT * 106.857)) as f32);
         let direction = place.transform_vector3(DVec3::NEG_Z).normalize_or(DVec3::NEG_Z);
         let position = place.translation;
+        if light.get("range").is_some() {
+            self.builder.note("ranges of lights: left out, all fall off by the square of the distance and never end");
+        }
         let light = match light.get("type").and_then(Value::as_str) {
             Some("directional") => Light::Distant { direction, irradiance: curve },
             Some("point") => Light::Point { position, intensity: curve },

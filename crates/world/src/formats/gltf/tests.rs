@@ -209,3 +209,206 @@ mod shared {
         );
     }
 }
+
+/// A file that has most words, over the triangle of [`file`].
+fn wordy() -> Value {
+    let mut root: Value = serde_json::from_str(&file("3", 3)).unwrap();
+    let picture = r#"{"index":0,"texCoord":0,"extensions":{"KHR_texture_transform":{"offset":[0,0],"rotation":0,"scale":[1,1],"texCoord":0}}}"#;
+    let material = r#"{"name":"all","alphaMode":"MASK","alphaCutoff":0.4,"doubleSided":true,"emissiveFactor":[0.1,0,0],
+        "emissiveTexture":PICTURE,"normalTexture":PICTURE,"occlusionTexture":PICTURE,
+        "pbrMetallicRoughness":{"baseColorFactor":[0.5,0.5,0.5,1],"baseColorTexture":PICTURE,"metallicFactor":0.3,"roughnessFactor":0.4,
+            "metallicRoughnessTexture":PICTURE},
+        "extensions":{"KHR_materials_ior":{"ior":1.4},"KHR_materials_dispersion":{"dispersion":0.2},
+            "KHR_materials_specular":{"specularFactor":0.5,"specularColorFactor":[1,0.5,0.5],"specularTexture":PICTURE},
+            "KHR_materials_transmission":{"transmissionFactor":0.4,"transmissionTexture":PICTURE},
+            "KHR_materials_volume":{"thicknessFactor":0.1,"attenuationDistance":0.3,"attenuationColor":[1,0.4,0.4]},
+            "KHR_materials_clearcoat":{"clearcoatFactor":0.6,"clearcoatRoughnessFactor":0.1,"clearcoatTexture":PICTURE},
+            "KHR_materials_emissive_strength":{"emissiveStrength":3}}}"#;
+    root["materials"] = serde_json::from_str(&format!("[{}]", material.replace("PICTURE", picture))).unwrap();
+    root["textures"] = serde_json::from_str(r#"[{"source":0,"sampler":0}]"#).unwrap();
+    root["samplers"] =
+        serde_json::from_str(r#"[{"wrapS":33071,"wrapT":10497,"magFilter":9729,"minFilter":9729}]"#).unwrap();
+    let bytes = include_bytes!("../../../tests/corpus/picture.png");
+    let uri = format!("data:image/png;base64,{}", BASE64_STANDARD.encode(bytes));
+    root["images"] = Value::Array(vec![Value::Object([("uri".to_owned(), Value::from(uri))].into_iter().collect())]);
+    root["nodes"][0]["rotation"] = serde_json::from_str("[0,0,0,1]").unwrap();
+    root["nodes"][0]["scale"] = serde_json::from_str("[1,1,1]").unwrap();
+    root["meshes"][0]["primitives"][0]["mode"] = Value::from(4);
+    root
+}
+
+/// Every object of a file, by the way to it.
+fn objects(value: &Value, way: &str, found: &mut Vec<String>) {
+    match value {
+        Value::Object(object) => {
+            found.push(way.to_owned());
+            object.iter().for_each(|(key, value)| objects(value, &format!("{way}/{key}"), found));
+        }
+        Value::Array(list) => {
+            list.iter().enumerate().for_each(|(number, value)| objects(value, &format!("{way}/{number}"), found));
+        }
+        _ => {}
+    }
+}
+
+/// A strange word in any object, and a strange value of any word, is told or refused; nothing is taken and ignored.
+#[test]
+fn strange_words_and_values_are_told_everywhere() {
+    let root = wordy();
+    let told = |root: &Value| read_text(&root.to_string()).map(|world| world.notes().to_vec());
+    let plain = told(&root).unwrap();
+    let mut ways = Vec::new();
+    objects(&root, "", &mut ways);
+    let mut n = 0;
+    for way in ways {
+        let is_free = way.ends_with("extensions") || way.ends_with("attributes");
+        let mut strange = root.clone();
+        strange.pointer_mut(&way).unwrap()["quux"] = Value::from(7);
+        if !is_free {
+            let notes = told(&strange).unwrap().join("\n");
+            assert!(notes.contains("quux"), "{way}: {notes}");
+        }
+        let words: Vec<String> = root.pointer(&way).unwrap().as_object().unwrap().keys().cloned().collect();
+        for word in words {
+            for value in
+                [Value::Null, Value::from("blarg"), Value::from(-7), Value::from(1e300), Value::from(vec![0.5; 9])]
+            {
+                let mut strange = root.clone();
+                strange.pointer_mut(&way).unwrap()[&word] = value.clone();
+                // Names and numbers without bounds may be that, and sides without sense.
+                let is_fine = ["name", "rotation", "scale", "uri", "max", "min"].contains(&word.as_str())
+                    || value == 1e300
+                        && [
+                            "emissiveStrength",
+                            "attenuationDistance",
+                            "thicknessFactor",
+                            "dispersion",
+                            "ior",
+                            "intensity",
+                            "znear",
+                            "zfar",
+                            "alphaCutoff",
+                        ]
+                        .contains(&word.as_str())
+                    || value == "blarg" && ["generator", "copyright"].contains(&word.as_str());
+                match told(&strange) {
+                    Ok(notes) if !is_fine => assert_ne!(notes, plain, "{way}/{word}: {value}"),
+                    _ => {}
+                }
+                n += 1;
+            }
+        }
+    }
+    assert!(n > 500, "{n}");
+}
+
+/// What is left out is left out: the default stands, or the nearest number.
+#[test]
+fn strange_values_leave_their_defaults() {
+    let with = |cutoff: &str| {
+        let text = file("3", 3).replace("\"metallicFactor\":0", &format!("\"metallicFactor\":{cutoff}"));
+        let world = read_text(&text).unwrap();
+        let bsdf = world.bsdf(&seen(&world, [0.2, 0.2]), Vec3::Z, &[450.0, 650.0]).albedo();
+        (bsdf, world.notes().join("\n"))
+    };
+    let (one, none) = (with("1").0, with("0").0);
+    assert_ne!(one, none);
+    for (value, expected, said) in
+        [("\"0\"", one, "left out: materials"), ("-3", none, "nearest"), ("12", one, "nearest")]
+    {
+        let (found, notes) = with(value);
+        assert_eq!(found, expected, "{value}");
+        assert!(notes.contains(said) && notes.contains("metallicFactor"), "{notes}");
+    }
+}
+
+/// A mesh at many places of one node, by its accessor of places.
+#[test]
+fn instances_of_a_node_stand_where_it_says() {
+    // The places are the corners of the triangle itself.
+    let places = r#""mesh":0,"extensions":{"EXT_mesh_gpu_instancing":{"attributes":{"TRANSLATION":0}}},"#;
+    let text = file("3", 3).replace("\"mesh\":0,", places);
+    let world = read_text(&text).unwrap();
+    assert_eq!(world.n_primitives(), 3);
+    for corner in [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]] {
+        assert!((seen(&world, [corner[0] + 0.2, corner[1] + 0.2]).distance_m - 5.0).abs() < 1e-5);
+    }
+    let of_file = r#""KHR_materials_variants":{"variants":[{"name":"green"}]},"KHR_lights_punctual":{"lights""#;
+    let variants = file("3", 3).replace(r#""KHR_lights_punctual":{"lights""#, of_file);
+    assert!(read_text(&variants).unwrap().notes().iter().any(|note| note.ends_with(": green")));
+}
+
+/// Returns a world whose triangle has a black base and these extensions.
+fn extended(extensions: &str) -> World {
+    let dark = "\"baseColorFactor\":[0,0,0,1]";
+    let text = file("3", 3).replace("\"baseColorFactor\":[1,0,0,1]", dark);
+    let text = text.replace("\"emissiveFactor\":[0,0,1]", &format!("\"extensions\":{{{extensions}}}"));
+    read_text(&text).unwrap()
+}
+
+/// Blue fibers over a black base: blue is sent back as the table of sheens says, more towards the rim; what they send back the base lacks.
+#[test]
+fn cloth_has_a_sheen() {
+    let sheen = "\"KHR_materials_sheen\":{\"sheenColorFactor\":[0,0,1],\"sheenRoughnessFactor\":0.5}";
+    let (plain, cloth) = (extended(""), extended(sheen));
+    assert_eq!(cloth.notes(), [""; 0]);
+    for cos in [1.0_f32, 0.5, 0.2] {
+        let outgoing = Vec3::new((1.0 - cos * cos).sqrt(), 0.0, cos);
+        let [of_plain, of_cloth] =
+            [&plain, &cloth].map(|world| world.bsdf(&seen(world, [0.2, 0.2]), outgoing, &[450.0, 620.0]).albedo());
+        let fibers = crate::velvet::albedo(0.25, cos);
+        let expected = of_plain[0] * (1.0 - fibers) + fibers;
+        assert!((of_cloth[0] - expected).abs() < 0.05 * expected, "{cos}: {of_cloth:?} {expected}");
+        assert!(of_cloth[1] < of_cloth[0] && of_cloth[1] > 0.0, "{of_cloth:?}");
+    }
+}
+
+/// Glass takes light below its coat and its sheen too.
+#[test]
+fn volumes_are_kept_below_coats_and_sheens() {
+    let volume = "\"KHR_materials_transmission\":{\"transmissionFactor\":1},\"KHR_materials_volume\":{\"thicknessFactor\":1,\
+                  \"attenuationDistance\":2,\"attenuationColor\":[0.5,0.5,0.5]}";
+    for more in [
+        "",
+        ",\"KHR_materials_clearcoat\":{\"clearcoatFactor\":1}",
+        ",\"KHR_materials_sheen\":{\"sheenColorFactor\":[1,1,1]}",
+    ] {
+        let world = extended(&format!("{volume}{more}"));
+        // From behind, and so from within, 4 m on.
+        let ray = Ray { origin: Vec3::new(0.2, 0.2, -7.0), direction: Vec3::Z };
+        let hit = world.intersect(&ray, f32::INFINITY).unwrap();
+        let left = world.transmittance(&hit, &ray, &[550.0]).expect("a volume that absorbs")[0];
+        assert!((left - 0.25).abs() < 1e-4, "{more}: {left}");
+    }
+}
+
+/// Brushed metal: towards the side along u the highlight is as wide as of the rougher α, across as of the finer, turned by its rotation.
+#[test]
+fn brushed_metal_spreads_light_along_its_turn() {
+    let with = |extension: &str| {
+        let metal = r#""baseColorFactor":[1,1,1,1],"metallicFactor":1,"roughnessFactor":0.4"#;
+        let text = file("3", 3).replace(r#""baseColorFactor":[1,0,0,1],"metallicFactor":0"#, metal);
+        let world =
+            read_text(&text.replace(r#""emissiveFactor":[0,0,1]"#, &format!(r#""extensions":{{{extension}}}"#)))
+                .unwrap();
+        let bsdf = world.bsdf(&seen(&world, [0.2, 0.2]), Vec3::Z, &[550.0]);
+        [Vec3::X, Vec3::Y].map(|side| bsdf.eval((Vec3::Z + 0.5 * side).normalize())[0])
+    };
+    let even = with("");
+    assert!((even[0] / even[1] - 1.0).abs() < 1e-4, "{even:?}");
+    let brushed = |turn: &str| with(&format!(r#""KHR_materials_anisotropy":{{"anisotropyStrength":0.7{turn}}}"#));
+    // GGX's density and masking by α of 0.16 and 0.16 + 0.84 · 0.49, at a tilt whose tangent is tan(atan(0.5)/2).
+    let tan = (0.5_f64.atan() / 2.0).tan();
+    let value = |along: f64, across: f64| {
+        let root = 1.0 + (tan / along).powi(2);
+        let lambda = 0.5 * ((1.0 + (0.5 * along).powi(2)).sqrt() - 1.0);
+        let cos = tan.atan().cos();
+        1.0 / (std::f64::consts::PI * along * across * root * root * cos.powi(4)) / (1.0 + lambda) / 4.0
+    };
+    let (fine, rough) = (0.16, 0.16 + 0.84 * 0.49);
+    let [along, across] = brushed("");
+    assert!((f64::from(along) / value(rough, fine) - 1.0).abs() < 1e-3, "{along} {}", value(rough, fine));
+    assert!((f64::from(across) / value(fine, rough) - 1.0).abs() < 1e-3, "{across} {}", value(fine, rough));
+    let turned = brushed(r#","anisotropyRotation":1.5707963"#);
+    assert!((turned[0] / across - 1.0).abs() < 1e-3 && (turned[1] / along - 1.0).abs() < 1e-3, "{turned:?}");
+}

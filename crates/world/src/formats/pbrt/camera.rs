@@ -25,7 +25,7 @@ pub(super) struct CameraWords {
     lens_file: String,
     focal_length_mm: Option<f64>,
     film_distance_mm: Option<f64>,
-    mapping: String,
+    is_equirectangular: bool,
     aperture_diameter_mm: Option<f64>,
     film_diagonal_mm: Option<f64>,
     has_diffraction: bool,
@@ -36,17 +36,24 @@ pub(super) struct CameraWords {
 impl CameraWords {
     pub(super) fn set_camera(&mut self, kind: &str, params: &Params<'_>, camera_from_world: DAffine3) {
         let is_set = |name: &str| params.number(name).is_some_and(|n| n != 0.0) || params.flag(name) == Some(true);
+        let fov = params.within("fov", [1e-3, 179.99]);
         *self = Self {
             kind: kind.to_owned(),
             camera_from_world,
-            fov_deg: params.number("fov"),
-            screen_window: params.numbers("screenwindow").and_then(|n| n.get(..4)?.try_into().ok()),
-            lens_radius: params.number("lensradius").unwrap_or(0.0),
-            focus_distance: params.number_of(&["focaldistance", "focusdistance"]),
+            fov_deg: fov.or_else(|| Some(2.0 * params.within("halffov", [1e-3, 89.99])?)),
+            screen_window: params.exactly("screenwindow").or_else(|| {
+                let aspect = params.within("frameaspectratio", [1e-3, 1e3])?;
+                let (x, y) = if aspect > 1.0 { (aspect, 1.0) } else { (1.0, 1.0 / aspect) };
+                Some([-x, x, -y, y])
+            }),
+            lens_radius: params.within("lensradius", [0.0, f64::MAX]).unwrap_or(0.0),
+            focus_distance: ["focaldistance", "focusdistance"]
+                .iter()
+                .find_map(|name| params.within(name, [0.0, f64::MAX])),
             lens_file: params.text("lensfile").or_else(|| params.text("specfile")).unwrap_or("").to_owned(),
             focal_length_mm: params.number("focal_length"),
             film_distance_mm: film_distance_mm(kind, params),
-            mapping: params.text("mapping").unwrap_or("equalarea").to_owned(),
+            is_equirectangular: params.choice("mapping", &["equalarea", "equirectangular"]) == Some(1),
             aperture_diameter_mm: params.number_of(&["aperturediameter", "aperture_diameter"]),
             film_diagonal_mm: params.number("filmdiag").or(self.film_diagonal_mm),
             has_diffraction: is_set("diffractionEnabled"),
@@ -57,7 +64,8 @@ impl CameraWords {
 
     /// Takes the parameters of the film; returns whether they ask for a part of the picture.
     pub(super) fn set_film(&mut self, params: &Params<'_>) -> bool {
-        if let (Some(x), Some(y)) = (params.number("xresolution"), params.number("yresolution")) {
+        let pixels = |name: &str| params.within(name, [1.0, 65536.0]);
+        if let (Some(x), Some(y)) = (pixels("xresolution"), pixels("yresolution")) {
             self.resolution = Some((x, y));
         }
         self.film_diagonal_mm = self.film_diagonal_mm.or_else(|| params.number("diagonal"));
@@ -83,7 +91,7 @@ impl CameraWords {
                 screen_window: self.screen_window.unwrap_or([-1.0, 1.0, -1.0, 1.0]).map(|v| v * metres_per_unit),
             },
             "environment" => CameraKind::Panorama { mapping: SkyMapping::LatLong },
-            "spherical" if self.mapping == "equirectangular" => CameraKind::Panorama { mapping: SkyMapping::LatLong },
+            "spherical" if self.is_equirectangular => CameraKind::Panorama { mapping: SkyMapping::LatLong },
             "spherical" => CameraKind::Panorama { mapping: SkyMapping::EqualArea },
             kind @ ("realisticEye" | "humaneye" | "raytransfer" | "lightfield") => {
                 CameraKind::Other { kind: kind.to_owned() }

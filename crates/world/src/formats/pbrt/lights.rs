@@ -10,7 +10,7 @@ use super::{
     shapes::FaceAreas,
     spectra::{SpectrumUse, photopic_mean},
 };
-use crate::{Emission, Encoding, FallOff, ImageTexture, Light, SkyImage, SkyMapping, Wrap};
+use crate::{Emission, Encoding, FallOff, ImageTexture, Layout, Light, SkyImage, SkyMapping, Wrap};
 
 use super::Version;
 
@@ -42,7 +42,7 @@ impl Glow {
 impl Reader<'_> {
     /// Returns a number above 0 that the fourth version has of lights, and earlier ones don't.
     fn of_fourth(&self, params: &Params<'_>, name: &str) -> Option<f64> {
-        (self.version == Version::Four).then(|| params.number(name).filter(|value| *value > 0.0))?
+        (self.version == Version::Four).then(|| params.within(name, [0.0, f64::MAX]).filter(|value| *value > 0.0))?
     }
 
     /// Returns the flux of a light, in the file's unit of radiance times area, where the file states one.
@@ -58,13 +58,20 @@ impl Reader<'_> {
     /// Returns what the light is multiplied by; a color, which earlier versions allow, by its mean.
     fn scale(&mut self, params: &Params<'_>) -> f64 {
         let Some(numbers) = params.numbers("scale") else { return 1.0 };
+        if numbers.iter().any(|n| *n < 0.0) {
+            self.builder.note("a light's 'scale' below 0: it is dark");
+            return 0.0;
+        }
         if numbers.iter().any(|n| *n != numbers[0]) {
             self.builder.note("a light's 'scale' that is a color: its mean stands for it");
         }
         numbers.iter().sum::<f64>() / numbers.len() as f64
     }
 
-    pub(super) fn glow(&mut self, params: &Params<'_>) -> Result<Glow, Fault> {
+    pub(super) fn glow(&mut self, kind: &str, params: &Params<'_>) -> Result<Glow, Fault> {
+        if !matches!(kind, "diffuse" | "area") {
+            self.builder.note_of("area lights of a kind that isn't known, as diffuse ones", kind);
+        }
         let scale = self.scale(params);
         let radiance = self.light_curve(params.find("L"), scale)?;
         let emission = Emission { radiance, is_two_sided: params.flag("twosided").unwrap_or(false) };
@@ -79,10 +86,16 @@ impl Reader<'_> {
         let place = self.place_m()?;
         let unit = self.metres_per_unit;
         let scale = self.scale(params);
-        let point = |name: &str, default: [f64; 3]| DVec3::from_array(params.three(name).unwrap_or(default));
+        let point = |name: &str, default: [f64; 3]| DVec3::from_array(params.exactly(name).unwrap_or(default));
         // A file in other units means the irradiance that its own lengths give.
         let of_point = scale * unit * unit;
         let light = match kind {
+            "goniometric" | "projection" if params.find_any(&["filename", "mapname"]).is_some() => {
+                match self.pictured(kind, params, scale)? {
+                    Some(light) => light,
+                    None => return Ok(()),
+                }
+            }
             "point" | "goniometric" | "projection" => {
                 if kind != "point" {
                     self.builder.note_of("light sources that shine alike in all directions, as a point does", kind);
@@ -95,8 +108,10 @@ impl Reader<'_> {
                 let position = place.transform_point3(point("from", [0.0; 3]));
                 let aim = place.transform_point3(point("to", [0.0, 0.0, 1.0]));
                 let direction = (aim - position).try_normalize().ok_or("a spot light without direction".to_owned())?;
-                let outer_deg = params.number("coneangle").unwrap_or(30.0);
-                let inner_deg = outer_deg - params.number_of(&["conedeltaangle", "conedelta"]).unwrap_or(5.0);
+                let outer_deg = params.within("coneangle", [0.0, 180.0]).unwrap_or(30.0);
+                let delta_deg =
+                    ["conedeltaangle", "conedelta"].iter().find_map(|name| params.within(name, [0.0, 180.0]));
+                let inner_deg = outer_deg - delta_deg.unwrap_or(5.0);
                 let (inner_rad, outer_rad) =
                     (inner_deg.to_radians().clamp(0.0, PI), outer_deg.to_radians().clamp(0.0, PI));
                 // The edge of the cone counts half, as in pbrt.
@@ -184,6 +199,57 @@ impl Reader<'_> {
         }
         self.builder.add_light(Light::SkyImage(sky));
         Ok(())
+    }
+
+    /// Returns a lamp that shines by a picture; none, with a note, where it can't be read.
+    fn pictured(&mut self, kind: &str, params: &Params<'_>, scale: f64) -> Result<Option<Light>, Fault> {
+        let name = params.text("filename").or_else(|| params.text("mapname")).unwrap_or("");
+        let read = self.find_file(name).map(|path| ImageTexture::read(&path, Encoding::Srgb, Wrap::Clamp));
+        let picture = match read {
+            Some(Ok(picture)) => picture,
+            Some(Err(error)) => {
+                let said = error.of_picture(name);
+                self.builder.note_of("light sources whose picture can't be read, left out", &said);
+                return Ok(None);
+            }
+            None => {
+                self.builder.note_of("light sources whose picture isn't there, left out", name);
+                return Ok(None);
+            }
+        };
+        let (columns, rows) = picture.size();
+        let is_fourth = self.version == Version::Four;
+        let layout = if kind == "projection" {
+            let tan = (0.5 * params.within("fov", [1e-3, 179.99]).unwrap_or(90.0)).to_radians().tan();
+            // The angle is that of the shorter side.
+            let aspect = columns as f64 / rows as f64;
+            Layout::Ahead { tan_x: tan * aspect.max(1.0), tan_y: tan * (1.0 / aspect).max(1.0) }
+        } else {
+            if is_fourth && columns != rows {
+                self.builder.note_of("pictures of lamps that aren't square, read as rows of equal polar angle", name);
+            }
+            Layout::Around(if is_fourth && columns == rows { SkyMapping::EqualArea } else { SkyMapping::LatLong })
+        };
+        let place = self.place_m()?;
+        let axes = [place.matrix3.x_axis, place.matrix3.y_axis, place.matrix3.z_axis].map(DVec3::normalize);
+        if (0..3).any(|i| axes[i].dot(axes[(i + 1) % 3]).abs() > 1e-6) {
+            self.builder.note(format!("LightSource \"{kind}\": a transform that isn't a rotation"));
+        }
+        let [x, y, z] = axes;
+        let world_from_light = match kind {
+            // The fourth version shows the picture upright, those before upside down; a lamp's distribution has its pole along y.
+            "projection" => DMat3::from_cols(x, if is_fourth { y } else { -y }, z),
+            _ => DMat3::from_cols(x, z, y),
+        };
+        let flux = layout.flux(&picture);
+        let of_power = match self.power(params) {
+            Some(power) if flux > 0.0 => power / flux,
+            _ => 1.0,
+        };
+        let unit = self.metres_per_unit;
+        let intensity = self.light_curve(params.find("I"), scale * of_power * unit * unit)?;
+        let position = place.translation;
+        Ok(Some(Light::Pictured { position, intensity, picture: Arc::new(picture), layout, world_from_light }))
     }
 
     /// Returns the color that `L` multiplies a picture of the sky by; a spectrum counts by its photopic mean.

@@ -51,11 +51,19 @@ impl Reader<'_> {
             "coatedconductor" => self.coated_metal(name, params)?,
             "disney" => self.disney(name, params)?,
             "translucent" => self.translucent(name, params)?,
-            "diffusetransmission" => Material::Translucent {
-                reflectance: color(self, &["reflectance"], 0.25)?,
-                transmittance: color(self, &["transmittance"], 0.25)?,
-            },
+            "diffusetransmission" => {
+                let scale = self.even(params.within("scale", [0.0, f64::MAX]).unwrap_or(1.0) as f32);
+                let [reflectance, transmittance] =
+                    ["reflectance", "transmittance"].map(|name| color(self, &[name], 0.25));
+                let [reflectance, transmittance] = [reflectance?, transmittance?]
+                    .map(|part| self.builder.add_texture(Texture::Product([part, scale])));
+                Material::Translucent { reflectance, transmittance }
+            }
             "mix" => self.mix(params)?,
+            "hair" => {
+                self.builder.note_of("materials of kind 'hair': matte of the color that much of it has", name);
+                Material::Matte { reflectance: self.hair_color(params)? }
+            }
             "" | "none" | "interface" => Material::Open,
             _ => {
                 let reflectance = color(self, &["Kd", "reflectance", "color", "basecolor"], 0.5)?;
@@ -185,6 +193,7 @@ impl Reader<'_> {
             mirrored: self.even(mirrored as f32),
             edge: self.even(1.0),
             transmission: None,
+            brushed: None,
         })
     }
 
@@ -219,9 +228,34 @@ impl Reader<'_> {
             );
             return Ok(Material::Matte { reflectance: self.even(0.5) });
         };
-        let amount = self.part(params, &["amount"], true, 0.5)?;
+        let amount = self.share(params, "amount")?;
         // Before the fourth version the amount is the share of the first.
         Ok(Material::Blend { of: if self.version < Version::Four { [b, a] } else { [a, b] }, amount })
+    }
+
+    /// Returns the color of light that many hairs have scattered, by Chiang & al. (2016), whose inverse is how pbrt makes a hair's absorption of it.
+    fn hair_color(&mut self, params: &Params<'_>) -> Result<TextureId, Fault> {
+        let rough = params.within("beta_n", [0.0, 1.0]).unwrap_or(0.3);
+        let factor = 5.969 + rough * (-0.215 + rough * (2.532 + rough * (-10.73 + rough * (5.574 + rough * 0.245))));
+        let left = |per_radius: f32| (-per_radius.max(0.0).sqrt() * factor as f32).exp();
+        if let Some(param) = params.find("sigma_a") {
+            let curve = match (param.kind, param.numbers.as_slice()) {
+                ("rgb" | "color", &[r, g, b]) => {
+                    SpectralCurve::from_rgb_reflectance([r, g, b].map(|per_radius| left(per_radius as f32)))
+                }
+                _ => self.curve(param, SpectrumUse::Index)?.unwrap_or(SpectralCurve::constant(0.0)).mapped(left),
+            };
+            return Ok(self.builder.add_texture(Texture::Curve(curve)));
+        }
+        if let Some(color) = self.part_if_any(params, &["reflectance", "color"], false)? {
+            return Ok(color);
+        }
+        let [dark, red] = ["eumelanin", "pheomelanin"].map(|name| params.within(name, [0.0, f64::MAX]));
+        let dark = dark.unwrap_or(if red.is_none() { 1.3 } else { 0.0 }) as f32;
+        let red = red.unwrap_or(0.0) as f32;
+        let absorbed =
+            [[0.419, 0.187], [0.697, 0.4], [1.37, 1.05]].map(|[of_dark, of_red]| dark * of_dark + red * of_red);
+        Ok(self.builder.add_texture(Texture::Curve(SpectralCurve::from_rgb_reflectance(absorbed.map(left)))))
     }
 
     fn index(&mut self, params: &Params<'_>, default: f32) -> Result<SpectralCurve, Fault> {
@@ -252,7 +286,8 @@ impl Reader<'_> {
                 });
                 continue;
             }
-            let given = param.and_then(|param| param.numbers.first().map(|n| *n as f32)).unwrap_or(default).max(0.0);
+            let given = names.iter().find_map(|name| params.within(name, [0.0, f64::MAX]));
+            let given = given.map_or(default, |n| n as f32);
             let is_as_given = !is_remapped || given == 0.0 && (has_smooth || self.version == Version::Four);
             alphas.push(self.even(if is_as_given { given.min(1.0) } else { by.alpha(given) }));
         }

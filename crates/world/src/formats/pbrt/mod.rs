@@ -4,8 +4,10 @@
 //! `Renderer` is of version 2.
 
 mod camera;
+mod curves;
 mod lights;
 mod materials;
+mod media;
 mod params;
 mod shapes;
 mod spectra;
@@ -28,29 +30,36 @@ use self::{
     tokens::{Token, Tokens},
 };
 use super::read_bytes;
-use crate::{GroupId, Material, MaterialId, SpectralCurve, Texture, TextureId, WorldBuilder, WorldError};
+use crate::{
+    GroupId, Material, MaterialId, Shape, SpectralCurve, Texture, TextureId, TriangleMesh, WorldBuilder, WorldError,
+};
 
 /// The most bytes that a file and all that it includes may have.
 const MAX_BYTES: u64 = 1 << 31;
 /// Words of films and cameras that change nothing here: names of files, their storage, and times of a still picture; bands and a
 /// sensor are chosen where a world is rendered.
-const NO_MATTER: [&str; 15] = [
-    "filename",
-    "savefp16",
-    "display",
-    "nbuckets",
-    "lambdamin",
-    "lambdamax",
-    "sensor",
-    "iso",
-    "scale",
-    "imagingratio",
-    "maxcomponentvalue",
-    "hither",
-    "yon",
-    "shutteropen",
-    "shutterclose",
-];
+const NO_MATTER: &str = "\
+    filename savefp16 display nbuckets lambdamin lambdamax sensor iso scale imagingratio maxcomponentvalue hither \
+    yon shutteropen shutterclose";
+/// Kinds of what computes a picture, and their parameters, of all versions.
+const OF_RENDERERS: &str = "\
+    02sequence B C adaptive aggregatetest alpha bdpt bestcandidate bidirectional bootstrapsamples box bvh \
+    causticphotons chains createprobes diffuseprt dimensions dipolesubsurface directsamples dodirectseparately \
+    emission emptybonus exphotonmap finalgather finalgathersamples gatherangle gaussian gdist glossyprt grid halton \
+    igi imagewritefrequency independent indirectdepth indirectphotons intersectcost irradiancecache iterations \
+    jitter kdtree lanczossinc largestepprobability lightpath lightsampler lightsamplestrategy lowdiscrepancy \
+    maxconsecutiverejects maxdepth maxdist maxerror maxmindist maxnodeprims maxphotondepth maxpixeldist maxprims \
+    maxsamples maxspeculardepth metadata method metropolis minpixeldist minsamples minweightangle mitchell mlt \
+    mutationsperpixel none nsamples nsets numCABands numcabands numiterations nused paddedsobol path photonmap \
+    photonsperiteration pixelbounds pixelsamples pmj02bn quickrender radius random randomization randomwalk \
+    refineimmediately regularize rrthreshold sample samplebsdf samplelights sampler samplesperpixel scramble seed \
+    sigma simplepath simplevolpath sinc single sobol spectralpath spectralvolpath splitmethod sppm stepsize strategy \
+    stratified surfacepoints tau traversalcost triangle useprobes visualizeobjectids visualizestrategies \
+    visualizeweights volpath volumephotons xradius xsamples xwidth yradius ysamples ywidth zsobol";
+/// Options that change nothing here.
+const OPTIONS: &str = "\
+    disablepixeljitter disabletexturefiltering disablewavelengthjitter displacementedgescale fullscreen gpu \
+    msereferenceimage msereferenceout pixelstats rendercoordsys seed wavefront";
 /// How deep files may include each other, and attributes be nested.
 const MAX_DEPTH: usize = 32;
 
@@ -58,6 +67,7 @@ const MAX_DEPTH: usize = 32;
 pub(super) fn read(path: &Path, metres_per_unit: f64, cancel: &Cancel) -> Result<WorldBuilder, WorldError> {
     let mut reader = Reader::new(path, metres_per_unit, cancel);
     reader.read_file(path, 0)?;
+    reader.end_curves();
     Ok(reader.builder)
 }
 
@@ -94,6 +104,8 @@ struct Attributes {
     material: MaterialId,
     glow: Option<lights::Glow>,
     is_reversed: bool,
+    /// The medium that fills shapes.
+    inside: String,
 }
 
 struct Reader<'c> {
@@ -116,6 +128,11 @@ struct Reader<'c> {
     object: Option<GroupId>,
     /// Materials of which a part is there, by the bits of a number or the number of a texture.
     covered: HashMap<(MaterialId, Coverage), MaterialId>,
+    /// What media that absorb alone take from light, 1/m, none of others; and materials that are filled with one.
+    media: HashMap<String, Option<SpectralCurve>>,
+    filled: HashMap<(MaterialId, String), MaterialId>,
+    /// Curves of one material and place, which are one mesh.
+    curves: Option<(Attributes, MaterialId, TriangleMesh)>,
     cancel: &'c Cancel,
 }
 
@@ -132,7 +149,8 @@ impl<'c> Reader<'c> {
         builder.set_up(DVec3::Y, true);
         let half = builder.add_texture(Texture::Curve(SpectralCurve::constant(0.5)));
         let material = builder.add_material("default", Material::Matte { reflectance: half });
-        let attributes = Attributes { place: DAffine3::IDENTITY, material, glow: None, is_reversed: false };
+        let attributes =
+            Attributes { place: DAffine3::IDENTITY, material, glow: None, is_reversed: false, inside: String::new() };
         Self {
             builder,
             metres_per_unit,
@@ -151,6 +169,9 @@ impl<'c> Reader<'c> {
             objects: HashMap::new(),
             object: None,
             covered: HashMap::new(),
+            media: HashMap::new(),
+            filled: HashMap::new(),
+            curves: None,
             cancel,
         }
     }
@@ -182,6 +203,9 @@ impl<'c> Reader<'c> {
     }
 
     fn directive(&mut self, directive: &str, tokens: &mut Tokens<'_>, depth: usize) -> Result<(), Fault> {
+        if directive != "Shape" {
+            self.end_curves();
+        }
         match directive {
             "Include" | "Import" => return self.include(text(directive, tokens)?, depth),
             "WorldBegin" => self.begin_world()?,
@@ -263,14 +287,17 @@ impl<'c> Reader<'c> {
             | "Sampler" | "PixelFilter" | "Integrator" | "Accelerator" | "ColorSpace" | "MakeNamedMedium"
             | "Attribute" | "SurfaceIntegrator" | "VolumeIntegrator" | "Renderer" | "Volume" => {}
             "MediumInterface" => {
-                while let Some(Token::Text(_)) = tokens.peek()? {
+                let mut names = Vec::new();
+                while let Some(Token::Text(name)) = tokens.peek()? {
                     tokens.next()?;
+                    names.push(name);
                 }
-                self.builder.note("MediumInterface: media aren't followed; space is clear");
+                self.medium_interface(&names);
                 return Ok(());
             }
             "Option" => {
-                Params::read(tokens)?;
+                let unknown = Params::read(tokens)?.unused().into_iter().filter(|name| !has_word(OPTIONS, name));
+                unknown.for_each(|name| self.builder.note_of("options that aren't supported, left out", name));
                 return Ok(());
             }
             _ => return Err(format!("'{directive}' is no directive of pbrt").into()),
@@ -283,6 +310,9 @@ impl<'c> Reader<'c> {
                 self.places.insert("camera".to_owned(), self.attributes.place.inverse());
             }
             "Film" => {
+                if !matches!(kind, "rgb" | "gbuffer" | "spectral" | "image") {
+                    self.builder.note_of("films of a kind that isn't known, as an image", kind);
+                }
                 if self.camera.set_film(&params) {
                     self.builder
                         .note(format!("Film \"{kind}\": a part of the picture is asked for; all of it is the picture"));
@@ -290,7 +320,7 @@ impl<'c> Reader<'c> {
             }
             "Shape" => self.shape(kind, &params)?,
             "LightSource" => self.light(kind, &params)?,
-            "AreaLightSource" => self.attributes.glow = Some(self.glow(&params)?),
+            "AreaLightSource" => self.attributes.glow = Some(self.glow(kind, &params)?),
             "Material" => {
                 let material = self.material(kind, kind, &params)?;
                 self.attributes.material = material;
@@ -303,34 +333,63 @@ impl<'c> Reader<'c> {
             "ColorSpace" if kind != "srgb" => {
                 self.builder.note(format!("ColorSpace \"{kind}\": colors are taken as sRGB"));
             }
-            "MakeNamedMedium" | "Volume" | "Attribute" => {
+            "MakeNamedMedium" => {
+                let absorption = self.absorption(&params)?;
+                let is_clear = absorption.is_none();
+                self.media.insert(kind.to_owned(), absorption);
+                if is_clear {
+                    self.builder.note_of("media that scatter light or glow, left out: space is clear", kind);
+                    return Ok(());
+                }
+            }
+            "Volume" | "Attribute" => {
                 self.builder.note_of(&format!("{directive}: not supported, left out"), kind);
                 return Ok(());
             }
-            "SurfaceIntegrator" | "VolumeIntegrator" | "Renderer" => {
-                self.version = Version::Two;
-                if kind == "directlighting" {
-                    self.builder.note(format!(
-                        "{directive} \"{kind}\": light that is scattered more than once is followed too, unless its scatterings are limited"
-                    ));
-                }
-                return Ok(());
-            }
-            // How a picture is computed is the renderer's affair.
-            _ => return Ok(()),
+            "Sampler" | "PixelFilter" | "Integrator" | "Accelerator" | "SurfaceIntegrator" | "VolumeIntegrator"
+            | "Renderer" => self.way_of_computing(directive, kind),
+            _ => {}
         }
         self.report_unused(directive, kind, &params);
         Ok(())
     }
 
+    /// How a picture is computed is the renderer's affair, unless other light is followed.
+    fn way_of_computing(&mut self, directive: &str, kind: &str) {
+        if directive.starts_with("Surface") || directive.starts_with("Volume") || directive == "Renderer" {
+            self.version = Version::Two;
+        }
+        if matches!(kind, "directlighting" | "whitted" | "ambientocclusion" | "ao") {
+            self.builder.note(format!(
+                "{directive} \"{kind}\": light that is scattered more than once is followed too, unless its scatterings are limited"
+            ));
+        } else if !has_word(OF_RENDERERS, kind) {
+            self.builder.note(format!("{directive} \"{kind}\": not known, left out"));
+        }
+    }
+
     /// Reports parameters that nobody asked for.
     fn report_unused(&mut self, directive: &str, kind: &str, params: &Params<'_>) {
-        let is_told = |name: &&str| !matches!(directive, "Film" | "Camera") || !NO_MATTER.contains(name);
+        let no_matter = match directive {
+            "Film" | "Camera" => NO_MATTER,
+            "Sampler" | "PixelFilter" | "Integrator" | "Accelerator" | "SurfaceIntegrator" | "VolumeIntegrator"
+            | "Renderer" => OF_RENDERERS,
+            _ => "",
+        };
+        let is_told = |name: &&str| !has_word(no_matter, name);
         let unused: Vec<&str> = params.unused().into_iter().filter(is_told).collect();
         if !unused.is_empty() {
             let unused = unused.join(", ");
             self.builder.note(format!("{directive} \"{kind}\": not supported and left out: {unused}"));
         }
+    }
+
+    /// Adds the curves so far.
+    fn end_curves(&mut self) {
+        let Some((attributes, material, mesh)) = self.curves.take() else { return };
+        let place = DAffine3::from_scale(DVec3::splat(self.metres_per_unit)) * attributes.place;
+        let group = self.object.unwrap_or(GroupId::ROOT);
+        self.builder.add_shape_to(group, Shape::Mesh(mesh), place, material, None);
     }
 
     fn include(&mut self, name: &str, depth: usize) -> Result<(), Fault> {
@@ -444,6 +503,11 @@ fn unpacked(path: &Path, bytes: Vec<u8>, limit: u64) -> Result<Vec<u8>, WorldErr
         return Err(unreadable(format!("it unpacks to more than {limit} bytes")));
     }
     Ok(text)
+}
+
+/// Whether a word is one of a list.
+fn has_word(list: &str, word: &str) -> bool {
+    list.split_ascii_whitespace().any(|known| known == word)
 }
 
 fn no_begin(directive: &str) -> String {

@@ -4,11 +4,15 @@ use std::f64::consts::PI;
 
 use glam::{DAffine3, DVec3, Vec2, Vec3};
 
-use super::{Coverage, Fault, Reader, params::Params, surfaces};
-use crate::{GroupId, Material, MaterialId, Shape, SpectralCurve, Texture, TriangleMesh, read_ply};
+use super::{Coverage, Fault, Reader, curves, params::Params, surfaces};
+use crate::{GroupId, Material, MaterialId, Shape, SpectralCurve, Texture, TriangleMesh};
 
 impl Reader<'_> {
     pub(super) fn shape(&mut self, kind: &str, params: &Params<'_>) -> Result<(), Fault> {
+        if kind == "curve" {
+            return self.curve_shape(params);
+        }
+        self.end_curves();
         let mut place = self.place_m()?;
         let number = |name: &str, default: f64| params.number(name).unwrap_or(default);
         let part = surfaces::quadric(kind, params)?;
@@ -17,7 +21,8 @@ impl Reader<'_> {
             (_, Some(part)) => Shape::Mesh(part),
             ("trianglemesh", None) => Shape::Mesh(triangles(params)?),
             ("loopsubdiv", None) => {
-                let levels = params.number_of(&["levels", "nlevels"]).unwrap_or(3.0).clamp(0.0, 10.0);
+                let levels =
+                    ["levels", "nlevels"].iter().find_map(|name| params.within(name, [0.0, 10.0])).unwrap_or(3.0);
                 let control = triangles(params)?;
                 control.check().map_err(|e| e.to_string())?;
                 Shape::Mesh(surfaces::smoothed(&control, levels as u32))
@@ -32,7 +37,11 @@ impl Reader<'_> {
             ("plymesh", None) => {
                 let file = params.text("filename").ok_or("a plymesh without filename".to_owned())?;
                 match self.find_file(file) {
-                    Some(path) => Shape::Mesh(read_ply(&path)?),
+                    Some(path) => {
+                        let crate::formats::ply::Contents { mesh, left, .. } = crate::formats::ply::read(&path)?;
+                        left.iter().for_each(|word| self.builder.note_of("of meshes isn't read", word));
+                        Shape::Mesh(mesh)
+                    }
                     None => {
                         self.builder.note_of("Shape \"plymesh\": no such file, left out", file);
                         return Ok(());
@@ -71,6 +80,7 @@ impl Reader<'_> {
             glow.of_faces(&faces.per_square_unit(self.metres_per_unit))
         });
         let material = self.material_of_shape(params, emission.is_some())?;
+        let material = self.filled(material);
         let group = self.object.unwrap_or(GroupId::ROOT);
         let id = self.builder.add_shape_to(group, shape, place, material, emission);
         if self.attributes.is_reversed {
@@ -81,6 +91,24 @@ impl Reader<'_> {
 }
 
 impl Reader<'_> {
+    fn curve_shape(&mut self, params: &Params<'_>) -> Result<(), Fault> {
+        self.checked_place()?;
+        if self.attributes.glow.is_some() {
+            self.builder.note("Shape \"curve\": the glow of curves is left out");
+        }
+        self.builder.note("Shape \"curve\": tubes of triangles, round where pbrt's turn to who looks");
+        let material = self.material_of_shape(params, false)?;
+        if self.curves.as_ref().is_some_and(|(_, known, _)| *known != material) {
+            self.end_curves();
+        }
+        let attributes = &self.attributes;
+        let (_, _, mesh) = self.curves.get_or_insert_with(|| (attributes.clone(), material, TriangleMesh::default()));
+        if let Err(reason) = curves::add(mesh, params) {
+            self.builder.note_of("curves that are none, left out", &reason);
+        }
+        Ok(())
+    }
+
     /// Returns the current material, of which so much is there as the shape's alpha says.
     fn material_of_shape(&mut self, params: &Params<'_>, glows: bool) -> Result<MaterialId, Fault> {
         let material = self.attributes.material;
@@ -88,17 +116,17 @@ impl Reader<'_> {
             self.builder.note("'shadowalpha' of shapes: shadows are those of 'alpha'");
         }
         let Some(param) = params.find("alpha") else { return Ok(material) };
-        let coverage = match (param.kind, param.numbers.first()) {
+        let coverage = match (param.kind, params.within("alpha", [0.0, 1.0])) {
             ("texture", _) => match self.part_if_any(params, &["alpha"], true)? {
                 Some(texture) => Coverage::Texture(texture),
                 None => return Ok(material),
             },
-            (_, Some(number)) if *number >= 1.0 => return Ok(material),
+            (_, None | Some(1.0)) => return Ok(material),
             // A lamp that isn't seen.
-            (_, Some(number)) if *number <= 0.0 && glows => {
+            (_, Some(0.0)) if glows => {
                 return Ok(self.builder.add_material("open", Material::Open));
             }
-            (_, number) => Coverage::Number((number.copied().unwrap_or(1.0) as f32).to_bits()),
+            (_, Some(number)) => Coverage::Number((number as f32).to_bits()),
         };
         if let Some(known) = self.covered.get(&(material, coverage)) {
             return Ok(*known);
@@ -169,7 +197,10 @@ fn mesh<const N: usize>(params: &Params<'_>) -> Result<(TriangleMesh, Vec<[u32; 
     };
     let positions = threes("P")?;
     let normals = threes("N")?;
-    let uvs = params.find_any(&["uv", "st"]).map_or(&[][..], |param| param.numbers.as_slice());
+    let uvs = params.numbers("uv").or_else(|| params.numbers("st")).unwrap_or(&[]);
+    if !uvs.len().is_multiple_of(2) {
+        return Err(format!("{} numbers in 'uv': expected two a vertex", uvs.len()).into());
+    }
     let uvs: Vec<Vec2> = uvs.chunks_exact(2).map(|n| Vec2::new(n[0] as f32, n[1] as f32)).collect();
     let whole: Vec<f64> = (0..N).map(|i| i as f64).collect();
     let indices = match params.numbers("indices") {

@@ -28,10 +28,28 @@ impl Reader<'_> {
                 SpectrumUse::Index => SpectralCurve::constant(rgb.iter().sum::<f32>() / 3.0),
             }
         };
+        if let ("rgb" | "color", true) = (param.kind, of != SpectrumUse::Index) {
+            let most = if of == SpectrumUse::Light { f64::INFINITY } else { 1.0 };
+            if param.numbers.iter().any(|v| !(0.0..=most).contains(v)) {
+                let sentence = match of {
+                    SpectrumUse::Light => "colors of lights below 0: 0 in place of that",
+                    _ => "colors of surfaces beyond 0 to 1: the nearest in their place",
+                };
+                self.builder.note_of(sentence, param.name);
+            }
+        }
         Ok(Some(match param.kind {
             "rgb" | "color" => colored(three()?),
             "xyz" => colored(Xyz(three()?).to_linear_srgb()),
-            "float" => SpectralCurve::constant(*param.numbers.first().ok_or_else(|| wrong("a number"))? as f32),
+            "float" => match *param.numbers {
+                [value, ref more @ ..] => {
+                    if !more.is_empty() {
+                        self.builder.note_of("numbers of parameters behind the first, left out", param.name);
+                    }
+                    SpectralCurve::constant(value as f32)
+                }
+                [] => return Err(wrong("a number")),
+            },
             "blackbody" => {
                 let kelvin = *param.numbers.first().ok_or_else(|| wrong("a temperature, K"))?;
                 if !(100.0..=1e6).contains(&kelvin) {

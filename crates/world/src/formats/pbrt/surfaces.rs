@@ -17,7 +17,7 @@ const MOST_TRIANGLES: usize = 1 << 22;
 /// another.
 pub(super) fn quadric(kind: &str, params: &Params<'_>) -> Result<Option<TriangleMesh>, String> {
     let number = |name: &str, default: f64| params.number(name).unwrap_or(default);
-    let turn = number("phimax", 360.0).clamp(0.0, 360.0).to_radians();
+    let turn = params.within("phimax", [1e-3, 360.0]).unwrap_or(360.0).to_radians();
     let radius = number("radius", 1.0);
     let is_part = turn < TAU;
     let profile: Box<dyn Fn(f64) -> DVec2> = match kind {
@@ -58,7 +58,7 @@ pub(super) fn quadric(kind: &str, params: &Params<'_>) -> Result<Option<Triangle
             })
         }
         "hyperboloid" => {
-            let point = |name: &str, default: [f64; 3]| DVec3::from_array(params.three(name).unwrap_or(default));
+            let point = |name: &str, default: [f64; 3]| DVec3::from_array(params.exactly(name).unwrap_or(default));
             let (a, b) = (point("p1", [0.0; 3]), point("p2", [1.0; 3]));
             return Ok(Some(turned(turn, &move |v| a + v * (b - a))));
         }

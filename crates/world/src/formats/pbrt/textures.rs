@@ -16,6 +16,9 @@ impl Reader<'_> {
         let kind = text("Texture", tokens)?;
         let params = Params::read(tokens)?;
         let is_number = of == "float";
+        if !matches!(of, "float" | "spectrum" | "color") {
+            self.builder.note_of("textures of a type that isn't known, as spectra", of);
+        }
         let texture = match kind {
             "imagemap" => self.image_texture(name, &params)?,
             "constant" => Texture::Curve(self.constant_texture(&params, "value", 1.0)?),
@@ -27,12 +30,12 @@ impl Reader<'_> {
             "mix" => {
                 let a = self.part(&params, &["tex1"], is_number, 0.0)?;
                 let b = self.part(&params, &["tex2"], is_number, 1.0)?;
-                Texture::Blend { of: [a, b], amount: self.part(&params, &["amount"], true, 0.5)? }
+                Texture::Blend { of: [a, b], amount: self.share(&params, "amount")? }
             }
             "checkerboard" => {
                 let a = self.part(&params, &["tex1"], is_number, 1.0)?;
                 let b = self.part(&params, &["tex2"], is_number, 0.0)?;
-                match params.number("dimension") {
+                match params.within("dimension", [2.0, 3.0]) {
                     Some(3.0) => procedural(Procedural::Blocks { of: [a, b], frame: self.texture_from_world()? }),
                     _ => Texture::Checkerboard { fields: [a, b], mapping: self.mapping(name, &params)? },
                 }
@@ -52,7 +55,7 @@ impl Reader<'_> {
             }
             "uv" => procedural(Procedural::Coordinates { mapping: self.mapping(name, &params)? }),
             "fbm" | "wrinkled" | "windy" | "marble" => {
-                let octaves = params.number("octaves").unwrap_or(8.0).clamp(0.0, 32.0) as u32;
+                let octaves = params.within("octaves", [0.0, 32.0]).unwrap_or(8.0) as u32;
                 let roughness = params.number("roughness").unwrap_or(0.5) as f32;
                 let frame = self.texture_from_world()?;
                 let kind = match kind {
@@ -107,6 +110,16 @@ impl Reader<'_> {
         Ok(found.unwrap_or_else(|| self.builder.add_texture(Texture::Curve(SpectralCurve::constant(default)))))
     }
 
+    /// Returns a share, 0–1, as [`part`](Self::part) does.
+    pub(super) fn share(&mut self, params: &Params<'_>, name: &str) -> Result<TextureId, Fault> {
+        let is_even = params.find(name).is_some_and(|param| param.kind != "texture");
+        let even = if is_even { params.within(name, [0.0, 1.0]) } else { None };
+        match is_even {
+            true => Ok(self.builder.add_texture(Texture::Curve(SpectralCurve::constant(even.unwrap_or(0.5) as f32)))),
+            false => self.part(params, &[name], true, 0.5),
+        }
+    }
+
     pub(super) fn part_if_any(
         &mut self,
         params: &Params<'_>,
@@ -141,9 +154,9 @@ impl Reader<'_> {
     fn image_texture(&mut self, name: &str, params: &Params<'_>) -> Result<Texture, Fault> {
         let file = params.text("filename").unwrap_or("");
         let path = self.find_file(file).unwrap_or_else(|| PathBuf::from(file));
-        let wrap = match params.text("wrap") {
-            Some("clamp") => Wrap::Clamp,
-            Some("black") => Wrap::Black,
+        let wrap = match params.choice("wrap", &["repeat", "clamp", "black"]) {
+            Some(1) => Wrap::Clamp,
+            Some(2) => Wrap::Black,
             _ => Wrap::Repeat,
         };
         let gamma = match (params.find("gamma"), params.text("encoding")) {
@@ -151,8 +164,12 @@ impl Reader<'_> {
             (Some(param), _) if param.texts.first() == Some(&"false") => Encoding::Linear,
             (Some(param), _) => param.numbers.first().map_or(Encoding::Srgb, |g| Encoding::Gamma(*g as f32)),
             (None, Some("linear")) => Encoding::Linear,
+            (None, Some("sRGB" | "srgb")) => Encoding::Srgb,
             (None, Some(encoding)) => {
                 let power = encoding.strip_prefix("gamma").and_then(|g| g.trim().parse().ok());
+                if power.is_none() {
+                    self.builder.note_of("pictures of an encoding that isn't known, as sRGB", encoding);
+                }
                 power.map_or(Encoding::Srgb, Encoding::Gamma)
             }
             (None, None) => Encoding::Srgb,
@@ -161,7 +178,7 @@ impl Reader<'_> {
         let scale = params.number("scale").unwrap_or(1.0) as f32;
         params.find("trilinear");
         params.find("maxanisotropy");
-        params.find("filter");
+        params.choice("filter", &["point", "bilinear", "trilinear", "EWA"]);
         let is_inverted = params.flag("invert").unwrap_or(false);
         match ImageTexture::read(&path, gamma, wrap) {
             Ok(image) => {
@@ -205,7 +222,7 @@ impl Reader<'_> {
             Some("spherical") => Some(Coordinates::Sphere(self.texture_from_world()?)),
             Some("cylindrical") => Some(Coordinates::Cylinder(self.texture_from_world()?)),
             Some("planar") => {
-                let row = |name: &str, default: [f64; 3]| DVec3::from_array(params.three(name).unwrap_or(default));
+                let row = |name: &str, default: [f64; 3]| DVec3::from_array(params.exactly(name).unwrap_or(default));
                 let (u, v) = (row("v1", [1.0, 0.0, 0.0]), row("v2", [0.0, 1.0, 0.0]));
                 // Rows u and v of a frame; pbrt takes the points in the world, its fourth version in the texture's frame.
                 let rows = DMat3::from_cols(u, v, DVec3::Z).transpose();
