@@ -63,9 +63,10 @@ pub struct VideoFrameFacts {
 }
 
 impl Video {
-    /// The rows and the columns of a frame.
+    /// The rows and the columns of a frame, those that are read as one being one.
     pub fn size(&self) -> (usize, usize) {
-        (self.sensor.rows, self.sensor.columns)
+        let sheet = self.sensor.as_read(&self.exposure).expect("the binning was checked when the video was made ready");
+        (sheet.rows, sheet.columns)
     }
 
     /// Takes a frame, counted from 0.
@@ -118,7 +119,8 @@ impl Video {
 
     fn rate(&self, shutter: &RollingShutter) -> Result<ElectronRate, PipelineError> {
         let place_at = |time_s: f64| self.path.place_at(time_s, self.samples_per_tan);
-        Ok(self.exposed.rolling_rate(&self.still, self.size(), shutter, &place_at, self.exit_pupil)?)
+        let size = (self.sensor.rows, self.sensor.columns);
+        Ok(self.exposed.rolling_rate(&self.still, size, shutter, &place_at, self.exit_pupil)?)
     }
 }
 
@@ -209,6 +211,7 @@ impl KeptCamera {
             noise: inputs.frames.shutter.noise,
             sensor,
         };
+        video.sensor.as_read(inputs.frames.shutter.exposure.shot())?;
         let rate = video.rate(&video.shutter(0))?;
         video.exposure = video.exposed.expose(&rate, &inputs.frames.shutter.exposure)?;
         video.check_times()?;
