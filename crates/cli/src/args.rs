@@ -358,6 +358,10 @@ pub(crate) struct FrameArgs {
     /// Readout of dual-gain pixels: low or high [default: low]
     #[arg(long, value_name = "MODE", help_heading = heading::EXPOSURE)]
     pub(crate) gain_mode: Option<String>,
+    /// Reads so many pixels of one filter each way as one: charge:2 (electrons summed before they are read), voltage:2 (the mean after the source
+    /// followers), digital:2 (numbers summed), none [default: none]
+    #[arg(long, value_name = "KIND:N", help_heading = heading::EXPOSURE)]
+    pub(crate) binning: Option<String>,
     /// Temperature of the chip, °C [default: 25]
     #[arg(long, value_name = "C", help_heading = heading::EXPOSURE)]
     pub(crate) temperature_c: Option<f64>,
@@ -383,6 +387,13 @@ pub(crate) struct DevelopArgs {
     /// How far the profile of the file makes the picture [default: colors]
     #[arg(long, value_enum, hide_possible_values = false, help_heading = heading::EXPOSURE)]
     pub(crate) rendering: Option<RenderingKind>,
+    /// Camera profile in place of the file's own: a DCP file, or a DNG file whose profile is taken
+    #[arg(long, value_name = "FILE", help_heading = heading::EXPOSURE)]
+    pub(crate) profile: Option<PathBuf>,
+    /// What stands for darkness: stated (the file's black level), masked (the mean of its masked pixels, which have dark current too)
+    /// [default: stated]
+    #[arg(long, value_name = "KIND", help_heading = heading::EXPOSURE)]
+    pub(crate) black: Option<String>,
     /// Folder for the results
     #[arg(long, short, value_name = "DIR", help_heading = heading::RESULTS)]
     pub(crate) out: PathBuf,

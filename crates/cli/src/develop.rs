@@ -3,7 +3,9 @@
 use std::fmt::Write;
 
 use dioptric_analysis::DngReport;
-use dioptric_pipeline::{Camera, DevelopedFile, DngOpcodes, DngRendering, FrameFile, Staged, write_json};
+use dioptric_pipeline::{
+    Camera, DevelopedFile, DngBlack, DngOpcodes, DngReading, DngRendering, FrameFile, ProfileFile, Staged, write_json,
+};
 
 use crate::{
     args::{Common, DevelopArgs},
@@ -19,9 +21,13 @@ pub(crate) fn run(arguments: &DevelopArgs, common: &Common) -> anyhow::Result<()
     arguments.picture.0.apply(&mut processing)?;
     let also = arguments.also.as_deref().map_or(Ok(Vec::new()), FrameFile::parse_list)?;
     let staged = Staged::folder(&arguments.out)?;
-    let opcodes = if arguments.ignore_opcodes { DngOpcodes::Ignored } else { DngOpcodes::Applied };
-    let rendering = arguments.rendering.map_or_else(DngRendering::default, DngRendering::from);
-    let developed = DevelopedFile::read_with(&arguments.raw, processing, (opcodes, rendering))?;
+    let reading = DngReading {
+        opcodes: if arguments.ignore_opcodes { DngOpcodes::Ignored } else { DngOpcodes::Applied },
+        rendering: arguments.rendering.map_or_else(DngRendering::default, DngRendering::from),
+        black: arguments.black.as_deref().map_or(Ok(DngBlack::default()), DngBlack::parse)?,
+        profile: arguments.profile.as_deref().map(ProfileFile::read).transpose()?,
+    };
+    let developed = DevelopedFile::read_with(&arguments.raw, processing, &reading)?;
     let report = DngReport::new(&developed);
     developed.write_pictures(&also, staged.path())?;
     write_json(&staged.path().join("report.json"), &report)?;

@@ -8,7 +8,7 @@ use dioptric_analysis::measure::{
     TextureCurve, TextureMeasurement, TextureNoiseRequest, TextureRequest, measure_bench, measure_frames,
     notes_on_picture,
 };
-use dioptric_pipeline::{SensorSpec, Staged, open_display, parse_illuminant};
+use dioptric_pipeline::{Binning, SensorSpec, Staged, open_display, parse_illuminant};
 
 use crate::{
     args::Common,
@@ -44,16 +44,16 @@ fn mtf(arguments: &MtfArgs, common: &Common) -> anyhow::Result<()> {
         pixel_um: arguments.pixel_um,
         pixels_per_degree: arguments.pixels_per_degree,
     };
+    let picture = match arguments.pictures.as_slice() {
+        [picture] if !picture.is_dir() => picture,
+        _ => return measure_charts::edges_of_pictures(request, arguments, common),
+    };
     if arguments.all {
-        return measure_charts::edges(request, arguments, common);
+        return measure_charts::edges(request, picture, arguments, common);
     }
-    let finish = Finish::new(
-        ("mtf", "Edge response"),
-        file_name(&arguments.picture),
-        arguments.picture_args.out.as_deref(),
-        common,
-    )?;
-    finish.with(&request.measure(&opened(&arguments.picture, &arguments.picture_args, common)?)?, mtf_table)
+    let out = arguments.picture_args.out.as_deref();
+    let finish = Finish::new(("mtf", "Edge response"), file_name(picture), out, common)?;
+    finish.with(&request.measure(&opened(picture, &arguments.picture_args, common)?)?, mtf_table)
 }
 
 fn texture(arguments: &TextureArgs, common: &Common) -> anyhow::Result<()> {
@@ -110,6 +110,7 @@ fn noise(arguments: &NoiseArgs, common: &Common) -> anyhow::Result<()> {
                 wavelength_nm: arguments.wavelength_nm,
                 time_s: arguments.exposure_s,
                 analog_gain: arguments.analog_gain,
+                binning: arguments.binning.as_deref().map_or(Ok(None), Binning::parse)?,
                 temperature_c: arguments.temperature_c,
                 seed: common.seed.unwrap_or(SEED),
             };
@@ -200,6 +201,18 @@ fn mtf_table(measured: &EdgeMeasurement) -> Result<String, std::fmt::Error> {
     }
     for channel in &measured.not_measured {
         writeln!(text, "{:<12} {}", channel.channel, channel.reason)?;
+    }
+    let beside_green: Vec<String> = measured
+        .channels
+        .iter()
+        .filter(|channel| !["G", "luminance"].contains(&channel.channel.as_str()))
+        .filter_map(|channel| {
+            let (px, error) = (channel.offset_px?, channel.offset_error_px?);
+            Some(format!("{} by {px:.3} ± {error:.3}", channel.channel))
+        })
+        .collect();
+    if !beside_green.is_empty() {
+        writeln!(text, "\nacross the edge, pixels from G (lateral color): {}", beside_green.join(", "))?;
     }
     let shading = measured.channels.iter().map(|channel| channel.shading).fold(0.0, f64::max);
     if shading > 0.0 {

@@ -55,8 +55,10 @@ pub(crate) enum CurveKind {
 /// A slanted edge.
 #[derive(Debug, Args)]
 pub(crate) struct MtfArgs {
-    /// Picture or raw frame: PNG, TIFF, JPEG, EXR, or DNG, whose mosaic is its own
-    pub(crate) picture: PathBuf,
+    /// Picture or raw frame: PNG, TIFF, JPEG, EXR, or DNG, whose mosaic is its own; several, or a folder of them, are measured one by one, a row
+    /// each
+    #[arg(required = true, value_name = "PICTURE")]
+    pub(crate) pictures: Vec<PathBuf>,
     /// Where the edge is, pixels [default: the most edge-like square of the picture]
     #[arg(long, value_name = "x,y,w,h")]
     pub(crate) region: Option<String>,
@@ -226,6 +228,9 @@ pub(crate) struct NoiseArgs {
     /// Factor on the voltage [default: 1]
     #[arg(long, value_name = "G", requires = "sensor")]
     pub(crate) analog_gain: Option<f64>,
+    /// Reads so many pixels each way as one: charge:2, voltage:2, digital:2, none [default: none]
+    #[arg(long, value_name = "KIND:N", requires = "sensor")]
+    pub(crate) binning: Option<String>,
     /// Temperature of the chip, °C [default: 25]
     #[arg(long, value_name = "C", requires = "sensor")]
     pub(crate) temperature_c: Option<f64>,

@@ -1,36 +1,77 @@
 //! `dioptric measure` of targets that fill the field: edges all over a picture, stars, grids of dots, even planes and gray steps.
 
-use std::fmt::{Error, Write};
+use std::{
+    fmt::{Error, Write},
+    path::Path,
+};
 
 use dioptric_analysis::measure::{
-    EdgeMap, EdgeMapRequest, EdgeRequest, GridMeasurement, PixelRegion, ShadingMeasurement, StarMeasurement,
-    StarRequest, StepsMeasurement, StepsRequest,
+    EdgeBatch, EdgeBatchRequest, EdgeMap, EdgeMapRequest, EdgeRequest, GridMeasurement, PixelRegion,
+    ShadingMeasurement, StarMeasurement, StarRequest, StepsMeasurement, StepsRequest,
 };
 
 use crate::{
     args::Common,
     lens::tell,
-    measure_args::{GridArgs, ShadingArgs, StarArgs, StepsArgs},
-    measure_output::{Finish, file_name, opened, or_dash},
+    measure_args::{GridArgs, MtfArgs, ShadingArgs, StarArgs, StepsArgs},
+    measure_output::{Finish, curve, file_name, opened, or_dash},
 };
 
 /// Places of a map that cannot be measured and are still named.
 const MOST_NAMED: usize = 3;
 
 /// Measures the edges all over a picture.
-pub(crate) fn edges(
-    request: EdgeRequest,
-    arguments: &crate::measure_args::MtfArgs,
-    common: &Common,
-) -> anyhow::Result<()> {
-    let finish = Finish::new(
-        ("mtf-field", "Edge responses over the field"),
-        file_name(&arguments.picture),
-        arguments.picture_args.out.as_deref(),
-        common,
-    )?;
-    let picture = opened(&arguments.picture, &arguments.picture_args, common)?;
+pub(crate) fn edges(request: EdgeRequest, picture: &Path, arguments: &MtfArgs, common: &Common) -> anyhow::Result<()> {
+    let out = arguments.picture_args.out.as_deref();
+    let finish = Finish::new(("mtf-field", "Edge responses over the field"), file_name(picture), out, common)?;
+    let picture = opened(picture, &arguments.picture_args, common)?;
     finish.with(&EdgeMapRequest { edge: request }.measure(&picture)?, edge_map_table)
+}
+
+/// Measures the edge of each of several pictures.
+pub(crate) fn edges_of_pictures(request: EdgeRequest, arguments: &MtfArgs, common: &Common) -> anyhow::Result<()> {
+    anyhow::ensure!(!arguments.all, "--all is for the edges of one picture, expected one in place of several");
+    let pictures = EdgeBatchRequest::pictures_of(&arguments.pictures)?;
+    let out = arguments.picture_args.out.as_deref();
+    let subject = format!("{} pictures", pictures.len());
+    let finish = Finish::new(("mtf", "Edge responses of pictures"), subject, out, common)?;
+    let batch = EdgeBatchRequest { edge: request, curve: curve(arguments.picture_args.curve) }.measure(&pictures)?;
+    tell(&batch.notes, common);
+    finish.with(&batch, edge_batch_table)
+}
+
+/// A row a picture: its luminance, or the last of its channels.
+fn edge_batch_table(batch: &EdgeBatch) -> Result<String, Error> {
+    let names = batch.pictures.iter().map(|measured| &measured.picture);
+    let names = names.chain(batch.not_measured.iter().map(|picture| &picture.picture));
+    let width = names.map(|name| name.chars().count()).max().unwrap_or(0).max("picture".len());
+    let mut text =
+        format!("{} of {} pictures\n\n", batch.pictures.len(), batch.pictures.len() + batch.not_measured.len());
+    writeln!(
+        text,
+        "{:<width$} {:<12} {:>7} {:>11} {:>9} {:>12} {:>11} {:>11} {:>9}",
+        "picture", "channel", "slant°", "MTF50 c/px", "± error", "MTF50P c/px", "MTF50 c/mm", "at 0.5 c/px", "acutance"
+    )?;
+    for measured in &batch.pictures {
+        let Some(channel) = measured.channels.last() else { continue };
+        writeln!(
+            text,
+            "{:<width$} {:<12} {:>7.2} {:>11} {:>9} {:>12} {:>11} {:>11} {:>9}",
+            measured.picture,
+            channel.channel,
+            measured.slant_deg,
+            or_dash(channel.mtf50_cycles_per_pixel, 4),
+            or_dash(channel.mtf50_error_cycles_per_pixel, 4),
+            or_dash(channel.mtf50p_cycles_per_pixel, 4),
+            or_dash(channel.mtf50_cycles_per_mm, 2),
+            or_dash(channel.response_at_nyquist, 4),
+            or_dash(channel.acutance, 4)
+        )?;
+    }
+    for picture in &batch.not_measured {
+        writeln!(text, "{:<width$} {}", picture.picture, picture.reason)?;
+    }
+    Ok(text)
 }
 
 pub(crate) fn star(arguments: &StarArgs, common: &Common) -> anyhow::Result<()> {

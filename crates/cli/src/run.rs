@@ -320,6 +320,7 @@ pub(crate) fn sensor_options(arguments: &FrameArgs) -> SensorOptions {
         noise: arguments.noise.clone(),
         analog_gain: arguments.analog_gain,
         gain_mode: arguments.gain_mode.clone(),
+        binning: arguments.binning.clone(),
         temperature_c: arguments.temperature_c,
         metering: arguments.metering.clone(),
         picture: arguments.picture.0.clone(),

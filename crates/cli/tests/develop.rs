@@ -166,6 +166,61 @@ fn processing_comes_from_options_and_from_a_camera_file() {
 }
 
 #[test]
+fn pixels_that_are_read_as_one_are_those_of_picture_and_raw_file() {
+    let folder = folder();
+    let mut means = Vec::new();
+    for (kind, time_s) in [("none", "4e-6"), ("charge:2", "1e-6"), ("voltage:2", "4e-6"), ("digital:2", "4e-6")] {
+        let (codes, report) = run_and_develop(folder.path(), ("", ""), &["--binning", kind, "--exposure-s", time_s]);
+        let size = if kind == "none" { (48, 32) } else { (24, 16) };
+        assert_eq!((codes.dimensions(), &report["mosaic"]), (size, &serde_json::json!(["RG", "GB"])), "{kind}");
+        assert!(report["notes"].as_array().unwrap().is_empty(), "{kind}");
+        let picture = read_picture(&folder.path().join("run/picture-16.png")).into_rgb16();
+        assert_eq!(picture.dimensions(), size, "{kind}");
+        means.push(f64::from(picture.get_pixel(size.0 / 2, size.1 / 2).0[1]));
+    }
+    // The picture of an even plane is the same, whatever its pixels are read from.
+    assert!(means.iter().all(|mean| (mean / means[0] - 1.0).abs() < 0.01 && *mean > 5000.0), "{means:?}");
+    let run = common::dioptric(folder.path(), &["run", "camera.ron", "--out", "run", "--binning", "charge:2"]);
+    let told = String::from_utf8_lossy(&run.stderr);
+    assert!(told.contains("24 × 16 pixels of 400 µm are read from 48 × 32 of 200 µm"), "{told}");
+    let refused = |more: &[&str], words: &[&str]| {
+        check_error(folder.path(), &[&["run", "camera.ron", "--out", "none"], more].concat(), words);
+    };
+    refused(&["--binning", "charge:1"], &["binning", "2 to 16"]);
+    refused(&["--binning", "sums"], &["sums", "charge:2"]);
+    refused(&["--binning", "digital:3"], &["65535"]);
+    refused(&["--binning", "charge:2", "--interleaved-ratio", "4"], &["binning", "Single"]);
+    refused(&["--binning", "charge:2", "--dual-pixel", "left-right"], &["dual_pixel", "binning"]);
+}
+
+#[test]
+fn pixels_in_the_dark_go_with_the_raw_file_and_set_its_black() {
+    let folder = folder();
+    let black =
+        |clamp: &str| format!("optical_black: Some((rows: 4, columns: 8, clamp: {clamp})),\n    full_well_e: 33000.0,");
+    let [kept, clamped] = ["None", "Row"].map(|clamp| {
+        let changed = black(clamp);
+        let options = ["--exposure-s", "1e-5"];
+        run_and_develop(folder.path(), ("full_well_e: 33000.0,", &changed), &options)
+    });
+    assert_eq!((kept.0.dimensions(), clamped.0.dimensions()), ((48, 32), (48, 32)));
+    assert_eq!((&clamped.1["stored_px"], &clamped.1["masked"]), (&serde_json::json!([48, 32]), &Value::Null));
+    let (codes, report) = run_and_develop(folder.path(), ("full_well_e: 33000.0,", &black("None")), &[]);
+    assert_eq!((codes.dimensions(), &report["stored_px"]), ((48, 32), &serde_json::json!([56, 36])));
+    assert_eq!(report["masked"]["n_pixels"], 56 * 36 - 48 * 32);
+    let by_masked = develop(folder.path(), &["--denoise", "0", "--black", "masked"]);
+    let above = report["masked"]["above_black"][0].as_f64().unwrap();
+    let shift = by_masked["black"].as_f64().unwrap() - report["black"].as_f64().unwrap();
+    assert!((shift - above).abs() < 1e-9, "{shift} {above}");
+    let refused = |line: &[&str], words: &[&str]| {
+        check_error(folder.path(), &[&["develop", "run/raw.dng", "--out", "none"], line].concat(), words);
+    };
+    refused(&["--black", "white"], &["white", "masked"]);
+    refused(&["--profile", "camera.ron"], &["camera.ron", "camera profile"]);
+    refused(&["--profile", "none.dcp"], &["none.dcp", "cannot be read"]);
+}
+
+#[test]
 fn what_cannot_be_developed_is_refused_and_leaves_nothing() {
     let folder = folder();
     let refused = |line: &[&str], words: &[&str]| {

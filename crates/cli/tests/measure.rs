@@ -66,6 +66,32 @@ fn an_edge_is_found_and_has_its_mtf50() {
     assert!(output(folder.path(), &["measure", "mtf", "edge.png"]).contains("MTF50P"));
 }
 
+#[test]
+fn edges_of_several_pictures_are_rows_of_a_table() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::create_dir(folder.path().join("shots")).unwrap();
+    save(&edge_picture(120, |_, _| 1.0).into(), &folder.path().join("shots/b.png")).unwrap();
+    save(&edge_picture(140, |_, _| 1.0).into(), &folder.path().join("shots/a.png")).unwrap();
+    fs::write(folder.path().join("broken.png"), "no picture").unwrap();
+    let line = ["measure", "mtf", "shots", "broken.png", "shots/b.png", "--pixel-um", "4"];
+    let measured = json(folder.path(), &[&line[..], &["--json", "-o", "out"]].concat());
+    let names: Vec<&str> =
+        measured["pictures"].as_array().unwrap().iter().map(|p| p["picture"].as_str().unwrap()).collect();
+    assert_eq!(names, ["shots/a.png", "shots/b.png", "shots/b.png"]);
+    assert_eq!(measured["not_measured"][0]["picture"], "broken.png");
+    let alone = json(folder.path(), &["measure", "mtf", "shots/b.png", "--pixel-um", "4", "--json"]);
+    assert_eq!((&measured["pictures"][1], &measured["pictures"][2]), (&alone, &alone));
+    let csv = fs::read_to_string(folder.path().join("out/mtf.csv")).unwrap();
+    assert_eq!(csv.lines().count(), 5, "{csv}");
+    assert!(csv.lines().nth(1).unwrap().starts_with("\"shots/a.png\",\"Y\","), "{csv}");
+    let table = output(folder.path(), &line);
+    assert!(table.contains("3 of 4 pictures") && table.contains("broken.png"), "{table}");
+    check_error(folder.path(), &["measure", "mtf", "shots", "--all"], &["--all", "one picture"]);
+    fs::create_dir(folder.path().join("empty")).unwrap();
+    check_error(folder.path(), &["measure", "mtf", "empty"], &["empty", "holds no picture"]);
+    check_error(folder.path(), &["measure", "mtf", "broken.png", "broken.png"], &["broken.png", "none of the 2"]);
+}
+
 /// A linear 16-bit gray picture of discs in a fixed disorder, pixels of 1 or of the mean over so many neighbors along a row.
 fn disc_picture(side: u32, box_px: u32) -> ImageBuffer<Luma<u16>, Vec<u16>> {
     let mix = |i: u32| f64::from((i.wrapping_mul(2_654_435_761) >> 8) & 0xffff) / 65536.0;

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use dioptric_sensor::{Developed, DngFile, DngOpcodes, DngRendering, Picture, Processing, SensorError};
+use dioptric_sensor::{Developed, DngFile, DngReading, Picture, Processing, SensorError};
 
 use crate::{FrameFile, PipelineError, picture_png, write_file};
 
@@ -24,21 +24,15 @@ impl DevelopedFile {
     /// When it cannot be read, or the processing asks for what such a file does not hold: corrections of a simulated lens, roots
     /// of channels, and what [`DngFile::develop`] refuses.
     pub fn read(path: &Path, processing: Processing) -> Result<Self, PipelineError> {
-        Self::read_with(path, processing, (DngOpcodes::default(), DngRendering::default()))
+        Self::read_with(path, processing, &DngReading::default())
     }
 
-    /// Reads a DNG file and develops its frame with or without the corrections that the file asks for, and as far by its profile as is told.
+    /// Reads a DNG file and develops its frame with or without the corrections that the file asks for, by its profile or another as far as is told.
     ///
     /// # Errors
-    /// As [`read`](Self::read).
-    pub fn read_with(
-        path: &Path,
-        processing: Processing,
-        (opcodes, rendering): (DngOpcodes, DngRendering),
-    ) -> Result<Self, PipelineError> {
-        let mut file = DngFile::read_with(path, opcodes)?;
-        file.rendering = rendering;
-        Self::of(file, processing)
+    /// As [`read`](Self::read), and as [`DngFile::read_with`].
+    pub fn read_with(path: &Path, processing: Processing, reading: &DngReading) -> Result<Self, PipelineError> {
+        Self::of(DngFile::read_with(path, reading)?, processing)
     }
 
     /// Develops the frame of a file, or one that a program holds as such.

@@ -129,6 +129,8 @@ pub struct LensFacts<'a> {
 pub struct Frames<'a> {
     /// The sensor.
     pub sensor: &'a Sensor,
+    /// The distance between the pixels, or between those of them that a preview has, µm.
+    pub pitch_um: f64,
     /// Filters before the lens.
     pub filters: &'a [OpticalFilter],
     /// The exposure, metered or given.

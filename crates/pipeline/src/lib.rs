@@ -46,7 +46,7 @@ pub use dioptric_scene::{
     DepthKind, ExrSamples, FileQuantity, FileReading, FillDepth, NoData, Panorama,
     may_be_read_with as may_be_read_with_scene,
 };
-pub use dioptric_sensor::{DngOpcodes, DngRendering};
+pub use dioptric_sensor::{Binning, DngBlack, DngOpcodes, DngReading, DngRendering, ProfileFile};
 
 pub use camera::{
     BlurSpec, BorderSpec, CAMERA_SCHEMA, Camera, CameraTurn, CoatingSpec, Crop, DrawnEye, DualPixelSpec, Exposed,

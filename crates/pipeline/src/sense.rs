@@ -76,6 +76,7 @@ impl Sensed {
     pub fn frame_parts(&self) -> Frames<'_> {
         Frames {
             sensor: &self.sensor,
+            pitch_um: self.sensor.pixel_pitch_um,
             filters: &self.filters,
             exposure: &self.frames.exposure,
             rate: &self.rate,

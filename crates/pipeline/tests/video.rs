@@ -5,7 +5,7 @@
 use dioptric_pipeline::{
     Camera, CameraTurn, FilmSpec, KeptCamera, SceneSource, SceneSpec, Silent, Video, VideoSpec, WavelengthSpec,
 };
-use dioptric_sensor::NoiseSources;
+use dioptric_sensor::{Binning, BinningKind, Exposure, NoiseSources};
 use dioptric_spectrum::Cancel;
 use ndarray::{Array2, s};
 
@@ -59,6 +59,31 @@ fn a_panned_camera_sees_its_picture_moved() {
     // Where it would be had the camera turned the other way.
     let other = moved.slice(s![5..45, 16..63]);
     assert!(apart(other) > 3.0 * apart(to), "{} {}", apart(other), apart(to));
+}
+
+#[test]
+fn rows_that_are_read_as_one_take_half_the_time() {
+    let ready = |binning: Option<Binning>, row_time_us: f64| {
+        let read = |camera: &mut Camera| {
+            camera.exposure = camera.exposure.with_shot(|shot| Exposure { binning, ..shot });
+            camera.video.as_mut().unwrap().row_time_us = Some(row_time_us);
+        };
+        camera(CameraTurn::default()).with(read).video(&Silent, &Cancel::new())
+    };
+    let (rows, columns) = ready(None, 0.0).unwrap().size();
+    // Three quarters of a frame for half the rows.
+    let frame_us = 1e6 / ready(None, 0.0).unwrap().spec.frames_per_s;
+    let row_time_us = 1.5 * frame_us / rows as f64;
+    let kind = |kind| Some(Binning { kind, pixels: 2 });
+    for too_long in [None, kind(BinningKind::Digital)] {
+        assert!(ready(too_long, row_time_us).unwrap_err().to_string().contains("longer than a frame"), "{too_long:?}");
+    }
+    for binning in [BinningKind::Charge, BinningKind::Voltage] {
+        let video = ready(kind(binning), row_time_us).unwrap();
+        let frame = video.frame(0).unwrap();
+        assert_eq!(video.size(), (rows / 4 * 2, columns / 4 * 2));
+        assert_eq!((frame.raw.size(), frame.developed.picture.rows()), (video.size(), video.size().0));
+    }
 }
 
 #[test]

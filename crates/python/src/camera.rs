@@ -158,6 +158,17 @@ impl Camera {
     ///     The bands that are simulated.
     /// exposure_s : float, or "auto"
     /// analog_gain : float
+    /// gain_mode : {"low", "high"}
+    ///     Readout of dual-gain pixels.
+    /// binning : str
+    ///     Pixels of one filter that are read as one: "charge:2" (electrons summed before they are read), "voltage:2" (the mean after the
+    ///     source followers), "digital:2" (numbers summed), "none".
+    /// temperature_c : float
+    ///     Of the chip.
+    /// metering : str
+    ///     What an automatic exposure looks at: "mean", "center", "peak", "percentile:99", "filters:99".
+    /// chip_seed : int
+    ///     Which chip of its kind the sensor is.
     /// noise : str
     ///     Sources: "all", "none", "photon,read", "all,-defects".
     /// burst : int
@@ -193,7 +204,7 @@ scene=None, fov_deg=None, depth_m=None, width_mm=None, distance_mm=None, fill_de
 white_level=None, quantity=None, unit=None, scale=None, scene_wavelengths_nm=None, variable=None, axes=None, \
 no_data=None, depth=None, depth_unit=None, depth_kind=None, depth_variable=None, view=None, panorama=None, illuminant=None, \
 illuminance_lux=None, scene_light=None, mean_luminance_cd_m2=None, mean_lux=None, wavelengths_nm=None, \
-exposure_s=None, analog_gain=None, noise=None, burst=None, bracket_stops=None, interleaved_ratio=None, \
+exposure_s=None, analog_gain=None, gain_mode=None, binning=None, temperature_c=None, metering=None, chip_seed=None, noise=None, burst=None, bracket_stops=None, interleaved_ratio=None, \
 interleaved_gain_ratio=None, seed=None, white=None, demosaic=None, denoise=None, highlights=None, \
 lens_corrections=None, color=None, sharpen_px=None, local_tone=None, perspective=None, brightness=None, curve=None, \
 space=None, defect_threshold=None)")]

@@ -27,6 +27,11 @@ const OF_EXPOSURE: &[&str] = &[
     "seed",
     "exposure_s",
     "analog_gain",
+    "gain_mode",
+    "binning",
+    "temperature_c",
+    "metering",
+    "chip_seed",
     "noise",
     "burst",
     "bracket_stops",
@@ -94,6 +99,11 @@ const ALL: &[&str] = &[
     "wavelengths_nm",
     "exposure_s",
     "analog_gain",
+    "gain_mode",
+    "binning",
+    "temperature_c",
+    "metering",
+    "chip_seed",
     "noise",
     "burst",
     "bracket_stops",
@@ -382,6 +392,7 @@ fn set_frames(camera: &mut Camera, key: &str, value: &Bound<'_, PyAny>) -> PyRes
             };
         }
         "seed" => camera.seed = seed(key, value)?,
+        "chip_seed" => camera.chip_seed = seed(key, value)?,
         _ => return Ok(false),
     }
     Ok(true)
@@ -392,6 +403,10 @@ fn set_sensor_option(camera: &mut Camera, key: &str, value: &Bound<'_, PyAny>) -
     match key {
         "analog_gain" => options.analog_gain = Some(number(key, value)?),
         "noise" => options.noise = Some(word(key, value)?),
+        "gain_mode" => options.gain_mode = Some(word(key, value)?),
+        "binning" => options.binning = Some(word(key, value)?),
+        "temperature_c" => options.temperature_c = Some(number(key, value)?),
+        "metering" => options.metering = Some(word(key, value)?),
         _ => return set_picture_option(&mut camera.processing, key, value),
     }
     options.apply(&mut camera.noise, &mut camera.exposure, &mut camera.processing).map_err(exception)

@@ -7,7 +7,8 @@ use std::{
 
 use dioptric_analysis::DngReport;
 use dioptric_pipeline::{
-    DevelopedFile, DngOpcodes, DngRendering, PipelineError, SensorSpec, Staged, picture_png, write_json,
+    DevelopedFile, DngBlack, DngReading, DngRendering, PipelineError, ProfileFile, SensorSpec, Staged, picture_png,
+    write_json,
 };
 use dioptric_sensor::{
     ColorCorrection, Developed as DevelopedPicture, DngFile, Exposure, OwnMosaic, Picture, Processing, Raw,
@@ -23,7 +24,7 @@ use serde::Serialize;
 use crate::{
     changes::changed_processing,
     errors::{exception, wrong},
-    input::array_f64,
+    input::{array_f64, number},
     options::{light, word},
     save::{is_picture, write_picture},
     sensor::Sensor,
@@ -157,8 +158,11 @@ impl Developed {
 ///     A DNG file, or digital numbers, whole numbers of 0 to 65535.
 /// cfa : str, optional
 ///     Of an array the mosaic, a letter a filter from the top left pixel on: ``"RGGB"``, ``"RG/GB"``, ``"W"`` for a single filter.
-/// black, saturation : float, optional
-///     With ``cfa`` the digital number of no light (0) and that at which a pixel is saturated (65535).
+/// black : float or str, optional
+///     With ``cfa`` the digital number of no light (0). Of a file ``"stated"`` (its black level, the default) or ``"masked"``, the mean of
+///     its masked pixels, which have dark current too.
+/// saturation : float, optional
+///     With ``cfa`` the digital number at which a pixel is saturated (65535).
 /// color_matrix : array_like, (filters, 3), optional
 ///     With ``cfa`` the signal of X, Y and Z of each filter, as ``ColorMatrix`` of a DNG file for D65. Without it colors are those of
 ///     the filters, which a note says.
@@ -171,6 +175,8 @@ impl Developed {
 /// rendering : str, optional
 ///     How far the profile of a file makes its picture: ``"matrices"``, ``"colors"`` (also its map of hues and saturations; the default)
 ///     or ``"look"`` (also its exposure, look table and tone curve).
+/// profile : path, optional
+///     Of a file the camera profile in place of its own: a DCP file, or a DNG file whose profile is taken.
 /// white, demosaic, denoise, highlights, color, sharpen_px, local_tone, perspective, brightness, curve, space, defect_threshold
 ///     As of `Camera.with_`. ``lens_corrections`` need a simulated lens and are refused.
 ///
@@ -186,8 +192,8 @@ impl Developed {
 ///     The processing asks for what the frame does not hold.
 #[pyfunction]
 #[pyo3(signature = (source, *, cfa=None, black=None, saturation=None, color_matrix=None, sensor=None, exposure_s=None,
-    analog_gain=None, illuminant=None, rendering=None, **options), text_signature = "(source, *, cfa=None, black=None, saturation=None, \
-color_matrix=None, sensor=None, exposure_s=None, analog_gain=None, illuminant=None, rendering=None, white=None, demosaic=None, denoise=None, \
+    analog_gain=None, illuminant=None, rendering=None, profile=None, **options), text_signature = "(source, *, cfa=None, black=None, saturation=None, \
+color_matrix=None, sensor=None, exposure_s=None, analog_gain=None, illuminant=None, rendering=None, profile=None, white=None, demosaic=None, denoise=None, \
 highlights=None, lens_corrections=None, color=None, sharpen_px=None, local_tone=None, perspective=None, brightness=None, curve=None, \
 space=None, defect_threshold=None)")]
 #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
@@ -195,7 +201,7 @@ pub(crate) fn develop(
     py: Python<'_>,
     source: &Bound<'_, PyAny>,
     cfa: Option<&str>,
-    black: Option<f64>,
+    black: Option<&Bound<'_, PyAny>>,
     saturation: Option<f64>,
     color_matrix: Option<&Bound<'_, PyAny>>,
     sensor: Option<&Bound<'_, PyAny>>,
@@ -203,12 +209,16 @@ pub(crate) fn develop(
     analog_gain: Option<f64>,
     illuminant: Option<&Bound<'_, PyAny>>,
     rendering: Option<&str>,
+    profile: Option<PathBuf>,
     options: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<Developed> {
     let processing = changed_processing("develop", options)?;
     let is_file = source.is_instance_of::<PyString>() || source.hasattr("__fspath__")?;
-    let of_mosaic =
-        [("black", black.is_some()), ("saturation", saturation.is_some()), ("color_matrix", color_matrix.is_some())];
+    let of_mosaic = [
+        ("black", !is_file && black.is_some()),
+        ("saturation", saturation.is_some()),
+        ("color_matrix", color_matrix.is_some()),
+    ];
     let of_sensor = [
         ("exposure_s", exposure_s.is_some()),
         ("analog_gain", analog_gain.is_some()),
@@ -223,11 +233,21 @@ pub(crate) fn develop(
         let with = [("cfa", cfa.is_some()), ("sensor", sensor.is_some())];
         beside(given(&with).or(given(&of_mosaic)).or(given(&of_sensor)), "it for arrays alone: a file states its own")?;
         let path: PathBuf = source.extract()?;
-        let choices = (DngOpcodes::default(), rendering.map_or(Ok(DngRendering::default()), rendering_of)?);
-        let of = run_apart(py, move |_| DevelopedFile::read_with(&path, processing, choices))?;
+        let reading = DngReading {
+            rendering: rendering.map_or(Ok(DngRendering::default()), rendering_of)?,
+            black: match black {
+                Some(black) => DngBlack::parse(&word("black", black)?).map_err(exception)?,
+                None => DngBlack::default(),
+            },
+            profile: profile.as_deref().map(ProfileFile::read).transpose().map_err(exception)?,
+            ..DngReading::default()
+        };
+        let of = run_apart(py, move |_| DevelopedFile::read_with(&path, processing, &reading))?;
         return Ok(Developed::new(Frame::File(Box::new(of))));
     }
-    beside(rendering.map(|_| "rendering"), "it for files, which have profiles")?;
+    let of_file = [("rendering", rendering.is_some()), ("profile", profile.is_some())];
+    beside(given(&of_file), "it for files, which have profiles")?;
+    let black = black.map(|black| number("black", black)).transpose()?;
     match (cfa, sensor) {
         (Some(_), Some(_)) => Err(wrong("sensor", "given beside cfa", "either of them")),
         (None, None) => Err(wrong("cfa", "missing", "the mosaic of the array, as 'RGGB', or sensor")),

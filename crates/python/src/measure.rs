@@ -3,14 +3,14 @@
 use std::{path::PathBuf, sync::Arc};
 
 use dioptric_analysis::measure::{
-    BenchRequest, ChartRequest, CodeCurve, CompareRequest, EdgeMapRequest, EdgeRequest, FrameSeries, GridMeasurement,
-    MeasuredPicture, PictureViewing, PixelRegion, PointRequest, RegionRequest, SeenPicture, ShadingMeasurement,
-    StarRequest, Step, StepsRequest, TextureNoiseRequest, TextureRequest, measure_bench, measure_frames,
-    measure_series, notes_on_picture,
+    BenchRequest, ChartRequest, CodeCurve, CompareRequest, EdgeBatchRequest, EdgeMapRequest, EdgeRequest, FrameSeries,
+    GridMeasurement, MeasuredPicture, PictureViewing, PixelRegion, PointRequest, RegionRequest, SeenPicture,
+    ShadingMeasurement, StarRequest, Step, StepsRequest, TextureNoiseRequest, TextureRequest, measure_bench,
+    measure_frames, measure_series, notes_on_picture,
 };
 use dioptric_pipeline::{PipelineError, SensorSpec, open_display};
 use dioptric_scene::PictureSamples;
-use dioptric_sensor::{Picture, Raw, ToneCurve};
+use dioptric_sensor::{Binning, Picture, Raw, ToneCurve};
 use dioptric_spectrum::{Bands, Quantity, SpectralImage};
 use ndarray::{Array2, Axis};
 use pyo3::{prelude::*, types::PyDict};
@@ -85,19 +85,20 @@ pub(crate) fn _measure<'py>(
         "bench" => return bench(py, subject, &options),
         _ => {}
     }
+    if kind == "mtf_of_pictures" {
+        let pictures: Vec<PathBuf> = subject.extract()?;
+        let request = EdgeBatchRequest { edge: edge_request(&options)?, curve };
+        let batch = run_apart(py, move |_| request.measure(&EdgeBatchRequest::pictures_of(&pictures)?))?;
+        warn(py, &batch.notes)?;
+        return to_python(py, &batch);
+    }
     let picture = options.subject("picture", subject)?;
     if let Subject::File(path) = &picture {
         warn(py, &notes_on_picture(path, curve))?;
     }
     match kind {
         "mtf" => {
-            let request = EdgeRequest {
-                region: options.get("region", region)?,
-                side: options.get("size", count)?,
-                mosaic: options.get("mosaic", word)?,
-                pixel_um: options.get("pixel_um", number)?,
-                pixels_per_degree: options.get("pixels_per_degree", number)?,
-            };
+            let request = edge_request(&options)?;
             match options.flag("every")? {
                 true => measured(py, move || EdgeMapRequest { edge: request }.measure(&picture.open(curve)?)),
                 false => measured(py, move || request.measure(&picture.open(curve)?)),
@@ -371,6 +372,16 @@ fn noise<'py>(py: Python<'py>, frames: &Bound<'py, PyAny>) -> PyResult<Bound<'py
     measured(py, move || measure_series("the frames", series))
 }
 
+fn edge_request(options: &Options<'_, '_>) -> PyResult<EdgeRequest> {
+    Ok(EdgeRequest {
+        region: options.get("region", region)?,
+        side: options.get("size", count)?,
+        mosaic: options.get("mosaic", word)?,
+        pixel_um: options.get("pixel_um", number)?,
+        pixels_per_degree: options.get("pixels_per_degree", number)?,
+    })
+}
+
 /// Puts a sensor on the simulated bench.
 fn bench<'py>(py: Python<'py>, sensor: &Bound<'py, PyAny>, options: &Options<'_, 'py>) -> PyResult<Bound<'py, PyAny>> {
     let sensor = match sensor.cast::<Sensor>() {
@@ -386,6 +397,10 @@ fn bench<'py>(py: Python<'py>, sensor: &Bound<'py, PyAny>, options: &Options<'_,
         wavelength_nm: options.get("wavelength_nm", number)?,
         time_s: options.get("exposure_s", number)?,
         analog_gain: options.get("analog_gain", number)?,
+        binning: match options.get("binning", word)? {
+            Some(word) => Binning::parse(&word).map_err(exception)?,
+            None => None,
+        },
         temperature_c: options.get("temperature_c", number)?,
         seed: options.get("seed", seed)?.unwrap_or(1),
     };

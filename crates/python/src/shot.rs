@@ -108,7 +108,8 @@ impl Shot {
     /// Rows and columns of the picture.
     #[getter]
     fn shape(&self) -> (usize, usize) {
-        (self.capture.place.rows, self.capture.place.columns)
+        let picture = &self.capture.developed.picture;
+        (picture.rows(), picture.columns())
     }
 
     /// Distance between the samples of the irradiance on the film, µm.
@@ -238,14 +239,14 @@ impl Shot {
     ///
     /// Parameters
     /// ----------
-    /// seed, exposure_s, analog_gain, noise, burst, bracket_stops, white, demosaic, denoise, highlights, lens_corrections,
+    /// seed, exposure_s, analog_gain, gain_mode, binning, temperature_c, metering, chip_seed, noise, burst, bracket_stops, white, demosaic, denoise, highlights, lens_corrections,
     /// color, sharpen_px, local_tone, perspective, brightness, curve, space, defect_threshold
     ///     As of `Camera.with_`.
     ///
     /// Returns
     /// -------
     /// Shot
-    #[pyo3(signature = (**changes), text_signature = "($self, *, seed=None, exposure_s=None, analog_gain=None, noise=None, burst=None, bracket_stops=None, \
+    #[pyo3(signature = (**changes), text_signature = "($self, *, seed=None, exposure_s=None, analog_gain=None, gain_mode=None, binning=None, temperature_c=None, metering=None, chip_seed=None, noise=None, burst=None, bracket_stops=None, \
 interleaved_ratio=None, interleaved_gain_ratio=None, white=None, demosaic=None, denoise=None, highlights=None, \
 lens_corrections=None, color=None, sharpen_px=None, local_tone=None, perspective=None, brightness=None, curve=None, \
 space=None, defect_threshold=None)")]

@@ -55,6 +55,26 @@ def test_profile_is_followed_as_far_as_told(raw: Path) -> None:
         dp.develop(np.zeros((8, 8), np.uint16), cfa="RGGB", rendering="look")
 
 
+def test_profile_of_another_file_and_black_of_masked_pixels(raw: Path) -> None:
+    # A raw file lends its own profile, which changes nothing.
+    assert np.array_equal(dp.develop(raw, profile=raw).rgb, dp.develop(raw).rgb)
+    with pytest.raises(OSError, match="MaskedAreas"):
+        dp.develop(raw, black="masked")
+    with pytest.raises(ValueError, match="stated, masked"):
+        dp.develop(raw, black="dark")
+
+
+def test_pixels_are_read_as_one(tiny: dp.Camera, shot: dp.Shot) -> None:
+    whole = shot.expose(noise="none", exposure_s=shot.exposure_s)
+    read = whole.expose(noise="none", exposure_s=shot.exposure_s, binning="voltage:2")
+    assert whole.shape == (32, 48) and read.shape == read.raw.shape == (16, 24)
+    # The mean of four voltages, to half a code and the scene within them.
+    assert read.raw.mean() == pytest.approx(whole.raw.mean(), rel=0.01)
+    assert tiny.with_(gain_mode="high", temperature_c=40, metering="mean", chip_seed=3, binning="charge:2").render().shape == (16, 24)
+    with pytest.raises(ValueError, match="charge:2"):
+        whole.expose(binning="sums")
+
+
 def test_what_cannot_be_developed_is_refused(raw: Path, tmp_path: Path) -> None:
     with pytest.raises(OSError, match="missing.dng"):
         dp.develop(tmp_path / "missing.dng")

@@ -50,6 +50,20 @@ def test_shot_array_and_file_have_the_same_response(edge: dp.Shot, program: Path
         assert ours["mtf50_cycles_per_pixel"] == pytest.approx(theirs["mtf50_cycles_per_pixel"], rel=0.02)
 
 
+def test_pictures_of_a_list_are_measured_one_by_one(edge: dp.Shot, tmp_path: Path) -> None:
+    edge.save(tmp_path / "a.png")
+    (tmp_path / "b.png").write_text("no picture")
+    region = (40, 20, 80, 80)
+    of_folder = dp.measure.mtf([tmp_path], region=region)
+    alone = dp.measure.mtf(tmp_path / "a.png", region=region)
+    assert of_folder["pictures"] == [alone]
+    assert [Path(other["picture"]).name for other in of_folder["not_measured"]] == ["b.png"]
+    offsets = {channel["channel"]: channel["offset_px"] for channel in alone["channels"]}
+    assert offsets["G"] == 0 and abs(offsets["R"]) < 0.5
+    with pytest.raises(ValueError, match="one picture"):
+        dp.measure.mtf([tmp_path], every=True)
+
+
 def test_raw_frame_is_measured_by_its_filters(edge: dp.Shot) -> None:
     of_raw = dp.measure.mtf(edge, region=(40, 20, 80, 80), of="raw")
     levels = edge.levels

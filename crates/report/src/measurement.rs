@@ -25,7 +25,7 @@ pub struct MeasurementWords<'a> {
     pub table: &'a str,
 }
 
-/// Writes `NAME.json`, every chart as [a drawing](write_drawing), and `report.html` with all of them into a folder.
+/// Writes `NAME.json`, `NAME.csv` of a table, every chart as [a drawing](write_drawing), and `report.html` with all of them into a folder.
 ///
 /// # Errors
 /// When a file cannot be written.
@@ -35,6 +35,9 @@ pub fn write_measurement(
     folder: &Path,
 ) -> Result<(), PipelineError> {
     write_json(&folder.join(format!("{}.json", words.name)), measured)?;
+    if let Some(csv) = measured.csv() {
+        write_file(&folder.join(format!("{}.csv", words.name)), csv.as_bytes())?;
+    }
     let charts: Vec<(String, LineChart)> = measured.charts();
     for (name, chart) in &charts {
         write_drawing(&chart_svg(chart, PLOT_PX.0, PLOT_PX.1), folder, name, PNG_SCALE)?;

@@ -1,9 +1,11 @@
 //! The laboratory bench of EMVA standard 1288, simulated: which flat and dark frames are taken, and the frames.
 
+use std::borrow::Cow;
+
 use dioptric_spectrum::{Quantity, SpectralImage, WavelengthGrid};
 use ndarray::Array2;
 
-use crate::{Adc, Cfa, ElectronRate, Exposure, Illumination, Noise, Raw, Sensor, SensorError};
+use crate::{Adc, BinningKind, Cfa, ElectronRate, Exposure, Illumination, Noise, Raw, Sensor, SensorError};
 
 /// The bits of the converter that the bench gives to a sensor without one.
 const BENCH_BITS: u32 = 16;
@@ -22,7 +24,7 @@ const HC_J_M: f64 = 6.626_070_15e-34 * 299_792_458.0;
 /// What is set on the bench.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BenchSettings {
-    /// Rows and columns of pixels that are looked at.
+    /// Rows and columns of the frames.
     pub side: usize,
     /// Levels of light, evenly from darkness to a little beyond saturation.
     pub n_levels: usize,
@@ -55,7 +57,7 @@ impl Default for BenchSettings {
 pub struct BenchSeries {
     /// The exposure time, s.
     pub time_s: f64,
-    /// The photons that fall on a pixel in that time; 0 in the dark.
+    /// The photons that fall on a pixel, or on all that are read as one, in that time; 0 in the dark.
     pub photons: f64,
     /// The number of frames: 2 for a point of the photon transfer, more for a stack.
     pub n_frames: usize,
@@ -116,25 +118,32 @@ impl Bench {
             bits => bits,
         };
         let name = filter.name.clone();
+        let n = settings.exposure.binning.map_or(1, |binning| binning.pixels);
         let sensor = Sensor {
             cfa: Cfa::Mosaic(vec![vec![name.clone()]]),
             filters: vec![filter],
             adc,
-            ..sensor.with_size(settings.side, settings.side)
+            ..sensor.with_size(n * settings.side, n * settings.side)
         };
+        sensor.as_read(&settings.exposure)?;
         let mut bench = Self { sensor, settings, quantum_efficiency: 1.0, filter: name, raised_black_dn: 0 };
         let one_photon = bench.rate(1.0, 1.0)?;
         // The middle of the array, away from the border's crosstalk.
-        let middle = settings.side / 2;
-        bench.quantum_efficiency = f64::from(one_photon.planes_e_per_s[0][(middle, middle)]);
+        let middle = n * settings.side / 2;
+        // The photon is shared by all pixels that are read as one.
+        bench.quantum_efficiency = (n * n) as f64 * f64::from(one_photon.planes_e_per_s[0][(middle, middle)]);
         bench.raise_black()?;
         Ok(bench)
     }
 
     /// Raises the black level until it cuts off next to none of the noise of darkness; the step stays what it is.
     fn raise_black(&mut self) -> Result<(), SensorError> {
+        // What clips is the number of one pixel, where numbers are summed.
+        let whole = self.settings.exposure.binning.take_if(|binning| binning.kind == BinningKind::Digital);
         let dark = self.frame(&BenchSeries { time_s: self.settings.exposure.time_s, photons: 0.0, n_frames: 1 }, 0)?;
-        let floor_dn = self.sensor.noise_floor_e(&dark) * dark.levels.volts_per_electron / dark.levels.step_v;
+        let sheet = self.sensor.as_read(&dark.exposure)?;
+        let floor_dn = sheet.noise_floor_e(&dark) * dark.levels.volts_per_electron / dark.levels.step_v;
+        self.settings.exposure.binning = whole.or(self.settings.exposure.binning);
         let least_dn = (LEAST_BLACK * floor_dn).ceil();
         if let Adc::Bits { bits, black_level_dn, .. } = self.sensor.adc
             && f64::from(black_level_dn) < least_dn
@@ -160,6 +169,11 @@ impl Bench {
         &self.sensor
     }
 
+    /// The data sheet of its frames: that of the pixels as they are read.
+    pub fn sheet(&self) -> Cow<'_, Sensor> {
+        self.sensor.as_read(&self.settings.exposure).expect("the binning was checked when the sensor was put there")
+    }
+
     /// The name of the filter.
     pub fn filter(&self) -> &str {
         &self.filter
@@ -179,19 +193,20 @@ impl Bench {
     /// points of rising time where the sensor has a dark current.
     pub fn series(&self) -> Vec<BenchSeries> {
         let BenchSettings { n_levels, n_stacked, exposure, .. } = self.settings;
-        let saturation_photons = self.sensor.saturation_e(&exposure) / self.quantum_efficiency;
+        let sheet = self.sheet();
+        let saturation_photons = sheet.saturation_e(&exposure) / self.quantum_efficiency;
         let at = |time_s, photons, n_frames| BenchSeries { time_s, photons, n_frames };
         let mut series = vec![at(exposure.time_s, 0.0, 2)];
         let brightest = BEYOND_SATURATION * saturation_photons;
         series.extend((1..=n_levels).map(|i| at(exposure.time_s, brightest * i as f64 / n_levels as f64, 2)));
         series.push(at(exposure.time_s, 0.0, n_stacked));
         series.push(at(exposure.time_s, 0.5 * saturation_photons, n_stacked));
-        let dark_e_per_s = self.sensor.dark_current.at(exposure.temperature_c);
+        let dark_e_per_s = sheet.dark_current.at(exposure.temperature_c);
         if dark_e_per_s > 0.0 {
             // Long enough that dark electrons dominate the dark noise, and half the well holds them.
-            let gain_v_per_e = self.sensor.conversion_gain_v_per_e(exposure.gain_mode);
-            let read_e = self.sensor.read_noise_v(exposure.gain_mode) / gain_v_per_e;
-            let most_e = (10.0 * read_e.powi(2)).max(1000.0).min(0.5 * self.sensor.saturation_e(&exposure));
+            let gain_v_per_e = sheet.conversion_gain_v_per_e(exposure.gain_mode);
+            let read_e = sheet.read_noise_v(exposure.gain_mode) / gain_v_per_e;
+            let most_e = (10.0 * read_e.powi(2)).max(1000.0).min(0.5 * sheet.saturation_e(&exposure));
             let longest_s = (most_e / dark_e_per_s).max(2.0 * exposure.time_s);
             let step_s = (longest_s - exposure.time_s) / f64::from(DARK_TIMES - 1);
             series.extend((1..DARK_TIMES).map(|i| at(exposure.time_s + step_s * f64::from(i), 0.0, 2)));
@@ -213,11 +228,12 @@ impl Bench {
 
     /// Returns the rate of photo-electrons of photons a pixel in a time.
     fn rate(&self, photons: f64, time_s: f64) -> Result<ElectronRate, SensorError> {
-        let area_m2 = 1e-12 * self.sensor.pixel_pitch_um.powi(2);
+        let n = self.settings.exposure.binning.map_or(1, |binning| binning.pixels);
+        let area_m2 = 1e-12 * (n as f64 * self.sensor.pixel_pitch_um).powi(2);
         let wavelength_nm = self.settings.wavelength_nm;
         let watts_per_m2_nm = photons * HC_J_M / (1e-9 * wavelength_nm) / (area_m2 * time_s * BAND_NM);
         let grid = WavelengthGrid::uniform(wavelength_nm, wavelength_nm, BAND_NM)?;
-        let plane = Array2::from_elem((self.settings.side, self.settings.side), watts_per_m2_nm as f32);
+        let plane = Array2::from_elem((n * self.settings.side, n * self.settings.side), watts_per_m2_nm as f32);
         let light = SpectralImage::new(Quantity::Irradiance, grid, vec![plane])?;
         self.sensor.electron_rate(&Illumination::on_pixels(&light))
     }

@@ -46,13 +46,14 @@ impl Sensor {
             let (expected, found) = (text(first), text(other));
             return Err(SensorError::Shape { what: "exposure of a frame of a moving burst", expected, found });
         }
-        let noise = Variance::of(self, first);
+        let sheet = self.as_read(&first.exposure)?;
+        let noise = Variance::of(&sheet, first);
         let tile = first.tile.as_ref();
-        let reference = Planes::new(self, first);
+        let reference = Planes::new(&sheet, first);
         let mut sum = reference.samples.clone();
         let merger = Merger::new(&reference.samples, noise);
         for frame in &frames[1..] {
-            let other = Planes::new(self, frame);
+            let other = Planes::new(&sheet, frame);
             // Both pictures are noisy by one over the number of planes that were averaged, in units of one sample's noise.
             let alignment = align(&reference.pyramid, &other.pyramid, (reference.samples.len() as f32).recip());
             merger.add(&other.samples, &alignment, &mut sum);
@@ -60,11 +61,12 @@ impl Sensor {
         let share = (frames.len() as f32).recip();
         sum.iter_mut().for_each(|plane| plane.par_mapv_inplace(|v| v * share));
         let planes = phases::join(sum, tile, first.size()).into_iter().map(RawPlane::Volts).collect();
-        let merged = frames.iter().map(|frame| self.source_of(frame)).collect();
+        let merged = frames.iter().map(|frame| sheet.source_of(frame)).collect();
         Ok(Raw {
             planes,
-            levels: self.unit_levels(self.saturation_e(&first.exposure), &first.exposure),
+            levels: sheet.unit_levels(sheet.saturation_e(&first.exposure), &first.exposure),
             merged,
+            masked: None,
             ..first.clone()
         })
     }

@@ -34,6 +34,7 @@ impl Sensor {
         let electrons = self.electrons(&rate, &exposure, noise)?;
         let volts = self.volts(&electrons, &exposure, noise)?;
         let raw = self.digitize(&volts, &exposure)?;
+        let (electrons, volts) = (self.lit_electrons(electrons), self.lit_volts(volts, &exposure)?);
         Ok(Capture { rate, exposure, electrons, volts, raw })
     }
 }

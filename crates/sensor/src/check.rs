@@ -16,6 +16,7 @@ impl Sensor {
         self.check_converter()?;
         self.check_tables()?;
         self.check_stack()?;
+        self.check_masked()?;
         self.tile().map(drop)
     }
 
@@ -40,6 +41,7 @@ impl Sensor {
             ("swing_v", self.swing_v),
             ("dark_current.doubling_k", self.dark_current.doubling_k),
             ("iso_at_unity_gain", self.iso_at_unity_gain.unwrap_or(1.0)),
+            ("binned_well_e", self.binned_well_e.unwrap_or(1.0)),
             ("high_gain.conversion_gain_v_per_e", self.high_gain.map_or(1.0, |h| h.conversion_gain_v_per_e)),
             ("high_gain.full_well_e", self.high_gain.map_or(1.0, |h| h.full_well_e)),
             ("split_pixel.conversion_gain_v_per_e", self.split_pixel.map_or(1.0, |s| s.conversion_gain_v_per_e)),

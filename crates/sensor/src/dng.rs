@@ -7,12 +7,14 @@ mod file_camera;
 mod file_color;
 mod file_look;
 mod file_profile;
+mod gain_table;
 mod levels;
 mod lossless_jpeg;
 mod opcodes;
 mod own_mosaic;
 mod pictured;
 mod predictor;
+mod profile_file;
 mod read;
 #[cfg(test)]
 mod read_tests;
@@ -35,8 +37,11 @@ pub use self::{
     file_color::{DngColor, DngLight},
     file_look::{ColorMap, DngLook, DngRendering},
     file_profile::{DngNoise, DngProfile},
+    gain_table::GainTableMap,
+    levels::MaskedSamples,
     own_mosaic::OwnMosaic,
-    read::{DngFile, DngOpcodes, DngShot, raw_format_by_name, raw_format_of},
+    profile_file::ProfileFile,
+    read::{DngBlack, DngFile, DngOpcodes, DngReading, DngShot, raw_format_by_name, raw_format_of},
 };
 use crate::{
     LensCorrections, LensTables, Picture, Raw, RawPlane, Sensor, SensorError, files::write_error,
@@ -96,16 +101,22 @@ impl Sensor {
     /// file cannot be written; then there is no file.
     pub fn write_dng(&self, raw: &Raw, details: &DngDetails<'_>, path: &Path) -> Result<(), SensorError> {
         raw.check()?;
-        let planes: Option<Vec<_>> = raw.planes.iter().map(RawPlane::dn).collect();
+        // Pixels in the dark go with the others, where nothing was taken off by them.
+        let planes = raw.masked.as_ref().map_or(&raw.planes, |masked| &masked.planes);
+        let planes: Option<Vec<_>> = planes.iter().map(RawPlane::dn).collect();
         let planes = planes.ok_or_else(|| raw.without_numbers("a DNG file"))?;
-        let (rows, columns) = raw.size();
+        let (rows, columns) = planes[0].dim();
         let codes: Vec<u8> = match planes.as_slice() {
             [plane] => plane.iter().flat_map(|dn| dn.to_le_bytes()).collect(),
             planes => (0..rows * columns)
                 .flat_map(|i| planes.iter().flat_map(move |plane| plane[(i / columns, i % columns)].to_le_bytes()))
                 .collect(),
         };
-        let tags = Tags { sensor: self, raw, details, colors: color_codes(raw)? };
+        let sheet = self.as_read(&raw.exposure)?;
+        let tables = details.corrections.map(|(_, tables)| tables.as_read(self, &raw.exposure));
+        let corrections = details.corrections.zip(tables.as_deref()).map(|((chosen, _), tables)| (chosen, tables));
+        let details = DngDetails { corrections, ..details.clone() };
+        let tags = Tags { sensor: &sheet, raw, details: &details, colors: color_codes(raw)? };
         let too_large = || write_error(path, "the frame is larger than a file of this kind can be, 4 GiB");
         let file = tags.directory(codes)?.into_file().ok_or_else(too_large)?;
         Ok(dioptric_files::write(path, &file)?)
@@ -175,6 +186,11 @@ impl Tags<'_> {
         exif.set(EXPOSURE_TIME, Value::Rational(vec![exposure_time(self.raw.exposure.time_s)]));
         let iso = self.sensor.iso_speed(self.raw, light).round().clamp(1.0, f64::from(u16::MAX)) as u16;
         exif.set(PHOTOGRAPHIC_SENSITIVITY, Value::Short(vec![iso]));
+        // Pixels a centimeter of the sensor.
+        let per_cm = Value::fraction(1e4 / self.sensor.pixel_pitch_um, 10_000);
+        exif.set(FOCAL_PLANE_X_RESOLUTION, Value::Rational(vec![per_cm]));
+        exif.set(FOCAL_PLANE_Y_RESOLUTION, Value::Rational(vec![per_cm]));
+        exif.set(FOCAL_PLANE_RESOLUTION_UNIT, Value::Short(vec![PER_CENTIMETER]));
         let known = |value: &Option<f64>| value.filter(|v| *v > 0.0 && *v < 1e6).map(|v| Value::fraction(v, 1000));
         if let Some(n) = known(f_number) {
             exif.set(F_NUMBER, Value::Rational(vec![n]));
@@ -192,8 +208,22 @@ impl Tags<'_> {
         let is_mosaic = !self.colors.is_empty() && self.raw.tile.is_some();
         let interpretation = if is_mosaic { COLOR_FILTER_ARRAY } else { LINEAR_RAW };
         let n_planes = self.raw.planes.len();
-        write_image(frame, self.raw.size(), (16, n_planes), interpretation, codes);
+        let (rows, columns) = self.raw.size();
+        let (above, left) = self.raw.masked.as_ref().map_or((0, 0), |masked| (masked.rows, masked.columns));
+        write_image(frame, (above + rows, left + columns), (16, n_planes), interpretation, codes);
         frame.set(NEW_SUBFILE_TYPE, Value::Long(vec![0]));
+        if above + left > 0 {
+            let corners = |all: [usize; 4]| all.map(|place| place as u32);
+            let (bottom, right) = (above + rows, left + columns);
+            // Top, left, bottom and right; the masked areas do not overlap.
+            frame.set(ACTIVE_AREA, Value::Long(corners([above, left, bottom, right]).to_vec()));
+            let dark = [[0, 0, above, right], [above, 0, bottom, left]]
+                .into_iter()
+                .filter(|[top, left, bottom, right]| top < bottom && left < right);
+            frame.set(MASKED_AREAS, Value::Long(dark.flat_map(corners).collect()));
+            frame.set(DEFAULT_CROP_ORIGIN, Value::Long(vec![0, 0]));
+            frame.set(DEFAULT_CROP_SIZE, Value::Long(corners([columns, rows, 0, 0])[..2].to_vec()));
+        }
         self.write_levels(frame);
         if is_mosaic {
             self.write_mosaic(frame);

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{Sensor, SensorError};
+use crate::{Binning, Sensor, SensorError};
 
 /// What belongs to a shot.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -20,6 +20,10 @@ pub struct Exposure {
     /// The temperature of the chip, °C.
     #[serde(default = "room_c")]
     pub temperature_c: f64,
+    /// Pixels that are read as one; each by itself if left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "schema", schemars(extend("default" = null)))]
+    pub binning: Option<Binning>,
 }
 
 /// A readout of a dual-gain pixel.
@@ -88,7 +92,7 @@ fn endless() -> Exposure {
 impl Exposure {
     /// Returns an exposure of this time, of gain 1 and at 25 °C.
     pub const fn seconds(time_s: f64) -> Self {
-        Self { time_s, analog_gain: 1.0, gain_mode: GainMode::Low, temperature_c: room_c() }
+        Self { time_s, analog_gain: 1.0, gain_mode: GainMode::Low, temperature_c: room_c(), binning: None }
     }
 
     /// Returns the same exposure with the gain of an ISO speed.
@@ -117,11 +121,39 @@ impl Exposure {
         if !self.temperature_c.is_finite() {
             return wrong("temperature_c", self.temperature_c, "a finite number");
         }
-        Ok(())
+        self.binning.map_or(Ok(()), Binning::check)
+    }
+
+    /// Refuses binning where something is read that cannot be summed.
+    pub(crate) fn check_single(&self, what: &'static str) -> Result<(), SensorError> {
+        match self.binning {
+            None => Ok(()),
+            Some(_) => {
+                let reason = "cannot be read with binning, expected every pixel by itself".to_owned();
+                Err(SensorError::Unsuitable { what, reason })
+            }
+        }
     }
 }
 
 impl ExposureControl {
+    /// The shot: its time is that of the hand, or the longest.
+    pub const fn shot(&self) -> &Exposure {
+        match self {
+            Self::Manual(exposure) => exposure,
+            Self::Auto(auto) => &auto.limit,
+        }
+    }
+
+    /// Returns a control of another shot; its time stays that of the hand or the longest.
+    #[must_use]
+    pub fn with_shot(self, change: impl FnOnce(Exposure) -> Exposure) -> Self {
+        match self {
+            Self::Manual(exposure) => Self::Manual(change(exposure)),
+            Self::Auto(auto) => Self::Auto(AutoExposure { limit: change(auto.limit), ..auto }),
+        }
+    }
+
     /// Checks every number, so that a wrong one is found before there is any light.
     ///
     /// # Errors

@@ -30,8 +30,9 @@ impl Sensor {
     /// When there are no frames, or they differ in size or mosaic, or one was not exposed.
     pub fn merge(&self, frames: &[Raw]) -> Result<Raw, SensorError> {
         self.check_merge(frames)?;
-        let sources = frames.iter().map(|frame| self.source_of(frame)).collect();
-        Ok(self.merge_as(frames, sources))
+        let sheet = self.as_read(&frames[0].exposure)?;
+        let sources = frames.iter().map(|frame| sheet.source_of(frame)).collect();
+        Ok(sheet.merge_as(frames, sources))
     }
 
     /// Merges frames that were checked, of which it is known what they are in the merge.
@@ -54,7 +55,8 @@ impl Sensor {
         let exposure = frames[shortest].exposure;
         let planes = (0..first.planes.len()).map(merge_plane).collect();
         let saturation_e = sources[shortest].saturation_e * (exposure.time_s / sources[shortest].time_s);
-        Raw { planes, levels: self.unit_levels(saturation_e, &exposure), exposure, merged: sources, ..first.clone() }
+        let levels = self.unit_levels(saturation_e, &exposure);
+        Raw { planes, levels, exposure, merged: sources, masked: None, ..first.clone() }
     }
 
     /// Checks that frames can be merged.
@@ -65,7 +67,11 @@ impl Sensor {
         };
         for frame in frames {
             frame.check()?;
-            if frame.size() != first.size() || frame.tile != first.tile || frame.filter_names != first.filter_names {
+            if frame.size() != first.size()
+                || frame.tile != first.tile
+                || frame.filter_names != first.filter_names
+                || frame.exposure.binning != first.exposure.binning
+            {
                 let text =
                     |frame: &Raw| format!("{} × {} of {}", frame.size().0, frame.size().1, frame.filter_names.join(""));
                 return shape("rows × columns and filters of a frame to merge", text(first), text(frame));

@@ -13,7 +13,7 @@ impl Sensor {
     /// Returns the electrons in each pixel at the end of an exposure, clipped at the full well.
     ///
     /// The pixels' sensitivities multiply the mean before the Poisson draw. With photon noise and dark-current noise
-    /// off the means stay as they are, not rounded.
+    /// off the means stay as they are, not rounded. Pixels that no light reaches ([`Sensor::optical_black`]) lie above and to the left.
     ///
     /// # Errors
     /// When the exposure makes no sense.
@@ -34,7 +34,7 @@ impl Sensor {
         let shutters: Vec<Shutter<'_>> =
             exposures.iter().map(|exposure| Shutter::new(self, tile.as_ref(), exposure, noise)).collect();
         let plane = |(number, rate): (usize, &Array2<f32>)| {
-            let mut electrons = rate.as_standard_layout().into_owned();
+            let mut electrons = self.with_masked(rate);
             let n_columns = electrons.ncols();
             let rows = electrons.as_slice_mut().expect("a standard layout is contiguous").par_chunks_mut(n_columns);
             rows.enumerate().for_each_init(

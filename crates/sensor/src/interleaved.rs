@@ -81,6 +81,8 @@ impl Sensor {
         rows: &Interleaved,
         noise: &Noise,
     ) -> Result<Electrons, SensorError> {
+        exposure.check_single("rows of two exposures")?;
+        self.check_all_lit("rows of two exposures")?;
         rows.check(self.tile()?.as_ref())?;
         self.electrons_by_row(rate, &[*exposure, rows.short(exposure)], &|row| usize::from(!rows.is_long(row)), noise)
     }
@@ -95,6 +97,7 @@ impl Sensor {
         exposure: &Exposure,
         rows: &Interleaved,
     ) -> Result<Raw, SensorError> {
+        exposure.check_single("rows of two exposures")?;
         rows.check(self.tile()?.as_ref())?;
         self.digitize_by_row(volts, &[*exposure, rows.short(exposure)], &|row| usize::from(!rows.is_long(row)))
     }

@@ -8,8 +8,10 @@
 
 mod acuity;
 mod angular_response;
+mod as_read;
 mod balance;
 mod bench;
+mod binning;
 mod blur;
 mod burst;
 mod capture;
@@ -40,6 +42,7 @@ mod local_tone;
 mod metering;
 mod motion;
 mod noise;
+mod optical_black;
 mod optical_filter;
 mod perspective;
 mod phases;
@@ -81,6 +84,7 @@ pub use acuity::Viewing;
 pub use angular_response::{AngularResponse, PixelLight};
 pub use balance::WhiteBalance;
 pub use bench::{Bench, BenchSeries, BenchSettings};
+pub use binning::{Binning, BinningKind, ReadLines};
 pub use capture::Capture;
 pub use cfa::{Bayer, Cfa, Tile};
 pub use chart::ChartReport;
@@ -90,8 +94,8 @@ pub use color::{ColorCorrection, ColorMatrix};
 pub use demosaic::{Demosaic, demosaic};
 pub use disparity::{DisparityAxis, DisparityMap, DisparitySearch};
 pub use dng::{
-    ColorMap, DngColor, DngDetails, DngFile, DngLight, DngLook, DngNoise, DngOpcodes, DngProfile, DngRendering,
-    DngShot, OwnMosaic, raw_format_by_name, raw_format_of,
+    ColorMap, DngBlack, DngColor, DngDetails, DngFile, DngLight, DngLook, DngNoise, DngOpcodes, DngProfile, DngReading,
+    DngRendering, DngShot, GainTableMap, MaskedSamples, OwnMosaic, ProfileFile, raw_format_by_name, raw_format_of,
 };
 pub use error::SensorError;
 pub use exit_pupil::ExitPupil;
@@ -114,11 +118,13 @@ pub use pixel_stack::{
 };
 pub use points::{PointWindow, find_points};
 pub use process::{Developed, LinearPicture, Processing};
-pub use raw::{Levels, MergedFrame, Raw, RawPlane};
+pub use raw::{Levels, MaskedPixels, MergedFrame, Raw, RawPlane};
 pub use response::{Adc, Response};
 pub use rolling::{ImagePlace, RollingShutter};
 pub use scielab::{scielab_delta_e, visual_snr};
-pub use sensor::{DarkCurrent, Defects, Filter, HighGain, Layer, Sensor, SplitPixel, TelegraphNoise};
+pub use sensor::{
+    BlackClamp, DarkCurrent, Defects, Filter, HighGain, Layer, OpticalBlack, Sensor, SplitPixel, TelegraphNoise,
+};
 pub use sfr::{EdgeResponse, find_edge, find_edges};
 pub use shading::{LensShading, ShadingMap};
 pub use similarity::{psnr_db, ssim};

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use crate::{AutoExposure, ElectronRate, Exposure, ExposureControl, Metering, Sensor, SensorError};
+use crate::{AutoExposure, Binning, ElectronRate, Exposure, ExposureControl, Metering, Sensor, SensorError};
 
 impl Sensor {
     /// Returns the exposure that a control asks for, given the light.
@@ -24,7 +24,10 @@ impl Sensor {
             Metering::EachFilter(percent) => self.metered_by_filter(rate, percent)?,
             metering => rate.metered(metering)?,
         };
-        let time_s = auto.target_fraction * self.saturation_e(&exposure) / metered_e_per_s;
+        // Of a pixel, where several are read as one.
+        let n = exposure.binning.map_or(1, Binning::n) as f64;
+        let saturation_e = self.as_read(&exposure)?.saturation_e(&exposure) / n;
+        let time_s = auto.target_fraction * saturation_e / metered_e_per_s;
         match time_s.min(auto.limit.time_s) {
             time_s if time_s.is_finite() => Ok(Exposure { time_s, ..exposure }),
             _ => Err(SensorError::Unsuitable {

@@ -19,6 +19,7 @@ impl Sensor {
         if self.split_pixel.is_some() {
             return refused(format!("needs pixels of equal photodiodes, but {} states split_pixel", self.name));
         }
+        self.check_all_lit("dual_pixel")?;
         if self.response != Response::Linear {
             return refused(format!("needs a linear response, which {} has not", self.name));
         }
@@ -48,6 +49,7 @@ impl Sensor {
         exposure: &Exposure,
         noise: &Noise,
     ) -> Result<Vec<Electrons>, SensorError> {
+        exposure.check_single("photodiodes of one pixel")?;
         let one = self.photodiode(rates.len())?;
         let well_e = one.full_well_e(exposure.gain_mode) as f32;
         let gathering = Self { full_well_e: self.full_well_e, high_gain: self.high_gain, ..one };

@@ -6,8 +6,9 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    Adc, Brightness, ColorCorrection, ColorMatrix, ColorSpace, Demosaic, Exposure, Highlights, LensCorrections,
-    LensShading, LensTables, LocalTone, Perspective, Picture, Raw, Sensor, SensorError, Tile, ToneCurve, WhiteBalance,
+    Adc, BlackClamp, Brightness, ColorCorrection, ColorMatrix, ColorSpace, Demosaic, Exposure, Highlights,
+    LensCorrections, LensShading, LensTables, LocalTone, Perspective, Picture, Raw, Sensor, SensorError, Tile,
+    ToneCurve, WhiteBalance,
     balance::gains,
     color::pairs,
     defects, demosaic,
@@ -200,9 +201,11 @@ impl Sensor {
         processing: &Processing,
         lens: Option<&LensTables>,
     ) -> Result<LinearPicture, SensorError> {
-        match Used::of(self, raw) {
-            Some(used) => used.develop_linear(self, raw, processing, lens),
-            None => develop_linear(self, raw, processing, lens),
+        let sheet = self.as_read(&raw.exposure)?;
+        let lens = lens.map(|tables| tables.as_read(self, &raw.exposure));
+        match Used::of(&sheet, raw) {
+            Some(used) => used.develop_linear(&sheet, raw, processing, lens.as_deref()),
+            None => develop_linear(&*sheet, raw, processing, lens.as_deref()),
         }
     }
 
@@ -213,11 +216,18 @@ impl Sensor {
 
     /// Returns the same of samples of these levels and this exposure.
     pub(crate) fn floor_e(&self, levels: &Levels, exposure: &Exposure) -> f64 {
-        let volts = self.read_noise_v(exposure.gain_mode).hypot(self.dsnu_v).hypot(self.row_noise_v);
+        let is_by_row = self.optical_black.is_some_and(|black| black.clamp == BlackClamp::Row);
+        let row_v = if is_by_row { 0.0 } else { self.row_noise_v };
+        let volts = self.read_noise_v(exposure.gain_mode).hypot(self.dsnu_v).hypot(row_v);
         let rounding_v = if self.adc == Adc::Analog { 0.0 } else { levels.step_v / 12.0_f64.sqrt() };
         let floor_v = (volts * exposure.analog_gain).hypot(rounding_v);
         let dark_e = self.dark_current.at(exposure.temperature_c) * exposure.time_s;
-        (floor_v / levels.volts_per_electron).hypot(dark_e.sqrt())
+        let own_e = (floor_v / levels.volts_per_electron).hypot(dark_e.sqrt());
+        match self.n_clamped_by() {
+            None => own_e,
+            // The mean that was taken off has noise, and what is left was rounded once more.
+            Some(n) => (own_e * (1.0 + 1.0 / n).sqrt()).hypot(rounding_v / levels.volts_per_electron),
+        }
     }
 }
 

@@ -24,6 +24,8 @@ pub struct Raw {
     pub row_time_us: f64,
     /// The frames that were merged into this one; empty for a frame as the converter gave it.
     pub merged: Vec<MergedFrame>,
+    /// The frame with the pixels that no light reaches, where it has some and nothing was taken off by them.
+    pub masked: Option<MaskedPixels>,
 }
 
 /// A frame that was merged with others.
@@ -35,6 +37,17 @@ pub struct MergedFrame {
     pub saturation_e: f64,
     /// Noise that does not depend on the signal, rms electrons.
     pub floor_e: f64,
+}
+
+/// The pixels of a frame that no light reaches, together with the others.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MaskedPixels {
+    /// Rows above those that see light.
+    pub rows: usize,
+    /// Columns to the left of those that see light.
+    pub columns: usize,
+    /// All pixels: one plane for a mosaic, one a filter where they are stacked.
+    pub planes: Vec<RawPlane>,
 }
 
 impl MergedFrame {
@@ -140,6 +153,15 @@ impl Levels {
             white_v,
             table: None,
         }
+    }
+
+    /// Returns the levels of samples that so many were taken off, but for the black level: what is full lies as much lower.
+    pub(crate) fn lowered(self, samples: f64) -> Self {
+        // A frame whose darkness is full has nothing left, of which a thousandth is kept.
+        let left = |white: f64, black: f64, less: f64| (white - less).max(black + 1e-3 * (white - black));
+        let white = left(self.white, self.black, samples);
+        let white_v = left(self.white_v, self.black_v, samples * self.step_v);
+        Self { white, white_v, ..self }
     }
 
     /// Returns the levels of a file: those of its codes, or with a table those of the table's entries.

@@ -6,17 +6,54 @@ use rand_distr::{Distribution, Exp1, StandardNormal};
 use rayon::prelude::*;
 
 use crate::{
-    Electrons, Exposure, Noise, NoiseSource, Raw, RawPlane, Sensor, SensorError, TelegraphNoise, Volts, noise::Kind,
-    raw::Levels,
+    Binning, BinningKind, Electrons, Exposure, Noise, NoiseSource, Raw, RawPlane, Sensor, SensorError, TelegraphNoise,
+    Volts, noise::Kind, raw::Levels,
 };
 
 impl Sensor {
     /// Returns the voltages at the pixels' outputs: not amplified and not clipped, so that noise keeps its shape.
     ///
+    /// Pixels whose charges or voltages are read as one ([`Exposure::binning`]) have one output.
+    ///
     /// # Errors
-    /// When the exposure makes no sense.
+    /// When the exposure makes no sense, or its binning does not go with the sensor ([`as_read`](Self::as_read)).
     pub fn volts(&self, electrons: &Electrons, exposure: &Exposure, noise: &Noise) -> Result<Volts, SensorError> {
         exposure.check()?;
+        let planes = &electrons.planes_e;
+        let Some(binning) = exposure.binning else { return Ok(self.volts_of(planes, exposure, noise)) };
+        let (sheet, lines) = (self.as_read(exposure)?, self.read_lines(exposure)?);
+        let sums = |planes: &[Array2<f32>], factor: f64| -> Result<Vec<Array2<f32>>, SensorError> {
+            planes.iter().map(|plane| binning.sums(lines, plane, factor)).collect()
+        };
+        match binning.kind {
+            BinningKind::Charge => {
+                let well_e = sheet.full_well_e(exposure.gain_mode) as f32;
+                let held: Vec<Array2<f32>> =
+                    sums(planes, 1.0)?.iter().map(|plane| plane.mapv(|e| e.min(well_e))).collect();
+                Ok(sheet.volts_of(&held, exposure, noise))
+            }
+            BinningKind::Voltage => {
+                let followers =
+                    Self { column_offset_v: 0.0, column_gain_fraction: 0.0, row_noise_v: 0.0, ..self.clone() };
+                let means_v = sums(&followers.volts_of(planes, exposure, noise).planes_v, 1.0 / binning.n() as f64)?;
+                // Columns and rows take volts for electrons.
+                let columns = Self {
+                    conversion_gain_v_per_e: 1.0,
+                    high_gain: None,
+                    read_noise_v: 0.0,
+                    reset_noise_v: 0.0,
+                    dsnu_v: 0.0,
+                    telegraph: TelegraphNoise::default(),
+                    ..sheet.into_owned()
+                };
+                Ok(columns.volts_of(&means_v, exposure, noise))
+            }
+            BinningKind::Digital => Ok(self.volts_of(planes, exposure, noise)),
+        }
+    }
+
+    /// Reads electrons, each pixel by itself.
+    fn volts_of(&self, planes_e: &[Array2<f32>], exposure: &Exposure, noise: &Noise) -> Volts {
         let plane = |(number, electrons): (usize, &Array2<f32>)| {
             let mut volts = electrons.as_standard_layout().into_owned();
             let n_columns = volts.ncols();
@@ -25,7 +62,7 @@ impl Sensor {
             rows.enumerate().for_each(|(row, values)| readout.read_row(row, values));
             volts
         };
-        Ok(Volts { planes_v: electrons.planes_e.iter().enumerate().map(plane).collect() })
+        Volts { planes_v: planes_e.iter().enumerate().map(plane).collect() }
     }
 
     /// Returns the frame as the converter gives it: offset, analog gain, clipping, response curve, rounding.
@@ -49,18 +86,31 @@ impl Sensor {
         self.check()?;
         exposures.iter().try_for_each(Exposure::check)?;
         let exposure = &exposures[0];
-        let levels = Levels::new(self, exposure);
+        let (sheet, lines) = (self.as_read(exposure)?, self.read_lines(exposure)?);
         let gains: Vec<f64> = exposures.iter().map(|exposure| exposure.analog_gain).collect();
         let gain_of = |row: usize| gains[exposure_of(row)];
-        let planes = volts.planes_v.iter().map(|plane| self.convert(plane, &gain_of)).collect();
+        let plane = |plane: &Array2<f32>| {
+            let numbers = self.convert(plane, &gain_of);
+            match exposure.binning {
+                Some(binning @ Binning { kind: BinningKind::Digital, .. }) => binning.sums_of_numbers(lines, numbers),
+                _ => Ok(numbers),
+            }
+        };
+        let planes = volts.planes_v.iter().map(plane).collect::<Result<_, _>>()?;
+        Ok(sheet.frame(planes, exposure)?.clamped(&sheet))
+    }
+
+    /// Returns the frame of planes as they are read.
+    fn frame(&self, planes: Vec<RawPlane>, exposure: &Exposure) -> Result<Raw, SensorError> {
         Ok(Raw {
             planes,
             tile: self.tile()?,
             filter_names: self.filters.iter().map(|f| f.name.clone()).collect(),
-            levels,
+            levels: Levels::new(self, exposure),
             exposure: *exposure,
             row_time_us: self.row_time_us,
             merged: Vec::new(),
+            masked: None,
         })
     }
 
@@ -72,15 +122,15 @@ impl Sensor {
     pub fn frame_of(&self, dn: Array2<u16>, exposure: &Exposure) -> Result<Raw, SensorError> {
         self.check()?;
         exposure.check()?;
+        let sheet = self.as_read(exposure)?;
         let refused = |reason: String| Err(SensorError::Unsuitable { what: "the raw frame", reason });
-        let Some(top) = self.adc.top_dn() else {
+        let Some(top) = sheet.adc.top_dn() else {
             return refused(format!(
                 "is of digital numbers, expected a sensor with a converter, which {} has not",
                 self.name
             ));
         };
-        let tile = self.tile()?;
-        if tile.is_none() && self.filters.len() > 1 {
+        if self.tile()?.is_none() && self.filters.len() > 1 {
             return refused(format!(
                 "has one plane, expected a sensor with a mosaic: {} has stacked filters",
                 self.name
@@ -93,15 +143,7 @@ impl Sensor {
             }
             Some(_) => {}
         }
-        Ok(Raw {
-            planes: vec![RawPlane::Dn(dn)],
-            tile,
-            filter_names: self.filters.iter().map(|f| f.name.clone()).collect(),
-            levels: Levels::new(self, exposure),
-            exposure: *exposure,
-            row_time_us: self.row_time_us,
-            merged: Vec::new(),
-        })
+        sheet.frame(vec![RawPlane::Dn(dn)], exposure)
     }
 
     fn convert(&self, volts: &Array2<f32>, gain_of: &(dyn Fn(usize) -> f64 + Sync)) -> RawPlane {

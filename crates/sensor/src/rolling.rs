@@ -4,7 +4,8 @@ use ndarray::{Array2, ArrayView2};
 use rayon::prelude::*;
 
 use crate::{
-    Cfa, ElectronRate, ExitPupil, Illumination, Sensor, SensorError, Tile, collect::after_filters, motion::keys,
+    Cfa, ElectronRate, ExitPupil, Illumination, ReadLines, Sensor, SensorError, Tile, collect::after_filters,
+    motion::keys,
 };
 
 /// When the rows of a frame are exposed.
@@ -16,12 +17,19 @@ pub struct RollingShutter {
     pub exposure_s: f64,
     /// From the start of one row to that of the next, s; 0 for a global shutter.
     pub row_time_s: f64,
+    /// Which rows are read, and so exposed, as one.
+    pub rows: ReadLines,
 }
 
 impl RollingShutter {
-    /// Returns when the middle of the exposure of a row is, s.
+    /// Returns when the middle of the exposure of a row of pixels is, s.
     pub fn middle_s(&self, row: usize) -> f64 {
-        self.start_s + self.row_time_s * row as f64 + 0.5 * self.exposure_s
+        self.begin_s(row) + 0.5 * self.exposure_s
+    }
+
+    /// Returns when the exposure of a row of pixels begins, s.
+    fn begin_s(&self, row: usize) -> f64 {
+        self.start_s + self.row_time_s * self.rows.read_in(row) as f64
     }
 }
 
@@ -94,7 +102,7 @@ fn places_of_row(
     shutter: &RollingShutter,
     place_at: &(dyn Fn(f64) -> ImagePlace + Sync),
 ) -> Vec<ImagePlace> {
-    let start_s = shutter.start_s + shutter.row_time_s * row as f64;
+    let start_s = shutter.begin_s(row);
     let at = |share: f64| place_at(start_s + share * shutter.exposure_s);
     const PARTS: usize = 8;
     // A camera that shakes may be back where it was at the end.
@@ -173,7 +181,7 @@ mod tests {
 
     #[test]
     fn a_camera_at_rest_sees_the_image() {
-        let shutter = RollingShutter { start_s: 0.4, exposure_s: 0.01, row_time_s: 1e-4 };
+        let shutter = RollingShutter { start_s: 0.4, exposure_s: 0.01, row_time_s: 1e-4, rows: ReadLines::SINGLE };
         let rate = sensor().rolling_rate(&line(), SIZE, &shutter, &moving(0.0), None).unwrap();
         assert_eq!(rate.planes_e_per_s[0], line().planes_e_per_s[0].slice(ndarray::s![20..80, 20..100]));
     }
@@ -181,7 +189,7 @@ mod tests {
     /// Row r sees the line where it is at its own time: 400 px/s and 2 × 10⁻⁴ s a row slant it by .08 of a pixel a row.
     #[test]
     fn an_upright_line_slants_by_the_way_in_a_row_time() {
-        let shutter = RollingShutter { start_s: 0.0, exposure_s: 1e-3, row_time_s: 2e-4 };
+        let shutter = RollingShutter { start_s: 0.0, exposure_s: 1e-3, row_time_s: 2e-4, rows: ReadLines::SINGLE };
         let rate = sensor().rolling_rate(&line(), SIZE, &shutter, &moving(400.0), None).unwrap();
         let (first, last) = (moments(&rate, 0).0, moments(&rate, 59).0);
         // Cubic convolution keeps first moments; single floats.
@@ -196,7 +204,7 @@ mod tests {
     /// A way of w during the exposure adds w² / 12 to the variance of the line.
     #[test]
     fn motion_during_the_exposure_blurs() {
-        let shutter = RollingShutter { start_s: -0.005, exposure_s: 0.01, row_time_s: 0.0 };
+        let shutter = RollingShutter { start_s: -0.005, exposure_s: 0.01, row_time_s: 0.0, rows: ReadLines::SINGLE };
         let blurred = sensor().rolling_rate(&line(), SIZE, &shutter, &moving(800.0), None).unwrap();
         let ((mean, variance), (_, still)) = (moments(&blurred, 30), moments(&line_frame(), 30));
         assert!(mean.abs() < 1e-3, "{mean}");
@@ -216,7 +224,7 @@ mod tests {
         let plane = |k: usize| Array2::from_shape_fn((8, 8), move |(r, c)| 1e-3 * (1 + k + r * 3 + c) as f32);
         let image = SpectralImage::new(Quantity::Irradiance, grid, (0..3).map(plane).collect()).unwrap();
         let light = Illumination::on_pixels(&image);
-        let shutter = RollingShutter { start_s: 0.0, exposure_s: 0.01, row_time_s: 1e-5 };
+        let shutter = RollingShutter { start_s: 0.0, exposure_s: 0.01, row_time_s: 1e-5, rows: ReadLines::SINGLE };
         let still = sensor.filter_rates(&light).unwrap();
         let rate = sensor.rolling_rate(&still, (8, 8), &shutter, &moving(0.0), None).unwrap();
         let expected = sensor.electron_rate(&light).unwrap();

@@ -49,6 +49,9 @@ pub struct Sensor {
     pub conversion_gain_v_per_e: f64,
     /// The electrons that a pixel holds.
     pub full_well_e: f64,
+    /// The electrons that the node holds where charges of several pixels are summed; left out, all that the pixels hold.
+    #[serde(default)]
+    pub binned_well_e: Option<f64>,
     /// The second readout of a dual-gain pixel.
     #[serde(default)]
     pub high_gain: Option<HighGain>,
@@ -121,6 +124,9 @@ pub struct Sensor {
     /// `chief_ray_response`.
     #[serde(default)]
     pub pixel_stack: Option<PixelStack>,
+    /// Rows and columns that no light reaches, and what is taken off the others by them.
+    #[serde(default)]
+    pub optical_black: Option<OpticalBlack>,
     /// The share of the electrons above the full well that spills into the pixels above and below.
     #[serde(default)]
     pub blooming_fraction: f64,
@@ -245,6 +251,39 @@ impl TelegraphNoise {
         let part = if correlated_double_sampling { 1.0 } else { 0.5 };
         self.mean_amplitude_e * (part * self.fraction).sqrt()
     }
+}
+
+/// Rows above and columns to the left of the others that no light reaches: optical black.
+///
+/// They have dark current, its noise, the noise of their reads, the offsets of their columns and the noise of their rows as all pixels have. They come
+/// besides the `rows` and `columns` of the sensor, which see light.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub struct OpticalBlack {
+    /// Rows above, a multiple of the rows after which the mosaic repeats.
+    pub rows: usize,
+    /// Columns to the left, a multiple of the columns after which the mosaic repeats.
+    pub columns: usize,
+    /// What is taken off the others.
+    #[serde(default)]
+    pub clamp: BlackClamp,
+}
+
+/// What is taken off the numbers of a frame by its pixels in the dark.
+///
+/// The mean m of n of them stands for darkness: each number becomes itself − m + the black level, so that the mean dark current is gone. Of the noise σ of
+/// darkness of a pixel the mean keeps σ²/n, which is common to all that it is taken off; that of a row has its row's noise in it, which goes too.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub enum BlackClamp {
+    /// Nothing: they go with the frame.
+    #[default]
+    None,
+    /// Row by row, the mean of the row's pixels in the dark.
+    Row,
+    /// The mean of all pixels in the dark.
+    Frame,
 }
 
 const fn whole() -> f64 {

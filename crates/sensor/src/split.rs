@@ -37,18 +37,20 @@ impl Sensor {
     /// # Errors
     /// When pixels are whole, or the frames do not fit each other.
     pub fn merge_split(&self, large: &[Raw], small: &[Raw]) -> Result<Raw, SensorError> {
-        let (Some(split), Some(sheet)) = (self.split_pixel, self.small_photodiode()) else {
+        let Some(split) = self.split_pixel else {
             let reason = format!("needs split_pixel, which {} does not state", self.name);
             return Err(SensorError::Unsuitable { what: "a merge of two photodiodes", reason });
         };
         let frames: Vec<Raw> = large.iter().chain(small).cloned().collect();
         self.check_merge(&frames)?;
+        let sheet = self.as_read(&frames[0].exposure)?;
+        let small_sheet = sheet.small_photodiode().expect("a sheet as read has the pixels of its sensor");
         let of_small = |frame: &Raw| {
-            let source = sheet.source_of(frame);
+            let source = small_sheet.source_of(frame);
             MergedFrame { time_s: source.time_s / split.area_ratio, ..source }
         };
-        let sources = large.iter().map(|frame| self.source_of(frame)).chain(small.iter().map(of_small)).collect();
-        Ok(self.merge_as(&frames, sources))
+        let sources = large.iter().map(|frame| sheet.source_of(frame)).chain(small.iter().map(of_small)).collect();
+        Ok(sheet.merge_as(&frames, sources))
     }
 }
 

@@ -4,8 +4,8 @@
 
 use approx::assert_relative_eq;
 use dioptric_sensor::{
-    Adc, DarkCurrent, DarkCurrentEstimate, ElectronRate, Exposure, FlatPoint, FrameStack, Noise, NonUniformity,
-    PhotonTransfer, RawPlane, Sensor,
+    Adc, Bench, BenchSeries, BenchSettings, Binning, BinningKind, DarkCurrent, DarkCurrentEstimate, ElectronRate,
+    Exposure, FlatPoint, FrameStack, Noise, NonUniformity, PhotonTransfer, RawPlane, Sensor,
 };
 use ndarray::Array2;
 
@@ -130,5 +130,35 @@ fn figure_4_has_the_variance_of_its_read_noise() {
         assert_relative_eq!(mean, 30_000.0 * cg, max_relative = 0.001);
         // One standard error of a variance from 250 000 values is 0.28 %.
         assert_relative_eq!(variance, expected, max_relative = 0.012);
+    }
+}
+
+#[test]
+fn the_bench_finds_the_data_sheet_of_pixels_that_are_read_as_one() {
+    for kind in [BinningKind::Charge, BinningKind::Voltage, BinningKind::Digital] {
+        let exposure = Exposure { binning: Some(Binning { kind, pixels: 2 }), ..Exposure::seconds(1e-3) };
+        let settings = BenchSettings { side: 256, n_levels: 20, n_stacked: 3, exposure, ..BenchSettings::default() };
+        let bench = Bench::new(&camera(), settings, None).unwrap();
+        let mut number = 0;
+        let mut point = |series: &BenchSeries| {
+            let [first, second] =
+                [0, 1].map(|shot| bench.frame(series, number + shot).unwrap().planes[0].samples().into_owned());
+            number += 2;
+            FlatPoint::measure(series.photons, &first, &second).unwrap()
+        };
+        let series = bench.series();
+        let dark = point(&series[0]);
+        let points: Vec<FlatPoint> = series[1..=20].iter().map(point).collect();
+        let transfer = PhotonTransfer::fit(dark, &points).unwrap();
+        let sheet = bench.sheet();
+        // A photon on the pixel as read, whatever it is read from.
+        assert_relative_eq!(bench.quantum_efficiency(), 1.0, max_relative = 1e-4);
+        let step_v = sheet.adc.step_v(sheet.swing_v).unwrap();
+        assert_relative_eq!(transfer.gain_dn_per_e, sheet.conversion_gain_v_per_e / step_v, max_relative = 0.02);
+        let read_e = READ_NOISE_V / GAIN_V_PER_E * if kind == BinningKind::Charge { 1.0 } else { 2.0 };
+        assert_relative_eq!(transfer.dark_noise_e, read_e, max_relative = 0.03);
+        // Levels are 5.5 % of saturation apart, and the last one that is whole is the one found.
+        let ratio = transfer.saturation_e / sheet.saturation_e(&exposure);
+        assert!((0.93..1.01).contains(&ratio), "{kind:?}: {ratio}");
     }
 }

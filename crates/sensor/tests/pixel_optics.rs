@@ -5,7 +5,7 @@
 use approx::assert_relative_eq;
 use dioptric_sensor::{
     Cfa, ElectronRate, ExitPupil, Filter, Illumination, ImagePlace, Interfaces, Microlens, MicrolensOutline,
-    MicrolensPower, MicrolensShift, PixelStack, QuantumEfficiencyOf, RollingShutter, Sensor, StackLayer,
+    MicrolensPower, MicrolensShift, PixelStack, QuantumEfficiencyOf, ReadLines, RollingShutter, Sensor, StackLayer,
 };
 use dioptric_spectrum::{Quantity, SpectralImage, Spectrum, WavelengthGrid};
 use ndarray::Array2;
@@ -143,7 +143,7 @@ fn frames_of_a_rolling_shutter_lose_the_same() {
     let sensor = Sensor { pixel_pitch_um: 2.0, ..sensor(MicrolensShift::None) }.with_size(60, 80);
     let exit_pupil = Some(pupil(0.2, 1.8));
     let still: ElectronRate = sensor.filter_rates(&Illumination::on_pixels(&image)).unwrap();
-    let shutter = RollingShutter { start_s: 0.0, exposure_s: 0.01, row_time_s: 1e-5 };
+    let shutter = RollingShutter { start_s: 0.0, exposure_s: 0.01, row_time_s: 1e-5, rows: ReadLines::SINGLE };
     let at_rest = |_: f64| -> ImagePlace { [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]] };
     let rolled = sensor.rolling_rate(&still, (60, 80), &shutter, &at_rest, exit_pupil).unwrap();
     let expected = rate(&sensor, &image, exit_pupil);

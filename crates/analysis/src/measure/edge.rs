@@ -16,6 +16,8 @@ const CERTAIN: f64 = 0.01;
 const PIXELS_PER_DEGREE: f64 = 60.0;
 /// The luminance at which pictures are looked at, cd/m².
 const LUMINANCE_CD_M2: f64 = 100.0;
+/// The channel from whose edge the others' are counted.
+const GREEN: &str = "G";
 /// The most letters a mosaic may have.
 const MOST_LETTERS: usize = 64;
 
@@ -87,6 +89,11 @@ pub struct EdgeChannel {
     pub contrast_to_noise: Option<f64>,
     /// By how much light changes from the edge to the border of the region, of the step: shading, which was taken off; 0 where there is none.
     pub shading: f64,
+    /// How far the edge lies from that of the green channel, pixels along the direction across it, to the right, or down where it is nearer to a row:
+    /// lateral color; none where there is no green one.
+    pub offset_px: Option<f64>,
+    /// One standard error of it, by the noise of the pixels.
+    pub offset_error_px: Option<f64>,
 }
 
 /// A channel in which the edge cannot be measured.
@@ -116,8 +123,15 @@ impl EdgeRequest {
         let mut measured: Vec<(String, EdgeResponse)> = Vec::new();
         let mut not_measured = Vec::new();
         for (channel, parts) in &samples.channels {
-            let responses: Result<Vec<EdgeResponse>, _> =
-                parts.iter().map(|part| EdgeResponse::measure(&part.of(region, samples.period))).collect();
+            let of_part = |part: &Part<'_>| {
+                let response = EdgeResponse::measure(&part.of(region, samples.period))?;
+                Ok::<_, SensorError>(EdgeResponse {
+                    position_px: part.position_px(&response, region, samples.period),
+                    position_error_px: samples.period as f64 * response.position_error_px,
+                    ..response
+                })
+            };
+            let responses: Result<Vec<EdgeResponse>, _> = parts.iter().map(of_part).collect();
             match responses {
                 Ok(responses) => measured.push((channel.clone(), mean_response(&responses, samples.period))),
                 Err(error) => {
@@ -131,10 +145,15 @@ impl EdgeRequest {
                 region,
                 slant_deg: last.slant_deg,
                 pixel_um: self.pixel_um,
-                channels: measured
-                    .iter()
-                    .map(|(name, response)| self.channel(name, response, &viewing))
-                    .collect::<Result<_, _>>()?,
+                channels: {
+                    let green = measured.iter().find(|(name, _)| name == GREEN).map(|(_, response)| response);
+                    let channel = |(name, response): &(String, EdgeResponse)| -> Result<EdgeChannel, PipelineError> {
+                        let offset = green.map(|green| offset_px(response, green));
+                        let (offset_px, offset_error_px) = (offset.map(|(px, _)| px), offset.map(|(_, error)| error));
+                        Ok(EdgeChannel { offset_px, offset_error_px, ..self.channel(name, response, &viewing)? })
+                    };
+                    measured.iter().map(channel).collect::<Result<_, _>>()?
+                },
                 not_measured,
                 clipped_share: picture.clipped_share_of(region),
             }),
@@ -258,8 +277,18 @@ impl EdgeRequest {
             response_error: response.standard_error.clone(),
             contrast_to_noise: Some(response.contrast_to_noise).filter(|ratio| ratio.is_finite()),
             shading: response.shading,
+            offset_px: None,
+            offset_error_px: None,
         })
     }
+}
+
+/// Returns how far an edge lies from another across the latter, and the standard error of that, pixels.
+fn offset_px(response: &EdgeResponse, from: &EdgeResponse) -> (f64, f64) {
+    let along = response.normal[0] * from.normal[0] + response.normal[1] * from.normal[1];
+    let error =
+        if std::ptr::eq(response, from) { 0.0 } else { response.position_error_px.hypot(from.position_error_px) };
+    (response.position_px * along - from.position_px, error)
 }
 
 /// Returns the luminance of a picture, each tile of a mosaic as one sample: its colors would look like edges.
@@ -332,9 +361,26 @@ impl Part<'_> {
             Plane::Owned(plane) => plane,
         };
         // The tile begins at pixel 0 of the picture, wherever the region does.
-        let offset = |first: usize, start: usize| (first + period - start % period) % period;
-        let (row, column) = (offset(self.first.0, region.row), offset(self.first.1, region.column));
+        let (row, column) = self.offset(region, period);
         region.of(plane).slice_move(s![row..; period, column..; period])
+    }
+
+    /// Returns the row and column of a region at which the part's samples begin.
+    fn offset(&self, region: PixelRegion, period: usize) -> (usize, usize) {
+        let offset = |first: usize, start: usize| (first + period - start % period) % period;
+        (offset(self.first.0, region.row), offset(self.first.1, region.column))
+    }
+
+    /// Returns where an edge lies that was found in the part, pixels across it from the middle of the region.
+    fn position_px(&self, response: &EdgeResponse, region: PixelRegion, period: usize) -> f64 {
+        let middle = |first: usize, n: usize| {
+            let n_samples = (n - first).div_ceil(period);
+            first as f64 + 0.5 * (period * (n_samples - 1)) as f64 - 0.5 * (n as f64 - 1.0)
+        };
+        let (row, column) = self.offset(region, period);
+        let [right, down] = response.normal;
+        let moved = right * middle(column, region.columns) + down * middle(row, region.rows);
+        period as f64 * response.position_px + moved
     }
 }
 
@@ -353,6 +399,9 @@ fn mean_response(parts: &[EdgeResponse], period: usize) -> EdgeResponse {
         contrast: mean(&|part| part.contrast),
         contrast_to_noise: mean(&|part| part.contrast_to_noise),
         shading: mean(&|part| part.shading),
+        normal: parts[0].normal,
+        position_px: mean(&|part| part.position_px),
+        position_error_px: (mean(&|part| part.position_error_px.powi(2)) / n).sqrt(),
     }
 }
 

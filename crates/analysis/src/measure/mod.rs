@@ -3,6 +3,7 @@
 mod chart;
 mod compare;
 mod edge;
+mod edge_batch;
 mod edge_map;
 mod frames;
 mod grid;
@@ -22,6 +23,7 @@ use serde::Serialize;
 pub use chart::{ChartMeasurement, ChartRequest, PatchRow};
 pub use compare::{CompareRequest, Comparison, DeltaESummary, PictureViewing, SeenPicture};
 pub use edge::{EdgeChannel, EdgeMeasurement, EdgeRequest, UnmeasuredChannel};
+pub use edge_batch::{EdgeBatch, EdgeBatchRequest, UnmeasuredPicture};
 pub use edge_map::{EdgeMap, EdgeMapRequest, EdgePlace, UnmeasuredPlace};
 pub use grid::{GridDot, GridMeasurement, LateralColor};
 pub use noise::{
@@ -43,4 +45,9 @@ use crate::LineChart;
 pub trait Measurement: Serialize {
     /// Returns the plots, each with the name of its file.
     fn charts(&self) -> Vec<(String, LineChart)>;
+
+    /// Returns the numbers as a table of comma-separated values, of measurements that are one.
+    fn csv(&self) -> Option<String> {
+        None
+    }
 }

@@ -6,8 +6,8 @@ use std::{
 };
 
 use dioptric_sensor::{
-    Bench, BenchSettings, DarkCurrentEstimate, Exposure, FlatPoint, FrameStack, NonUniformity, Parts, PhotonTransfer,
-    Raw, Sensor, Spectrogram,
+    Bench, BenchSettings, Binning, DarkCurrentEstimate, Exposure, FlatPoint, FrameStack, NonUniformity, Parts,
+    PhotonTransfer, Raw, Sensor, Spectrogram,
 };
 use dioptric_spectrum::Illuminant;
 use ndarray::Array2;
@@ -42,6 +42,8 @@ pub struct BenchRequest {
     pub time_s: Option<f64>,
     /// The factor on the voltage; 1 where it is not given.
     pub analog_gain: Option<f64>,
+    /// Pixels that are read as one.
+    pub binning: Option<Binning>,
     /// The temperature of the chip, °C; 25 where it is not given.
     pub temperature_c: Option<f64>,
     /// The seed of all noise.
@@ -60,6 +62,7 @@ impl BenchRequest {
                 time_s: self.time_s.unwrap_or(standard.exposure.time_s),
                 analog_gain: self.analog_gain.unwrap_or(standard.exposure.analog_gain),
                 temperature_c: self.temperature_c.unwrap_or(standard.exposure.temperature_c),
+                binning: self.binning,
                 ..standard.exposure
             },
             seed: self.seed,
@@ -275,7 +278,7 @@ pub fn measure_bench(request: &BenchRequest, frames_folder: Option<&Path>) -> Re
         collected.add(taken)?;
     }
     if let Some(folder) = frames_folder {
-        let bits = u32::from(bench.sensor().adc.top_dn().unwrap_or(u16::MAX)).count_ones();
+        let bits = u32::from(bench.sheet().adc.top_dn().unwrap_or(u16::MAX)).count_ones();
         let path = folder.join(DESCRIPTOR_FILE);
         let text = descriptor(bits, bench.settings().side, &kept);
         fs::write(&path, text).map_err(|e| PipelineError::Write { path, reason: e.to_string() })?;
@@ -354,7 +357,7 @@ fn numbers_of(raw: &Raw) -> Array2<f32> {
 }
 
 fn data_sheet(bench: &Bench) -> NoiseDataSheet {
-    let (sensor, exposure) = (bench.sensor(), bench.settings().exposure);
+    let (sensor, exposure) = (bench.sheet(), bench.settings().exposure);
     let gain_v_per_e = sensor.conversion_gain_v_per_e(exposure.gain_mode);
     let step_v = sensor.adc.step_v(sensor.swing_v).unwrap_or(1.0);
     let dark_e_per_s = sensor.dark_current.at(exposure.temperature_c);

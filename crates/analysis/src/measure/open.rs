@@ -130,8 +130,8 @@ impl MeasuredPicture {
     /// # Errors
     /// When the file cannot be read, is empty, holds samples that are not finite, or colors that cannot be converted.
     pub fn open(path: &Path, curve: CodeCurve) -> Result<Self, PipelineError> {
-        if let Some(DngFile { raw, .. }) = read_dng(path)? {
-            return Ok(Self { is_of_file: true, ..Self::of_raw(path.display().to_string(), &raw) });
+        if let Some(DngFile { raw, notes, .. }) = read_dng(path)? {
+            return Ok(Self { is_of_file: true, notes, ..Self::of_raw(path.display().to_string(), &raw) });
         }
         let mut notes = vec![];
         let samples = read_picture_samples(path)?.told_in(&mut notes);

@@ -1,7 +1,7 @@
 //! Numbers of a raw file and its picture.
 
 use dioptric_pipeline::DevelopedFile;
-use dioptric_sensor::{DngProfile, DngShot, Processing, WhiteBalance};
+use dioptric_sensor::{DngProfile, DngShot, MaskedSamples, Processing, WhiteBalance};
 use dioptric_spectrum::ColorTemperature;
 use serde::Serialize;
 
@@ -31,6 +31,9 @@ pub struct DngReport {
     pub saturated_fraction: f64,
     /// What the file states of the camera: filters, colors, noise.
     pub camera: DngProfile,
+    /// What its masked pixels hold; none where it has none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub masked: Option<MaskedSamples>,
     /// What each filter gives of the white of the shot, by the camera.
     pub neutral: Option<Vec<f64>>,
     /// The correlated color temperature of what was made white, K; none where the file has no colors.
@@ -72,6 +75,7 @@ impl DngReport {
             white: raw.levels.white,
             saturated_fraction: raw.saturated_fraction(),
             camera: file.profile.clone(),
+            masked: file.masked.clone(),
             neutral: file.neutral.clone(),
             white_kelvin: white.map(|xy| ColorTemperature::of_chromaticity(xy).kelvin),
             white_balance: developed.balance.clone(),

@@ -1,13 +1,13 @@
 //! Numbers of a capture: what the sensor saw and what the lens lost.
 
 use dioptric_optics::{MonoLens, ObjectPoint, Vignetting, glam::DVec2, rays_over_front};
-use dioptric_sensor::Tile;
+use dioptric_sensor::{Binning, BinningKind, Tile};
 use serde::Serialize;
 
 use super::pixel_optics::PixelOpticsData;
 use crate::psf::spot::pupil_share;
 use crate::{LensData, LensInfoRequest};
-use dioptric_pipeline::{Capture, Frames, PipelineError, REFERENCE_WAVELENGTH_NM};
+use dioptric_pipeline::{Capture, Frames, PipelineError, REFERENCE_WAVELENGTH_NM, number};
 
 /// Bins of a histogram of digital numbers.
 const BINS: usize = 128;
@@ -86,15 +86,29 @@ impl SensorStatistics {
     pub fn new(frames: &Frames<'_>) -> Result<Self, PipelineError> {
         let Frames { sensor, exposure, exposed, .. } = frames;
         let raw = &exposed.raw;
-        let tile = sensor.tile()?;
-        let read_noise_e = sensor.read_noise_v(exposure.gain_mode) / sensor.conversion_gain_v_per_e(exposure.gain_mode);
+        let (tile, sheet) = (sensor.tile()?, sensor.as_read(exposure)?);
+        let read_noise_e = sheet.read_noise_v(exposure.gain_mode) / sheet.conversion_gain_v_per_e(exposure.gain_mode);
         let channels =
             (0..sensor.filters.len()).map(|filter| channel(frames, tile.as_ref(), filter, read_noise_e)).collect();
+        let as_one = exposure.binning.map(|binning| {
+            let ((rows, columns), pitch_um) = (raw.size(), frames.pitch_um);
+            let volts = if binning.kind == BinningKind::Digital { ("", ", volts") } else { (", volts", "") };
+            format!(
+                "{binning}: {columns} × {rows} pixels of {} µm are read from {} × {} of {} µm; picture{} and raw frame are of the former, \
+                 irradiance, depth, electrons{} of the latter",
+                number(binning.pixels as f64 * pitch_um),
+                sensor.columns,
+                sensor.rows,
+                number(pitch_um),
+                volts.0,
+                volts.1
+            )
+        });
         Ok(Self {
             sensor: sensor.name.clone(),
             exposure_time_s: exposure.time_s,
             analog_gain: exposure.analog_gain,
-            saturation_e: sensor.saturation_e(exposure),
+            saturation_e: sheet.saturation_e(exposure),
             saturated_fraction: raw.saturated_fraction(),
             read_noise_e,
             row_time_us: raw.row_time_us,
@@ -103,6 +117,7 @@ impl SensorStatistics {
             notes: sensor
                 .bands_beyond_tables(frames.grid)
                 .into_iter()
+                .chain(as_one)
                 .chain(frames.filters.iter().filter_map(|filter| filter.note_beyond_table(frames.grid)))
                 .collect(),
             channels,
@@ -114,17 +129,23 @@ fn channel(frames: &Frames<'_>, tile: Option<&Tile>, filter: usize, read_noise_e
     let Frames { sensor, exposure, rate, exposed, .. } = frames;
     let raw = &exposed.raw;
     let plane = if tile.is_some() { 0 } else { filter };
-    let (mut sum_e, mut max_e, mut sum_raw, mut counts) = (0.0, 0.0_f64, 0.0, vec![0_usize; BINS]);
-    for at in places_of_filter(raw.size(), tile, filter) {
-        let electrons = f64::from(rate.planes_e_per_s[plane][at]) * exposure.time_s;
+    let (mut sum_e, mut max_e, mut n_e) = (0.0, 0.0_f64, 0_usize);
+    // Of all pixels that are read as one.
+    let n_as_one = exposure.binning.map_or(1, Binning::n) as f64;
+    for at in places_of_filter(rate.planes_e_per_s[plane].dim(), tile, filter) {
+        let electrons = n_as_one * (f64::from(rate.planes_e_per_s[plane][at]) * exposure.time_s);
         sum_e += electrons;
         max_e = max_e.max(electrons);
+        n_e += 1;
+    }
+    let (mut sum_raw, mut counts) = (0.0, vec![0_usize; BINS]);
+    for at in places_of_filter(raw.size(), raw.tile.as_ref(), filter) {
         let sample = raw.planes[plane].sample(at.0, at.1).unwrap_or_default();
         sum_raw += sample;
         counts[((sample / raw.levels.top * BINS as f64) as usize).min(BINS - 1)] += 1;
     }
     let n_pixels = counts.iter().sum::<usize>().max(1) as f64;
-    let mean_e = sum_e / n_pixels;
+    let mean_e = sum_e / n_e.max(1) as f64;
     ChannelStatistics {
         filter: sensor.filters[filter].name.clone(),
         mean_e,

@@ -47,5 +47,16 @@ pub(crate) const CHANGED: &[(&str, &str, &str)] = &[
         "Unexpected field named `photodiode` in `PixelStack`, expected",
     ),
     ("optical_crosstalk: None", "optical_crosstalk: Some(2.0)", "Expected opening `(`"),
+    ("binned_well_e: None", "binned_well_e: Some(0.0)", "binned_well_e of IMX363-class phone sensor is 0, expected"),
+    (
+        "optical_black: None",
+        "optical_black: Some((rows: 3, columns: 4))",
+        "optical_black.rows of IMX363-class phone sensor is 3, expected a multiple of what the mosaic repeats after",
+    ),
+    (
+        "optical_black: None",
+        "optical_black: Some((rows: 4, columns: 0, clamp: Row))",
+        "is by row, which needs columns that no light reaches",
+    ),
     ("high_gain: None", "high_gain: Some(0.0)", "Expected opening `(` for struct `HighGain`"),
 ];

@@ -233,7 +233,9 @@ impl FramesSpec {
             if let (Some(small), Some(rate)) = (&small_sensor, sensor.small_rate(&rate)) {
                 small_frames.push(digitized(small, &rate, exposure, &noise.of_small_photodiode())?);
             }
-            first.get_or_insert((electrons, volts));
+            if first.is_none() {
+                first = Some((sensor.lit_electrons(electrons), sensor.lit_volts(volts, exposure)?));
+            }
         }
         let (electrons, volts) = first.expect("a checked choice has a frame");
         let merged = match self {

@@ -364,6 +364,7 @@ impl Camera {
             checker.number("Film", reflectance)?;
         }
         self.check_psfs(checker)?;
+        self.check_binning(checker)?;
         self.exposure.check().map_err(|error| checker.of_sensor(error))?;
         self.processing.check().map_err(|error| checker.of_sensor(error))?;
         match &self.wavelengths {
@@ -469,6 +470,23 @@ impl Camera {
                     "0, with psfs of a file, which are those of a lens before its film",
                 )?;
             }
+        }
+        Ok(())
+    }
+
+    /// Checks what does not go with pixels that are read as one.
+    fn check_binning(&self, checker: &Checker<'_>) -> Result<(), PipelineError> {
+        let Some(binning) = self.exposure.shot().binning else { return Ok(()) };
+        let with = |what: &str| format!("{what}, with binning");
+        checker.count("pixels", binning.pixels, 2..=16)?;
+        if matches!(self.frames, FramesSpec::Interleaved { .. }) {
+            checker.wrong("frames", "Interleaved", &with("Single, Burst or BracketStops"))?;
+        }
+        if self.dual_pixel.is_some() {
+            checker.wrong("dual_pixel", "photodiodes read one by one", &with("whole pixels"))?;
+        }
+        if self.light_field.is_some() {
+            checker.wrong("light_field", "a light-field camera", &with("none"))?;
         }
         Ok(())
     }

@@ -1,8 +1,8 @@
 //! What a command line changes of the sensor's frames and of the picture.
 
-use dioptric_sensor::{Exposure, ExposureControl, GainMode, Metering, NoiseSources, Processing};
+use dioptric_sensor::{Binning, Exposure, ExposureControl, GainMode, Metering, NoiseSources, Processing};
 
-use crate::{PictureOptions, PipelineError, with_analog_gain, words::with_shot};
+use crate::{PictureOptions, PipelineError, with_analog_gain};
 
 /// Changes to noise, gain and processing as words; what is `None` stays.
 #[derive(Clone, Debug, Default)]
@@ -13,6 +13,8 @@ pub struct SensorOptions {
     pub analog_gain: Option<f64>,
     /// Which readout of a dual-gain pixel, as [`GainMode::parse`] has it.
     pub gain_mode: Option<String>,
+    /// Pixels that are read as one, as [`Binning::parse`] has them.
+    pub binning: Option<String>,
     /// The temperature of the chip, °C.
     pub temperature_c: Option<f64>,
     /// What an automatic exposure looks at, as [`Metering::parse`] has it.
@@ -41,10 +43,14 @@ impl SensorOptions {
         }
         if let Some(name) = &self.gain_mode {
             let gain_mode = GainMode::parse(name)?;
-            *exposure = with_shot(*exposure, |shot| Exposure { gain_mode, ..shot });
+            *exposure = exposure.with_shot(|shot| Exposure { gain_mode, ..shot });
+        }
+        if let Some(word) = &self.binning {
+            let binning = Binning::parse(word)?;
+            *exposure = exposure.with_shot(|shot| Exposure { binning, ..shot });
         }
         if let Some(temperature_c) = self.temperature_c {
-            *exposure = with_shot(*exposure, |shot| Exposure { temperature_c, ..shot });
+            *exposure = exposure.with_shot(|shot| Exposure { temperature_c, ..shot });
             exposure.check()?;
         }
         if let Some(word) = &self.metering {

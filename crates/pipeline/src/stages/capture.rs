@@ -166,6 +166,7 @@ impl Capture {
         let first = self.lens.reference.first_order();
         Frames {
             sensor: &self.sensor,
+            pitch_um: self.place.pitch_um,
             filters: &self.inputs.filters,
             exposure: &self.frames.exposure,
             rate: &self.rate,

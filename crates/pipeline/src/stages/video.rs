@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use dioptric_sensor::{
-    Developed, ElectronRate, ExitPupil, Exposure, Illumination, LensTables, Noise, Processing, Raw, RollingShutter,
-    Sensor,
+    Developed, ElectronRate, ExitPupil, Exposure, Illumination, LensTables, Noise, Processing, Raw, ReadLines,
+    RollingShutter, Sensor,
 };
 use dioptric_spectrum::{Bands, Cancel};
 use serde::Serialize;
@@ -31,6 +31,7 @@ pub struct Video {
     /// The notes on bands beyond the tables of sensor and filters, a sentence each.
     pub notes: Vec<String>,
     path: TurnPath,
+    rows_as_one: ReadLines,
     exposed: Sensor,
     still: Arc<ElectronRate>,
     exit_pupil: Option<ExitPupil>,
@@ -62,9 +63,10 @@ pub struct VideoFrameFacts {
 }
 
 impl Video {
-    /// The rows and the columns of a frame.
+    /// The rows and the columns of a frame, those that are read as one being one.
     pub fn size(&self) -> (usize, usize) {
-        (self.sensor.rows, self.sensor.columns)
+        let sheet = self.sensor.as_read(&self.exposure).expect("the binning was checked when the video was made ready");
+        (sheet.rows, sheet.columns)
     }
 
     /// Takes a frame, counted from 0.
@@ -98,12 +100,12 @@ impl Video {
                 self.exposure.time_s
             ));
         }
-        let readout_s = 1e-6 * self.row_time_us * self.sensor.rows as f64;
+        let n_rows = self.rows_as_one.count(self.sensor.rows);
+        let readout_s = 1e-6 * self.row_time_us * n_rows as f64;
         if readout_s > frame_s {
             return refused(format!(
-                "reading {} rows takes {readout_s:.4} s, longer than a frame of {frame_s:.4} s, expected fewer frames a second or a shorter \
-                 row_time_us",
-                self.sensor.rows
+                "reading {n_rows} rows takes {readout_s:.4} s, longer than a frame of {frame_s:.4} s, expected fewer frames a second or a shorter \
+                 row_time_us"
             ));
         }
         Ok(())
@@ -111,12 +113,14 @@ impl Video {
 
     fn shutter(&self, number: usize) -> RollingShutter {
         let start_s = self.spec.start_s(number);
-        RollingShutter { start_s, exposure_s: self.exposure.time_s, row_time_s: 1e-6 * self.row_time_us }
+        let row_time_s = 1e-6 * self.row_time_us;
+        RollingShutter { start_s, exposure_s: self.exposure.time_s, row_time_s, rows: self.rows_as_one }
     }
 
     fn rate(&self, shutter: &RollingShutter) -> Result<ElectronRate, PipelineError> {
         let place_at = |time_s: f64| self.path.place_at(time_s, self.samples_per_tan);
-        Ok(self.exposed.rolling_rate(&self.still, self.size(), shutter, &place_at, self.exit_pupil)?)
+        let size = (self.sensor.rows, self.sensor.columns);
+        Ok(self.exposed.rolling_rate(&self.still, size, shutter, &place_at, self.exit_pupil)?)
     }
 }
 
@@ -198,6 +202,7 @@ impl KeptCamera {
             samples_per_tan,
             notes,
             path,
+            rows_as_one: sensor.rows_exposed_as_one(inputs.frames.shutter.exposure.shot())?,
             exposed,
             still,
             exit_pupil,
@@ -206,6 +211,7 @@ impl KeptCamera {
             noise: inputs.frames.shutter.noise,
             sensor,
         };
+        video.sensor.as_read(inputs.frames.shutter.exposure.shot())?;
         let rate = video.rate(&video.shutter(0))?;
         video.exposure = video.exposed.expose(&rate, &inputs.frames.shutter.exposure)?;
         video.check_times()?;

@@ -39,7 +39,7 @@ __all__ = [
 
 
 def mtf(
-    picture: _Picture,
+    picture: _Picture | Sequence[str | os.PathLike[str]],
     *,
     region: _Region | None = None,
     size: int | None = None,
@@ -54,7 +54,9 @@ def mtf(
 
     Parameters
     ----------
-    picture : path, Shot, Developed or array
+    picture : path, Shot, Developed, array or list of paths
+        Of a list of files and folders each picture is measured, and one that cannot be stops no other: "pictures" holds the measurements,
+        "not_measured" the others with the reason.
     region : (x, y, columns, rows), optional
         Where the edge is; the most edge-like square without it.
     size : int, optional
@@ -70,7 +72,13 @@ def mtf(
     of, curve : str, optional
         As above.
     """
-    result: dict[str, Any] = _measure("mtf", picture, _without(locals()))
+    options = _without(locals())
+    if isinstance(picture, (list, tuple)) and picture and all(isinstance(p, (str, os.PathLike)) for p in picture):
+        if every or of is not None:
+            raise ValueError("every and of are for one picture, expected one in place of several")
+        options.pop("every")
+        return dict(_measure("mtf_of_pictures", list(picture), options))
+    result: dict[str, Any] = _measure("mtf", picture, options)
     return result
 
 
@@ -296,6 +304,7 @@ def bench(
     wavelength_nm: float | None = None,
     exposure_s: float | None = None,
     analog_gain: float | None = None,
+    binning: str | None = None,
     temperature_c: float | None = None,
     seed: int | None = None,
 ) -> dict[str, Any]:
@@ -310,6 +319,8 @@ def bench(
         Side of the square of pixels (512), levels of light (40), frames of the stacks that show DSNU and PRNU (64).
     wavelength_nm, exposure_s, analog_gain, temperature_c : float, optional
         550 nm, 0.01 s, 1, 25 °C.
+    binning : str, optional
+        Pixels that are read as one: "charge:2", "voltage:2", "digital:2".
     seed : int, optional
     """
     result: dict[str, Any] = _measure("bench", sensor, _without(locals()))

@@ -2,7 +2,7 @@
 
 use super::{
     corrections::Place,
-    tags::{ACTIVE_AREA, DEFAULT_CROP_ORIGIN, DEFAULT_CROP_SIZE},
+    tags::{ACTIVE_AREA, DEFAULT_CROP_ORIGIN, DEFAULT_CROP_SIZE, MASKED_AREAS},
     tiff_reader::Fields,
 };
 
@@ -20,6 +20,19 @@ pub(super) struct Area {
     pub(super) left: usize,
     pub(super) rows: usize,
     pub(super) columns: usize,
+}
+
+/// Reads the areas that no light reaches: top, left, bottom and right of each.
+pub(super) fn masked_areas(frame: &Fields<'_>, (rows, columns): (usize, usize)) -> Result<Vec<[usize; 4]>, String> {
+    let corners = frame.whole(MASKED_AREAS)?;
+    let (areas, rest) = corners.as_chunks::<4>();
+    let is_within =
+        |&[top, left, bottom, right]: &[usize; 4]| top <= bottom && left <= right && bottom <= rows && right <= columns;
+    if rest.is_empty() && areas.iter().all(is_within) {
+        Ok(areas.to_vec())
+    } else {
+        Err(format!("has masked areas of {corners:?}, expected some within {columns} × {rows} pixels"))
+    }
 }
 
 impl Area {

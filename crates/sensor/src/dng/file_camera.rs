@@ -8,19 +8,28 @@ use super::{
     file_profile::DngNoise,
     tags::{
         ANALOG_BALANCE, AS_SHOT_NEUTRAL, AS_SHOT_WHITE_XY, CALIBRATION_ILLUMINANT_1, CALIBRATION_ILLUMINANT_2,
-        CALIBRATION_ILLUMINANT_3, CAMERA_CALIBRATION_1, CAMERA_CALIBRATION_2, CAMERA_CALIBRATION_3, COLOR_MATRIX_1,
-        COLOR_MATRIX_2, COLOR_MATRIX_3, FORWARD_MATRIX_1, FORWARD_MATRIX_2, FORWARD_MATRIX_3, ILLUMINANT_DATA_1,
-        ILLUMINANT_DATA_2, ILLUMINANT_DATA_3, NOISE_PROFILE, PROFILE_HUE_SAT_MAP_DATA_1, PROFILE_HUE_SAT_MAP_DATA_2,
+        CALIBRATION_ILLUMINANT_3, CAMERA_CALIBRATION_1, CAMERA_CALIBRATION_2, CAMERA_CALIBRATION_3,
+        CAMERA_CALIBRATION_SIGNATURE, COLOR_MATRIX_1, COLOR_MATRIX_2, COLOR_MATRIX_3, FORWARD_MATRIX_1,
+        FORWARD_MATRIX_2, FORWARD_MATRIX_3, ILLUMINANT_DATA_1, ILLUMINANT_DATA_2, ILLUMINANT_DATA_3, NOISE_PROFILE,
+        PROFILE_CALIBRATION_SIGNATURE, PROFILE_HUE_SAT_MAP_DATA_1, PROFILE_HUE_SAT_MAP_DATA_2,
         PROFILE_HUE_SAT_MAP_DATA_3,
     },
     tiff_reader::Fields,
 };
 
-/// Returns the colors of a camera of so many filters, and what each gives of the white of the shot.
-pub(super) fn color(first: &Fields<'_>, n: usize) -> Result<(Option<DngColor>, Option<Vec<f64>>), String> {
+/// Returns the colors of a camera of so many filters by a profile, which may be that of the file, and what each gives of the white of the shot.
+pub(super) fn color(
+    first: &Fields<'_>,
+    profile: &Fields<'_>,
+    n: usize,
+) -> Result<(Option<DngColor>, Option<Vec<f64>>), String> {
     if n == 1 {
         return Ok((None, None));
     }
+    // What a camera differs by from its model goes with the profiles of one maker alone (DNG 1.6, `CameraCalibrationSignature`).
+    let signature = |fields: &Fields<'_>, tag: u16| fields.text(tag).unwrap_or_default();
+    let is_calibrated =
+        signature(first, CAMERA_CALIBRATION_SIGNATURE) == signature(profile, PROFILE_CALIBRATION_SIGNATURE);
     let mut lights = Vec::new();
     for ((matrix, forward, calibration, illuminant, data), map) in [
         (
@@ -36,21 +45,21 @@ pub(super) fn color(first: &Fields<'_>, n: usize) -> Result<(Option<DngColor>, O
             PROFILE_HUE_SAT_MAP_DATA_3,
         ),
     ] {
-        let Some(rows) = first.finite(matrix, 3 * n)? else { continue };
+        let Some(rows) = profile.finite(matrix, 3 * n)? else { continue };
         let unit = |i: usize| (0..n).map(|j| f64::from(u8::from(i == j))).collect::<Vec<f64>>();
-        let calibration = match first.finite(calibration, n * n)? {
+        let calibration = match first.finite(calibration, n * n)?.filter(|_| is_calibrated) {
             Some(rows) => rows.chunks_exact(n).map(<[f64]>::to_vec).collect(),
             None => (0..n).map(unit).collect(),
         };
-        let forward = first.finite(forward, 3 * n)?;
-        let illuminant = first.one_or(illuminant, 0)?;
+        let forward = profile.finite(forward, 3 * n)?;
+        let illuminant = profile.one_or(illuminant, 0)?;
         lights.push(DngLight {
             illuminant,
-            white_xy: if illuminant == OTHER_LIGHT { white_of_data(first, data)? } else { None },
+            white_xy: if illuminant == OTHER_LIGHT { white_of_data(profile, data)? } else { None },
             camera_from_xyz: rows.chunks_exact(3).map(|row| [row[0], row[1], row[2]]).collect(),
             xyz_d50_from_balanced: forward.map(|rows| [0, 1, 2].map(|i| rows[i * n..(i + 1) * n].to_vec())),
             calibration,
-            map: hue_sat_map(first, map)?,
+            map: hue_sat_map(profile, map)?,
         });
     }
     let analog_balance = first.finite(ANALOG_BALANCE, n)?.unwrap_or(vec![1.0; n]);

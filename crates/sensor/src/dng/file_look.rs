@@ -9,6 +9,7 @@ use serde::Serialize;
 
 use super::{
     color::{D50_XY, inverse, xyz_of},
+    gain_table::GainTableMap,
     tags::{
         BASELINE_EXPOSURE, BASELINE_EXPOSURE_OFFSET, PROFILE_HUE_SAT_MAP_DIMS, PROFILE_HUE_SAT_MAP_ENCODING,
         PROFILE_LOOK_TABLE_DATA, PROFILE_LOOK_TABLE_DIMS, PROFILE_LOOK_TABLE_ENCODING, PROFILE_TONE_CURVE,
@@ -142,30 +143,34 @@ pub struct DngLook {
     pub exposure_stops: f64,
     /// The look table.
     pub table: Option<ColorMap>,
+    /// Local gains.
+    pub gains: Option<GainTableMap>,
     /// Points of the tone curve, from light to light.
     pub curve: Option<Vec<[f64; 2]>>,
 }
 
 impl DngLook {
-    pub(super) fn read(first: &Fields<'_>) -> Result<Self, String> {
+    /// Reads the exposure of a file and the look of a profile, which may be that of the file.
+    pub(super) fn read(first: &Fields<'_>, profile: &Fields<'_>) -> Result<Self, String> {
         // Some writers state 0 over 0, which is none.
-        let stops = |tag: u16| -> Result<f64, String> {
-            Ok(first.numbers(tag)?.first().copied().filter(|stops| stops.is_finite()).unwrap_or(0.0))
+        let stops = |fields: &Fields<'_>, tag: u16| -> Result<f64, String> {
+            Ok(fields.numbers(tag)?.first().copied().filter(|stops| stops.is_finite()).unwrap_or(0.0))
         };
-        let curve = first.numbers(PROFILE_TONE_CURVE)?;
+        let curve = profile.numbers(PROFILE_TONE_CURVE)?;
         let curve: Vec<[f64; 2]> = curve.chunks_exact(2).map(|point| [point[0], point[1]]).collect();
         let rises = curve.windows(2).all(|pair| pair[0][0] < pair[1][0]);
         if curve.len() == 1 || !rises || curve.iter().flatten().any(|value| !value.is_finite()) {
             return Err("has a tone curve whose points do not follow each other".to_owned());
         }
         Ok(Self {
-            exposure_stops: stops(BASELINE_EXPOSURE)? + stops(BASELINE_EXPOSURE_OFFSET)?,
+            exposure_stops: stops(first, BASELINE_EXPOSURE)? + stops(profile, BASELINE_EXPOSURE_OFFSET)?,
             table: ColorMap::read(
-                first,
+                profile,
                 PROFILE_LOOK_TABLE_DATA,
                 PROFILE_LOOK_TABLE_DIMS,
                 PROFILE_LOOK_TABLE_ENCODING,
             )?,
+            gains: None,
             curve: (!curve.is_empty()).then_some(curve),
         })
     }
@@ -189,12 +194,14 @@ pub(super) fn render(picture: &mut Array3<f32>, map: Option<&ColorMap>, look: &D
     let (to_romm, to_srgb) = matrices();
     let gain = look.exposure_stops.exp2() as f32;
     let curve = look.curve.as_deref().map(ToneTable::new);
-    let change = |rgb: [f32; 3]| {
+    let change = |rgb: [f32; 3], local: &dyn Fn([f32; 3]) -> f32| {
         let mut rgb = product(&to_romm, rgb);
         if let Some(map) = map {
             rgb = map.apply(rgb);
         }
         rgb = rgb.map(|part| gain * part);
+        let local = local(rgb);
+        rgb = rgb.map(|part| local * part);
         if let Some(table) = &look.table {
             rgb = table.apply(rgb);
         }
@@ -203,10 +210,13 @@ pub(super) fn render(picture: &mut Array3<f32>, map: Option<&ColorMap>, look: &D
         }
         product(&to_srgb, rgb)
     };
+    let (n_rows, n_columns, _) = picture.dim();
     let mut rows: Vec<_> = picture.outer_iter_mut().collect();
-    rows.par_iter_mut().for_each(|row| {
-        Zip::from(row.rows_mut()).for_each(|mut pixel| {
-            let changed = change([pixel[0], pixel[1], pixel[2]]);
+    rows.par_iter_mut().enumerate().for_each(|(number, row)| {
+        let gains = look.gains.as_ref().map(|gains| gains.row(number, n_rows));
+        Zip::indexed(row.rows_mut()).for_each(|column, mut pixel| {
+            let local = |rgb: [f32; 3]| gains.as_ref().map_or(1.0, |gains| gains.gain(column, n_columns, rgb));
+            let changed = change([pixel[0], pixel[1], pixel[2]], &local);
             pixel.iter_mut().zip(changed).for_each(|(part, changed)| *part = changed);
         });
     });

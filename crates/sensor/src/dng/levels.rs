@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use ndarray::Array2;
 use rayon::prelude::*;
+use serde::Serialize;
 
 use super::{
     area::Area,
@@ -28,6 +29,36 @@ pub(super) struct FileLevels {
     of_rows: Vec<f64>,
     /// Saturation of each plane.
     white: Vec<f64>,
+}
+
+/// What the pixels of a frame hold that no light reaches (`MaskedAreas`).
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct MaskedSamples {
+    /// How many they are.
+    pub n_pixels: usize,
+    /// How far the mean of each plane lies above the black level that the file states, straightened codes.
+    pub above_black: Vec<f64>,
+    /// The standard deviation of each plane's.
+    pub deviation: Vec<f64>,
+}
+
+/// How far above black masked pixels lie before that is told, standard errors of their mean; a step of a code is a quarter of one at least.
+const TOLD_ERRORS: f64 = 4.0;
+
+impl MaskedSamples {
+    /// Says that darkness lies above the black level of the file, where it does.
+    pub(super) fn note(&self) -> Option<String> {
+        let error = |deviation: f64| (deviation / (self.n_pixels as f64).sqrt()).max(0.25);
+        let planes = self.above_black.iter().zip(&self.deviation);
+        let most = planes.filter(|(above, deviation)| above.abs() > TOLD_ERRORS * error(**deviation));
+        let most = most.map(|(above, _)| *above).max_by(|a, b| a.abs().total_cmp(&b.abs()))?;
+        let side = if most > 0.0 { "above" } else { "below" };
+        Some(format!(
+            "the {} masked pixels of the file lie {:.2} {side} its black level, as with dark current; --black masked takes their mean for black",
+            self.n_pixels,
+            most.abs()
+        ))
+    }
 }
 
 impl FileLevels {
@@ -84,6 +115,42 @@ impl FileLevels {
             }
         }
         Ok(levels)
+    }
+
+    /// Returns the levels whose black is raised to the mean of the pixels of areas (top, left, bottom and right) that no light reaches.
+    pub(super) fn raised_to(mut self, masked: &MaskedSamples) -> Self {
+        let n = self.white.len();
+        for (plane, raised) in masked.above_black.iter().enumerate() {
+            self.black.iter_mut().skip(plane).step_by(n).for_each(|black| *black += raised);
+        }
+        self
+    }
+
+    /// Returns what the pixels of areas hold that no light reaches.
+    pub(super) fn masked(&self, stored: &Samples, areas: &[[usize; 4]], area: &Area) -> Option<MaskedSamples> {
+        let n = self.white.len();
+        let (rows, columns) = self.repeat;
+        let place = |i: usize, first: usize, n: usize| (i as isize - first as isize).rem_euclid(n as isize) as usize;
+        let places = || {
+            areas.iter().flat_map(|&[top, left, bottom, right]| {
+                (top..bottom).flat_map(move |r| (left..right).map(move |c| (r, c)))
+            })
+        };
+        let n_pixels = places().count();
+        if n_pixels == 0 {
+            return None;
+        }
+        let above = |plane: usize| {
+            let of = |(row, column): (usize, usize)| {
+                let (r, c) = (place(row, area.active_top, rows), place(column, area.active_left, columns));
+                self.straight(stored.at(row, column, plane)) - self.black[(r * columns + c) * n + plane]
+            };
+            let mean = places().map(of).sum::<f64>() / n_pixels as f64;
+            let variance = places().map(|at| (of(at) - mean).powi(2)).sum::<f64>() / n_pixels as f64;
+            (mean, variance.sqrt())
+        };
+        let (above_black, deviation) = (0..n).map(above).unzip();
+        Some(MaskedSamples { n_pixels, above_black, deviation })
     }
 
     fn highest_black(&self, plane: usize) -> f64 {

@@ -96,6 +96,7 @@ impl DngFile {
             exposure: Exposure::seconds(0.0),
             row_time_us: 0.0,
             merged: Vec::new(),
+            masked: None,
         };
         Ok(Self {
             raw,
@@ -113,6 +114,7 @@ impl DngFile {
             orientation: 1,
             shot: DngShot::default(),
             rendering: DngRendering::default(),
+            masked: None,
             opcodes: Vec::new(),
             notes: Vec::new(),
             with_border: None,

@@ -7,20 +7,22 @@ use ndarray::Array2;
 use serde::Serialize;
 
 use super::{
-    area::Area,
+    area::{Area, masked_areas},
     color::FILTERS,
     corrections::{Corrections, Place},
     file_camera,
     file_look::{self, DngLook, DngRendering},
     file_profile::{ChannelCorrections, DngProfile},
-    levels::FileLevels,
+    gain_table::GainTableMap,
+    levels::{FileLevels, MaskedSamples},
+    profile_file::ProfileFile,
     samples::{self, Codes, Samples},
     tags::{
-        CFA_LAYOUT, CFA_PATTERN, CFA_PLANE_COLOR, CFA_REPEAT_PATTERN_DIM, COLOR_FILTER_ARRAY, DEFAULT_SCALE,
-        DNG_VERSION, EXIF_DIRECTORY, EXPOSURE_TIME, F_NUMBER, FOCAL_LENGTH, IMAGE_DESCRIPTION, IMAGE_LENGTH,
-        IMAGE_WIDTH, LENS_MODEL, LINEAR_RAW, MAKE, MODEL, NEW_SUBFILE_TYPE, OPCODE_LIST_1, OPCODE_LIST_2,
+        BLACK_LEVEL, CFA_LAYOUT, CFA_PATTERN, CFA_PLANE_COLOR, CFA_REPEAT_PATTERN_DIM, COLOR_FILTER_ARRAY,
+        DEFAULT_SCALE, DNG_VERSION, EXIF_DIRECTORY, EXPOSURE_TIME, F_NUMBER, FOCAL_LENGTH, IMAGE_DESCRIPTION,
+        IMAGE_LENGTH, IMAGE_WIDTH, LENS_MODEL, LINEAR_RAW, MAKE, MODEL, NEW_SUBFILE_TYPE, OPCODE_LIST_1, OPCODE_LIST_2,
         OPCODE_LIST_3, ORIENTATION, OWN_MAKE, PHOTOGRAPHIC_SENSITIVITY, PHOTOMETRIC_INTERPRETATION,
-        PROFILE_GAIN_TABLE_MAP, RGB_TABLES, SUB_DIRECTORIES,
+        PROFILE_GAIN_TABLE_MAP, PROFILE_GAIN_TABLE_MAP_2, RGB_TABLES, SUB_DIRECTORIES,
     },
     tiff_reader::{Fields, TiffReader},
 };
@@ -39,6 +41,47 @@ pub enum DngOpcodes {
     Applied,
     /// The frame is taken as the sensor gave it.
     Ignored,
+}
+
+/// What stands for darkness in a frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum DngBlack {
+    /// The black level that the file states; the mean of its masked pixels where it states none.
+    #[default]
+    Stated,
+    /// The mean of its masked pixels, which have dark current too (`MaskedAreas`).
+    Masked,
+}
+
+impl DngBlack {
+    /// Returns the choice of a word: `stated` or `masked`.
+    ///
+    /// # Errors
+    /// When the word is another.
+    pub fn parse(word: &str) -> Result<Self, SensorError> {
+        match word.to_ascii_lowercase().as_str() {
+            "stated" => Ok(Self::Stated),
+            "masked" => Ok(Self::Masked),
+            _ => Err(SensorError::Word {
+                what: "what stands for darkness",
+                found: word.to_owned(),
+                expected: "stated, masked".to_owned(),
+            }),
+        }
+    }
+}
+
+/// How a file is read.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct DngReading {
+    /// Whether its corrections are made.
+    pub opcodes: DngOpcodes,
+    /// How far its profile makes its picture.
+    pub rendering: DngRendering,
+    /// What stands for darkness.
+    pub black: DngBlack,
+    /// A camera profile in place of the file's own.
+    pub profile: Option<ProfileFile>,
 }
 
 /// A raw frame from a DNG file, with what the file states of it.
@@ -62,6 +105,8 @@ pub struct DngFile {
     pub shot: DngShot,
     /// How far its profile makes its picture.
     pub rendering: DngRendering,
+    /// What its masked pixels hold; `None` where it has none.
+    pub masked: Option<MaskedSamples>,
     /// The corrections that the file asks for and that are made, by the names of their opcodes: to the frame, or to its picture.
     pub opcodes: Vec<String>,
     /// What the file asks for and is not done, a sentence each.
@@ -98,19 +143,19 @@ impl DngFile {
     /// # Errors
     /// When the file cannot be read, is no DNG, or has samples of another kind.
     pub fn read(path: &Path) -> Result<Self, SensorError> {
-        Self::read_with(path, DngOpcodes::Applied)
+        Self::read_with(path, &DngReading::default())
     }
 
-    /// Reads a file as [`read`](Self::read) does, with or without its opcodes.
+    /// Reads a file as [`read`](Self::read) does, in another way.
     ///
     /// # Errors
-    /// As there.
-    pub fn read_with(path: &Path, opcodes: DngOpcodes) -> Result<Self, SensorError> {
+    /// As there, and when it has no masked pixels that are asked for, or a profile is for another number of filters.
+    pub fn read_with(path: &Path, reading: &DngReading) -> Result<Self, SensorError> {
         let wrong = |reason: String| SensorError::Read { path: path.to_owned(), reason };
         let length = fs::metadata(path).map_err(|e| wrong(e.to_string()))?.len();
         memory::check(length, length).map_err(|e| wrong(e.to_string()))?;
         let bytes = fs::read(path).map_err(|e| wrong(e.to_string()))?;
-        Self::from_bytes_with(&bytes, opcodes).map_err(|reason| match raw_format_of(&bytes).or_else(|| raw_format_by_name(path)) {
+        Self::from_bytes_with(&bytes, reading).map_err(|reason| match raw_format_of(&bytes).or_else(|| raw_format_by_name(path)) {
             Some(format) => wrong(format!(
                 "is {format}, which is not read, expected a DNG file; Adobe's DNG Converter and `dnglab convert` make one of it"
             )),
@@ -127,10 +172,10 @@ impl DngFile {
     /// Reads the bytes of a file; the error is what is wrong with it.
     #[cfg(test)]
     pub(crate) fn from_bytes(bytes: &[u8]) -> Result<Self, String> {
-        Self::from_bytes_with(bytes, DngOpcodes::Applied)
+        Self::from_bytes_with(bytes, &DngReading::default())
     }
 
-    pub(super) fn from_bytes_with(bytes: &[u8], opcodes: DngOpcodes) -> Result<Self, String> {
+    pub(super) fn from_bytes_with(bytes: &[u8], reading: &DngReading) -> Result<Self, String> {
         let (file, first) = TiffReader::new(bytes)?;
         let first = file.fields_at(first)?;
         if !first.has(DNG_VERSION) {
@@ -146,11 +191,28 @@ impl DngFile {
         let whole = area.whole();
         let (filter_names, tile) = mosaic(&frame, stored.n_planes, &area)?;
         let (_, whole_tile) = mosaic(&frame, stored.n_planes, &whole)?;
-        let lists = Lists::read(&frame, opcodes)?;
+        let lists = Lists::read(&frame, reading.opcodes)?;
         lists.correct_codes(&mut stored, whole_tile.as_ref(), &area);
-        let (color, neutral) = file_camera::color(&first, filter_names.len())?;
+        if reading.profile.is_some() && filter_names.len() == 1 {
+            return Err("has one filter, of which a camera profile says nothing, expected none".to_owned());
+        }
+        let other = reading.profile.as_ref().map(ProfileFile::fields).transpose()?;
+        let profile = other.as_ref().unwrap_or(&first);
+        let (color, neutral) = file_camera::color(&first, profile, filter_names.len())?;
         let noise = file_camera::noise(&frame, &first, filter_names.len())?;
         let file_levels = FileLevels::read(&frame, &stored)?;
+        let areas = masked_areas(&frame, (stored.rows, stored.columns))?;
+        let masked = file_levels.masked(&stored, &areas, &area);
+        let is_by_masked = reading.black == DngBlack::Masked || !frame.has(BLACK_LEVEL);
+        let file_levels = match &masked {
+            Some(masked) if is_by_masked => file_levels.raised_to(masked),
+            None if reading.black == DngBlack::Masked => {
+                return Err(
+                    "has no masked pixels to take for black, expected MaskedAreas or the black level".to_owned()
+                );
+            }
+            _ => file_levels,
+        };
         let saturation_e = noise.first().map_or(f64::INFINITY, |noise| 1.0 / noise.scale);
         let number = |tag: u16| -> Result<Option<f64>, String> {
             let found = exif.as_ref().map_or(Ok(Vec::new()), |exif| exif.numbers(tag))?;
@@ -167,6 +229,7 @@ impl DngFile {
                 exposure: Exposure::seconds(exposure_time_s.unwrap_or(0.0)),
                 row_time_us: 0.0,
                 merged: Vec::new(),
+                masked: None,
             };
             lists.correct_light(raw, area, saturation_e)
         };
@@ -179,7 +242,13 @@ impl DngFile {
             let place = if needs_border { whole.place() } else { area.place() };
             ChannelCorrections { list: lists.third.clone(), place, shown }
         });
-        let mut notes = notes(&first, &frame)?;
+        // The map of the file's own profile lies with the frame.
+        let own_map = if reading.profile.is_none() && frame.has(PROFILE_GAIN_TABLE_MAP) { &frame } else { profile };
+        let gains = GainTableMap::read(own_map, PROFILE_GAIN_TABLE_MAP, &area)?;
+        let look = DngLook { gains, ..DngLook::read(&first, profile)? };
+        let mut notes = notes(&first, profile, &frame)?;
+        notes.extend(masked.as_ref().filter(|_| !is_by_masked).and_then(MaskedSamples::note));
+        notes.extend(reading.profile.as_ref().and_then(|profile| profile.note(&first)));
         notes.extend(lists.notes.iter().cloned());
         if let Some(color) = &color
             && color.lights.len() > 1
@@ -192,7 +261,7 @@ impl DngFile {
             bits: stored.bits,
             stored: (stored.columns, stored.rows),
             origin: (area.left, area.top),
-            profile: DngProfile { filter_names, color, look: DngLook::read(&first)?, noise, corrections },
+            profile: DngProfile { filter_names, color, look, noise, corrections },
             neutral,
             orientation: Some(first.one_or(ORIENTATION, 1)?).filter(|n| (1..=8).contains(n)).unwrap_or(1),
             shot: DngShot {
@@ -205,7 +274,8 @@ impl DngFile {
                 focal_length_mm: number(FOCAL_LENGTH)?,
                 iso_speed: number(PHOTOGRAPHIC_SENSITIVITY)?,
             },
-            rendering: DngRendering::default(),
+            rendering: reading.rendering,
+            masked,
             opcodes: lists.names,
             notes,
             with_border,
@@ -232,6 +302,12 @@ impl DngFile {
             }
             (white, ..) => white,
         };
+        let has_map = self.rendering == DngRendering::Look && self.profile.look.gains.is_some();
+        if has_map && processing.perspective.is_some() {
+            let reason =
+                "moves what the file's local map of gains is for, expected none, or another rendering than look";
+            return Err(SensorError::Unsuitable { what: "perspective", reason: reason.to_owned() });
+        }
         let processing = Processing { white, ..processing.clone() };
         self.profile.check_processing(&processing)?;
         let raw = self.with_border.as_ref().unwrap_or(&self.raw);
@@ -272,6 +348,7 @@ impl DngFile {
                 look.exposure_stops != 0.0 && no_look,
                 format!("{} stops more brightness (BaselineExposure)", look.exposure_stops),
             ),
+            (look.gains.is_some() && no_look, "a local map of gains".to_owned()),
             (look.table.is_some() && no_look, "a look table".to_owned()),
             (look.curve.is_some() && no_look, "a tone curve".to_owned()),
         ];
@@ -476,7 +553,7 @@ fn mosaic(frame: &Fields<'_>, n_planes: usize, area: &Area) -> Result<(Vec<Strin
 }
 
 /// Returns what the file asks for and is not done.
-fn notes(first: &Fields<'_>, frame: &Fields<'_>) -> Result<Vec<String>, String> {
+fn notes(first: &Fields<'_>, profile: &Fields<'_>, frame: &Fields<'_>) -> Result<Vec<String>, String> {
     let mut notes = Vec::new();
     // Cameras write names and captions there; frames of this program what the frame lacks.
     if let (Some(OWN_MAKE), Some(description)) = (first.text(MAKE).as_deref(), first.text(IMAGE_DESCRIPTION)) {
@@ -485,10 +562,11 @@ fn notes(first: &Fields<'_>, frame: &Fields<'_>) -> Result<Vec<String>, String> 
     if frame.numbers(DEFAULT_SCALE)?.iter().any(|scale| *scale != 1.0) {
         notes.push("the file's pixels are not square (DefaultScale), which is left as it is".to_owned());
     }
-    let look = [(PROFILE_GAIN_TABLE_MAP, "a local map of gains"), (RGB_TABLES, "tables of colors")];
-    let look: Vec<&str> = look.into_iter().filter(|(tag, _)| first.has(*tag)).map(|(_, name)| name).collect();
+    let look = [(PROFILE_GAIN_TABLE_MAP_2, "local gains of a second kind"), (RGB_TABLES, "tables of colors")];
+    let look: Vec<&str> =
+        look.into_iter().filter(|(tag, _)| profile.has(*tag) || frame.has(*tag)).map(|(_, name)| name).collect();
     if !look.is_empty() {
-        notes.push(format!("the file's profile has {}, which is left out", look.join(", ")));
+        notes.push(format!("the profile has {}, which is left out", look.join(", ")));
     }
     Ok(notes)
 }

@@ -4,7 +4,7 @@ use dioptric_spectrum::{Illuminant, Quantity, SpectralImage, WavelengthGrid};
 use ndarray::Array2;
 
 use super::{
-    DngDetails, DngFile, DngNoise, DngOpcodes, DngRendering,
+    DngBlack, DngDetails, DngFile, DngNoise, DngOpcodes, DngReading, DngRendering, ProfileFile,
     lossless_jpeg::tests::{Coding, encode, uneven},
     tags::*,
     tiff_file::{Directory, Value},
@@ -663,7 +663,9 @@ fn opcodes_written_here_undo_the_lens_when_read() {
     let through = file.develop(&Processing { denoise: Some(0.0), ..Processing::default() }).unwrap();
     // Tables by cubic convolution and polynomials from middles of pixels differ by hundredths of a pixel.
     let psnr = psnr_db(&own.picture, &through.picture).unwrap();
-    let ignored = DngFile::from_bytes_with(&bytes, DngOpcodes::Ignored).unwrap();
+    let ignored =
+        DngFile::from_bytes_with(&bytes, &DngReading { opcodes: DngOpcodes::Ignored, ..DngReading::default() })
+            .unwrap();
     assert!(ignored.opcodes.is_empty() && ignored.notes[0].contains("left out as asked"), "{:?}", ignored.notes);
     let uncorrected = ignored.develop(&Processing { denoise: Some(0.0), ..Processing::default() }).unwrap();
     let without = psnr_db(&own.picture, &uncorrected.picture).unwrap();
@@ -909,4 +911,174 @@ fn mutations_are_read_or_refused() {
         }
     }
     assert!(n_read > 500, "{n_read}");
+}
+
+/// Returns a camera profile of these fields in a file of its own.
+fn profile_file(change: impl FnOnce(&mut Directory)) -> Vec<u8> {
+    let mut d = Directory::default();
+    let matrix = [9000, -3000, -1000, -5000, 14_000, 1000, -500, 1500, 7000];
+    d.set(UNIQUE_CAMERA_MODEL, Value::Ascii("Maker X1".to_owned()));
+    d.set(PROFILE_NAME, Value::Ascii("Neutral".to_owned()));
+    d.set(COLOR_MATRIX_1, Value::SignedRational(matrix.map(|m| (m, 10_000)).to_vec()));
+    d.set(CALIBRATION_ILLUMINANT_1, Value::Short(vec![21]));
+    change(&mut d);
+    let mut bytes = d.into_file().unwrap();
+    bytes[2..4].copy_from_slice(b"RC");
+    bytes
+}
+
+#[test]
+fn a_profile_of_its_own_stands_in_place_of_that_of_the_file() {
+    // The same fields within the frame's file and beside it make the same picture.
+    let map = |d: &mut Directory| {
+        d.set(PROFILE_HUE_SAT_MAP_DIMS, Value::Long(vec![1, 2, 1]));
+        d.set(PROFILE_HUE_SAT_MAP_DATA_1, Value::Double([[0.0, 1.0, 1.0], [20.0, 0.6, 0.9]].concat()));
+        d.set(PROFILE_TONE_CURVE, Value::Double(vec![0.0, 0.0, 0.3, 0.5, 1.0, 1.0]));
+        d.set(BASELINE_EXPOSURE_OFFSET, Value::SignedRational(vec![(1, 4)]));
+    };
+    let calibration = [9500, 0, 0, 0, 10_000, 0, 0, 0, 10_500].map(|m| (m, 10_000)).to_vec();
+    let of_camera = |d: &mut Directory| {
+        d.set(CAMERA_CALIBRATION_1, Value::SignedRational(calibration.clone()));
+        d.set(BASELINE_EXPOSURE, Value::SignedRational(vec![(1, 2)]));
+    };
+    let own = PLAIN.file(|d| {
+        of_camera(d);
+        let matrix = [9000, -3000, -1000, -5000, 14_000, 1000, -500, 1500, 7000];
+        d.set(COLOR_MATRIX_1, Value::SignedRational(matrix.map(|m| (m, 10_000)).to_vec()));
+        map(d);
+    });
+    let plain = PLAIN.file(|d| {
+        of_camera(d);
+        d.set(UNIQUE_CAMERA_MODEL, Value::Ascii("Maker X1".to_owned()));
+    });
+    let reading = |bytes: &[u8]| DngReading {
+        rendering: DngRendering::Look,
+        profile: Some(ProfileFile::from_bytes(bytes).unwrap()),
+        ..DngReading::default()
+    };
+    let picture = |bytes: &[u8], reading: &DngReading| {
+        let file = DngFile::from_bytes_with(bytes, reading).unwrap();
+        let usual = Processing { denoise: Some(0.0), ..Processing::default() };
+        (file.develop(&usual).unwrap().picture, file.notes)
+    };
+    let look = DngReading { rendering: DngRendering::Look, ..DngReading::default() };
+    let (expected, _) = picture(&own, &look);
+    let (found, notes) = picture(&plain, &reading(&profile_file(map)));
+    assert_eq!((found, notes), (expected.clone(), vec![]));
+    // A DNG file lends its profile too.
+    assert_eq!(picture(&plain, &reading(&own)).0, expected);
+    let (without, _) = picture(&plain, &look);
+    assert!(without != expected);
+    // Calibrations of a camera go with profiles of the same signature alone.
+    let signed = profile_file(|d| {
+        map(d);
+        d.set(PROFILE_CALIBRATION_SIGNATURE, Value::Ascii("com.adobe".to_owned()));
+    });
+    assert!(picture(&plain, &reading(&signed)).0 != expected);
+    let name = ProfileFile::from_bytes(&signed).unwrap().name();
+    assert_eq!(name.as_deref(), Some("Neutral"));
+    // A profile for another camera is named.
+    let other = profile_file(|d| d.set(UNIQUE_CAMERA_MODEL, Value::Ascii("Maker X2".to_owned())));
+    let (_, notes) = picture(&plain, &reading(&other));
+    assert!(notes[0].contains("Maker X2") && notes[0].contains("Maker X1"), "{notes:?}");
+    let refused = |bytes: &[u8]| ProfileFile::from_bytes(bytes).unwrap_err();
+    assert!(refused(b"RIFF....").contains("IIRC"));
+    assert!(refused(&profile_file(|d| d.set(COLOR_MATRIX_1, Value::SignedRational(vec![])))[..40]).contains("ends"));
+    let single = Stored { n_planes: 1, ..PLAIN }.file(|d| {
+        d.set(PHOTOMETRIC_INTERPRETATION, Value::Short(vec![LINEAR_RAW]));
+    });
+    let reason = DngFile::from_bytes_with(&single, &reading(&profile_file(|_| ()))).unwrap_err();
+    assert!(reason.contains("one filter"), "{reason}");
+}
+
+#[test]
+fn masked_pixels_are_black_where_a_file_states_none_or_it_is_asked() {
+    // Codes rise by row and column; the first two rows are masked.
+    let stored = Stored { rows: 16, columns: 24, bits: 12, ..PLAIN };
+    let codes = stored.codes();
+    let mean = codes[..48].iter().map(|code| f64::from(*code)).sum::<f64>() / 48.0;
+    let areas = |d: &mut Directory| {
+        d.set(ACTIVE_AREA, Value::Long(vec![2, 0, 16, 24]));
+        d.set(MASKED_AREAS, Value::Long(vec![0, 0, 2, 24]));
+        d.set(WHITE_LEVEL, Value::Long(vec![4095]));
+    };
+    let black = |bytes: &[u8], black: DngBlack| {
+        DngFile::from_bytes_with(bytes, &DngReading { black, ..DngReading::default() }).unwrap().raw.levels.black
+    };
+    let without = stored.file(areas);
+    assert!((black(&without, DngBlack::Stated) - mean).abs() < 1e-9);
+    let with = stored.file(|d| {
+        areas(d);
+        d.set(BLACK_LEVEL, Value::Long(vec![7]));
+    });
+    assert_eq!(black(&with, DngBlack::Stated), 7.0);
+    assert!((black(&with, DngBlack::Masked) - mean).abs() < 1e-9);
+    let beyond = stored.file(|d| d.set(MASKED_AREAS, Value::Long(vec![0, 0, 2, 25])));
+    assert!(DngFile::from_bytes(&beyond).unwrap_err().contains("masked areas"));
+}
+
+#[test]
+fn local_gains_follow_the_formula_of_the_specification() {
+    // Four tables over the pixels that see light, of which a row and a column are not shown: gains rise with light and from table to table.
+    let gain =
+        |row: u32, column: u32, entry: u32| 1.0 + 0.25 * row as f32 + 0.125 * column as f32 + 0.0625 * entry as f32;
+    let weights = [0.25, 0.25, 0.25, 0.125, 0.125];
+    let (spacing, origin, entries) = (0.5, 0.25, 8);
+    let map = super::gain_table::tests::bytes([2, 2, entries], [spacing, spacing, origin, origin], weights, gain);
+    let stored = Stored { rows: 16, columns: 24, bits: 12, ..PLAIN };
+    let with_map = |d: &mut Directory| {
+        d.set(DEFAULT_CROP_ORIGIN, Value::Long(vec![2, 4]));
+        d.set(DEFAULT_CROP_SIZE, Value::Long(vec![20, 10]));
+        d.set(BASELINE_EXPOSURE, Value::SignedRational(vec![(-1, 1)]));
+        d.set(PROFILE_GAIN_TABLE_MAP, Value::Undefined(map.clone()));
+    };
+    let picture = |rendering: DngRendering, processing: &Processing| {
+        let file = DngFile { rendering, ..DngFile::from_bytes(&stored.file(with_map)).unwrap() };
+        assert!(file.notes.is_empty(), "{:?}", file.notes);
+        file.develop(processing).map(|developed| (developed.picture.codes, file.left_out().concat()))
+    };
+    let linear = Processing { curve: crate::ToneCurve::Linear, ..Processing::plain() };
+    let (plain, left) = picture(DngRendering::Colors, &linear).unwrap();
+    assert!(left.contains("local map of gains"), "{left}");
+    let (found, left) = picture(DngRendering::Look, &linear).unwrap();
+    assert!(left.is_empty(), "{left}");
+    // ROMM RGB of linear sRGB, D65 to D50 by Bradford.
+    let romm =
+        [[0.529_280, 0.330_162, 0.140_477], [0.098_366, 0.873_463, 0.028_178], [0.016_875, 0.117_662, 0.865_426]];
+    let mut compared = 0;
+    for row in 0..10 {
+        for column in 0..20 {
+            let srgb = [0, 1, 2].map(|i| 0.5 * plain[(row, column, i)]);
+            let inside =
+                srgb.iter().all(|part| (0.001..0.49).contains(part)) && (0..3).all(|i| found[(row, column, i)] < 0.99);
+            if !inside {
+                continue;
+            }
+            let rgb: [f32; 3] = romm.map(|line: [f32; 3]| line.iter().zip(srgb).map(|(m, v)| m * v).sum());
+            let (least, most) = (rgb[0].min(rgb[1]).min(rgb[2]), rgb[0].max(rgb[1]).max(rgb[2]));
+            let light = (0.25 * (rgb[0] + rgb[1] + rgb[2]) + 0.125 * (least + most)).clamp(0.0, 1.0);
+            // Half a pixel in, over all that sees light; the ends of the map go on.
+            let place = |i: usize, n: f32| ((i as f32 + 0.5) / n - 0.25) / 0.5;
+            let (down, right) = (place(row + 4, 16.0).clamp(0.0, 1.0), place(column + 2, 24.0).clamp(0.0, 1.0));
+            let expected = 1.0 + 0.25 * down + 0.125 * right + 0.0625 * (8.0 * light).min(7.0);
+            for i in 0..3 {
+                let ratio = found[(row, column, i)] / srgb[i];
+                assert!((ratio / expected - 1.0).abs() < 2e-3, "{row} {column} {i}: {ratio} {expected}");
+            }
+            compared += 1;
+        }
+    }
+    assert!(compared > 20, "{compared}");
+    let aslant = Processing { perspective: Some(crate::Perspective::parse("0.1,0,0.9,0,1,1,0,1").unwrap()), ..linear };
+    assert!(picture(DngRendering::Look, &aslant).unwrap_err().to_string().contains("local map of gains"));
+    let broken = |bytes: Vec<u8>| {
+        let file = stored.file(|d| d.set(PROFILE_GAIN_TABLE_MAP, Value::Undefined(bytes.clone())));
+        DngFile::from_bytes(&file).unwrap_err()
+    };
+    assert!(broken(map[..60].to_vec()).contains("cut short"));
+    assert!(broken(map[..map.len() - 4].to_vec()).contains("bytes"));
+    let infinite = super::gain_table::tests::bytes([1, 1, 1], [0.0; 4], weights, |_, _, _| f32::INFINITY);
+    assert!(broken(infinite).contains("numbers that are none"));
+    let spaced = super::gain_table::tests::bytes([2, 1, 1], [0.0; 4], weights, |_, _, _| 1.0);
+    assert!(broken(spaced).contains("spaced"));
 }

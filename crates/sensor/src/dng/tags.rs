@@ -45,6 +45,11 @@ pub(super) const F_NUMBER: u16 = 33437;
 pub(super) const PHOTOGRAPHIC_SENSITIVITY: u16 = 34855;
 pub(super) const EXIF_VERSION: u16 = 36864;
 pub(super) const FOCAL_LENGTH: u16 = 37386;
+pub(super) const FOCAL_PLANE_X_RESOLUTION: u16 = 41486;
+pub(super) const FOCAL_PLANE_Y_RESOLUTION: u16 = 41487;
+pub(super) const FOCAL_PLANE_RESOLUTION_UNIT: u16 = 41488;
+/// A value of it.
+pub(super) const PER_CENTIMETER: u16 = 3;
 pub(super) const LENS_MODEL: u16 = 42036;
 
 /// Values of the tag `PhotometricInterpretation`.
@@ -77,6 +82,7 @@ pub(super) const ANALOG_BALANCE: u16 = 50727;
 pub(super) const AS_SHOT_WHITE_XY: u16 = 50729;
 pub(super) const BASELINE_EXPOSURE: u16 = 50730;
 pub(super) const ACTIVE_AREA: u16 = 50829;
+pub(super) const MASKED_AREAS: u16 = 50830;
 pub(super) const SUB_TILE_BLOCK_SIZE: u16 = 50974;
 pub(super) const ROW_INTERLEAVE_FACTOR: u16 = 50975;
 pub(super) const OPCODE_LIST_1: u16 = 51008;
@@ -105,6 +111,12 @@ pub(super) const PROFILE_HUE_SAT_MAP_ENCODING: u16 = 51107;
 pub(super) const PROFILE_LOOK_TABLE_ENCODING: u16 = 51108;
 pub(super) const BASELINE_EXPOSURE_OFFSET: u16 = 51109;
 pub(super) const PROFILE_HUE_SAT_MAP_DATA_3: u16 = 52537;
-/// Those of it that are noted.
+/// Whose calibrations of cameras a profile goes with, and the camera that it is for.
+pub(super) const CAMERA_CALIBRATION_SIGNATURE: u16 = 50931;
+pub(super) const PROFILE_CALIBRATION_SIGNATURE: u16 = 50932;
+pub(super) const PROFILE_NAME: u16 = 50936;
+/// Local gains.
 pub(super) const PROFILE_GAIN_TABLE_MAP: u16 = 52525;
+/// Those of it that are noted.
+pub(super) const PROFILE_GAIN_TABLE_MAP_2: u16 = 52544;
 pub(super) const RGB_TABLES: u16 = 52543;

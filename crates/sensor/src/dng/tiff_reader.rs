@@ -25,11 +25,22 @@ struct Field<'a> {
 impl<'a> TiffReader<'a> {
     /// Returns the reader of a file and the place of its first directory.
     pub(super) fn new(bytes: &'a [u8]) -> Result<(Self, usize), String> {
-        let is_big_endian = match bytes.get(..4) {
-            Some(b"II*\0") => false,
-            Some(b"MM\0*") => true,
-            _ => return Err("is no TIFF file, expected it to begin with II*\\0 or MM\\0*".to_owned()),
-        };
+        Self::beginning(bytes, [b"II*\0", b"MM\0*"])
+            .unwrap_or_else(|| Err("is no TIFF file, expected it to begin with II*\\0 or MM\\0*".to_owned()))
+    }
+
+    /// Returns the same of a camera profile (DCP), which has letters in place of the number of TIFF files; `None` of other files.
+    pub(super) fn of_profile(bytes: &'a [u8]) -> Option<Result<(Self, usize), String>> {
+        Self::beginning(bytes, [b"IIRC", b"MMCR"])
+    }
+
+    fn beginning(bytes: &'a [u8], [little, big]: [&[u8; 4]; 2]) -> Option<Result<(Self, usize), String>> {
+        let begin = bytes.get(..4)?;
+        let is_big_endian = begin == big;
+        (is_big_endian || begin == little).then(|| Self::of_order(bytes, is_big_endian))
+    }
+
+    fn of_order(bytes: &'a [u8], is_big_endian: bool) -> Result<(Self, usize), String> {
         let file = Self { bytes, is_big_endian };
         let first = file.whole(4, 4).ok_or("ends in its header")?;
         Ok((file, first as usize))

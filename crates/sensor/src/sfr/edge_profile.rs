@@ -14,7 +14,7 @@ const SMOOTHNESS: f64 = 1e-4;
 const BAND: usize = 4;
 
 /// A symmetric matrix of rows with as many entries from the diagonal on.
-type Banded = Vec<[f64; BAND]>;
+pub(super) type Banded = Vec<[f64; BAND]>;
 
 /// A spline over distances from an edge.
 pub(super) struct EdgeProfile {

@@ -86,6 +86,7 @@ pub fn sensor_answer(sensor: &SensorSpec) -> Result<NoiseData, PipelineError> {
         wavelength_nm: None,
         time_s: None,
         analog_gain: None,
+        binning: None,
         temperature_c: None,
         seed: 1,
     };

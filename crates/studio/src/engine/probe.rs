@@ -113,7 +113,8 @@ impl Product {
         sample.filter(|_| is_inside).map(|z_m| f64::from(*z_m))
     }
 
-    /// Returns what is at a place, stated as shares of the picture's width and height from the top left.
+    /// Returns what is at a place, stated as shares of the picture's width and height from the top left; of the light that of the film there, which has
+    /// more pixels than the picture where several are read as one.
     pub fn probe(&self, share: [f64; 2]) -> Option<Probe> {
         let [columns, rows] = self.size();
         let index = |share: f64, n: usize| {
@@ -121,16 +122,20 @@ impl Product {
             (index >= 0.0 && index < n as f64).then_some(index as usize)
         };
         let (column, row) = (index(share[0], columns)?, index(share[1], rows)?);
+        let of = |plane: (usize, usize)| Some((index(share[1], plane.0)?, index(share[0], plane.1)?));
         let seen = self.seen(share);
         let capture = &self.capture;
         let grid = capture.grid();
         let irradiance = |band: usize| match capture.irradiance.cube() {
-            Some(cube) => cube.get((band, row, column)).map(|e| f64::from(*e)),
+            Some(cube) => {
+                let (_, rows, columns) = cube.dim();
+                of((rows, columns)).map(|(row, column)| f64::from(cube[(band, row, column)]))
+            }
             None => None,
         };
         let spectrum = (0..grid.len()).filter_map(|band| Some((grid.centers_nm()[band], irradiance(band)?))).collect();
         let exposed = &capture.frames.exposed;
-        let electrons = exposed.electrons.planes_e.iter().filter_map(|plane| plane.get((row, column)));
+        let electrons = exposed.electrons.planes_e.iter().filter_map(|plane| Some(plane[of(plane.dim())?]));
         let samples = exposed.raw.planes.iter().filter_map(|plane| plane.sample(row, column));
         let filter =
             exposed.raw.tile.as_ref().map(|tile| exposed.raw.filter_names[tile.filter_at(row, column)].clone());
@@ -140,7 +145,7 @@ impl Product {
             field_deg: seen.map(|(tan, _)| tan.length().atan().to_degrees()),
             depth_m: seen.and_then(|(_, depth_m)| depth_m),
             spectrum,
-            electrons: electrons.map(|&e| f64::from(e)).collect(),
+            electrons: electrons.map(f64::from).collect(),
             samples: samples.collect(),
             filter,
             rgb: [self.rgb8[first], self.rgb8[first + 1], self.rgb8[first + 2]],

@@ -73,7 +73,8 @@ impl Product {
 
     /// Columns and rows of the picture.
     pub fn size(&self) -> [usize; 2] {
-        [self.capture.place.columns, self.capture.place.rows]
+        let picture = &self.capture.developed.picture;
+        [picture.columns(), picture.rows()]
     }
 
     /// Returns the picture as `dioptric run` writes it: the bytes of `picture.png`.

@@ -4,7 +4,7 @@ use dioptric_pipeline::{
     Camera, Diffraction, FilmSpec, FocusSpec, FramesSpec, Iris, LensReadOptions, LensSpec, PICTURE, SensorSpec,
     StopSpec, light_word, with_analog_gain, with_exposure_s,
 };
-use dioptric_sensor::{ExposureControl, NoiseSource, NoiseSources};
+use dioptric_sensor::{Exposure, ExposureControl, NoiseSource, NoiseSources};
 
 use super::{Session, absolute};
 
@@ -231,13 +231,14 @@ impl Telling {
             self.number("exposure-s", new_s);
             self.made.exposure = with_exposure_s(self.made.exposure, new_s);
         }
-        let gain = |control: &ExposureControl| match control {
-            ExposureControl::Manual(exposure) => exposure.analog_gain,
-            ExposureControl::Auto(auto) => auto.limit.analog_gain,
-        };
-        if gain(&camera.exposure) != gain(&self.made.exposure) {
-            self.number("analog-gain", gain(&camera.exposure));
-            self.made.exposure = with_analog_gain(self.made.exposure, gain(&camera.exposure));
+        let (shot, made) = (*camera.exposure.shot(), *self.made.exposure.shot());
+        if shot.analog_gain != made.analog_gain {
+            self.number("analog-gain", shot.analog_gain);
+            self.made.exposure = with_analog_gain(self.made.exposure, shot.analog_gain);
+        }
+        if shot.binning != made.binning {
+            self.word("binning", shot.binning.map_or("none".to_owned(), |binning| binning.to_string()));
+            self.made.exposure = self.made.exposure.with_shot(|made| Exposure { binning: shot.binning, ..made });
         }
         if camera.noise != self.made.noise {
             self.text("noise", &noise_words(camera.noise));

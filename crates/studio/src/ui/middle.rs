@@ -205,7 +205,9 @@ impl Studio {
             of_spread.strong("Point spread at +");
             views::charts::spread(of_spread, spread.map(|(_, texture)| texture), spread.map(|(spread, _)| spread));
             of_modulation.strong("Modulation at +");
-            let edge = self.edge.as_ref().map(|edge| (&edge.response, results.product.capture.place.pixel_pitch_um()));
+            let capture = &results.product.capture;
+            let as_one = capture.frames.exposure.binning.map_or(1, |binning| binning.pixels) as f64;
+            let edge = self.edge.as_ref().map(|edge| (&edge.response, as_one * capture.place.pixel_pitch_um()));
             views::charts::modulation(of_modulation, spread.map(|(spread, _)| spread), edge);
             of_histogram.strong("Histogram, raw");
             views::charts::histogram(of_histogram, &results.product);

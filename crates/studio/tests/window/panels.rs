@@ -8,7 +8,7 @@ use dioptric_pipeline::{
     SurfaceChange, WavelengthSpec, WorldSpec, with_exposure_s,
 };
 use dioptric_scene::{Pattern, Wave};
-use dioptric_sensor::{Brightness, ColorCorrection, LensShading, ToneCurve};
+use dioptric_sensor::{Binning, BinningKind, Brightness, ColorCorrection, ExposureControl, LensShading, ToneCurve};
 use dioptric_spectrum::Illuminant;
 use dioptric_studio::{
     engine::EngineSettings,
@@ -95,6 +95,8 @@ const PANELS: &[(&str, &[&str])] = &[
     ("time", &["Exposure.time_s"]),
     ("gain", &["Exposure.analog_gain"]),
     ("readout", &["Exposure.gain_mode"]),
+    ("binning", &["Exposure.binning", "Binning.kind"]),
+    ("pixels as one", &["Binning.pixels"]),
     ("temperature", &["Exposure.temperature_c"]),
     ("metering", &["AutoExposure.metering"]),
     ("percentile", &["Metering.Percentile"]),
@@ -331,6 +333,9 @@ fn everything(camera: &mut Camera) {
     camera.wavelengths = WavelengthSpec::Range { first_nm: 400.0, last_nm: 700.0, step_nm: 100.0 };
     camera.stop = StopSpec::DiameterMm(8.0);
     camera.frames = FramesSpec::MovingBurst { frames: 2, motion_px: 1.0 };
+    if let ExposureControl::Auto(auto) = &mut camera.exposure {
+        auto.limit.binning = Some(Binning { kind: BinningKind::Charge, pixels: 2 });
+    }
     let scene = &mut camera.scene;
     scene.field_of_view_deg = Some(36.0);
     (scene.illuminance_lux, scene.mean_luminance_cd_m2) = (Some(100.0), Some(10.0));

@@ -1,7 +1,7 @@
 //! Exposure and number of frames.
 
 use dioptric_pipeline::{Camera, FramesSpec, with_auto_exposure, with_exposure_s};
-use dioptric_sensor::{AutoExposure, Exposure, ExposureControl, GainMode, Metering};
+use dioptric_sensor::{AutoExposure, Binning, BinningKind, Exposure, ExposureControl, GainMode, Metering};
 use egui::Ui;
 
 use super::{
@@ -64,6 +64,23 @@ fn readout(ui: &mut Ui, exposure: &mut Exposure) {
     NumberField::by_factors("gain", "×", 1e-3..=1e4, 1.0..=64.0, words).show(ui, &mut exposure.analog_gain);
     let modes = [(GainMode::Low, "low"), (GainMode::High, "high")];
     choice(ui, "readout", "Which readout of a pixel of two gains is used", &mut exposure.gain_mode, &modes);
+    let binned = |kind| exposure.binning.map_or(Some(Binning { kind, pixels: 2 }), |now| Some(Binning { kind, ..now }));
+    let kinds = [
+        (None, "none"),
+        (binned(BinningKind::Charge), "charges summed"),
+        (binned(BinningKind::Voltage), "voltages averaged"),
+        (binned(BinningKind::Digital), "numbers summed"),
+    ];
+    choice(
+        ui,
+        "binning",
+        "Whether pixels of one filter are read as one, and where they meet",
+        &mut exposure.binning,
+        &kinds,
+    );
+    if let Some(binning) = &mut exposure.binning {
+        count(ui, "pixels as one", "How many pixels each way are read as one", 2..=16, &mut binning.pixels);
+    }
     let words = "Temperature of the chip, which its dark current depends on";
     let field = NumberField::even("temperature", "°C", -273.0..=200.0, -40.0..=80.0, words);
     field.show(ui, &mut exposure.temperature_c);
