@@ -160,12 +160,16 @@ impl Reader<'_> {
         };
         let (n, k) = (of(self, "conductor.eta")?, of(self, "conductor.k")?);
         let copper = MetalKind::Copper.index();
-        let roughness = |reader: &mut Self, names: [&str; 2], default: f32| {
-            let part = reader.part(params, &names, true, default);
-            part.map(|roughness| reader.builder.add_texture(Texture::Alpha { roughness, by: RoughnessLaw::Root }))
+        let roughness = |reader: &mut Self, names: [&str; 2]| match params.find_any(&names) {
+            Some(param) if param.kind == "texture" => reader.part(params, &names, true, 0.0),
+            _ => {
+                let given = names.iter().find_map(|name| params.within(name, [0.0, f64::MAX]));
+                Ok(reader.even(given.unwrap_or(0.0) as f32))
+            }
         };
-        let metal_alpha = roughness(self, ["conductor.roughness", "conductor.uroughness"], 0.0)?;
-        let coat = self.part(params, &["interface.roughness", "interface.uroughness"], true, 0.0)?;
+        let metal = roughness(self, ["conductor.roughness", "conductor.uroughness"])?;
+        let metal_alpha = self.builder.add_texture(Texture::Alpha { roughness: metal, by: RoughnessLaw::Root });
+        let coat = roughness(self, ["interface.roughness", "interface.uroughness"])?;
         let metal = match self.part_if_any(params, &["reflectance"], false)? {
             Some(reflectance) => Material::Mirror { reflectance, roughness: Some([metal_alpha; 2]) },
             None => {
