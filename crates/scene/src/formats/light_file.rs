@@ -89,6 +89,18 @@ fn unit_of_power<'a>(name: &str, comments: impl Iterator<Item = &'a str>) -> Res
         {
             return Ok(unit);
         }
+        // A unit at its end, or any that is not understood.
+        let at_end = LightUnit::of_spectrum(comment)
+            .filter(|(_, before)| LightUnit::is_written_in(comment.get(before.len()..).unwrap_or_default()));
+        if let Some((unit, _)) = at_end {
+            return Ok(unit);
+        }
+        if let Some(word) = comment.split([' ', '\t', ',', ';']).find(|word| LightUnit::is_strange(word)) {
+            return Err(format!(
+                "its comment says '{}', which is no unit of power a nanometre: expected such (W/nm) or photons",
+                short(word)
+            ));
+        }
         let lower = comment.to_lowercase();
         const OTHERS: [&str; 9] =
             ["photon", "quanta", "pfd", "ppfd", "reflectance", "transmittance", "absorbance", "albedo", "counts"];
@@ -106,7 +118,8 @@ fn unit_of_power<'a>(name: &str, comments: impl Iterator<Item = &'a str>) -> Res
 /// Returns the unit of power, or of photons, that a name has; `None` where it says nothing of it.
 fn power_in(name: &str) -> Result<Option<LightUnit>, String> {
     let own = LightUnit::of_spectrum(name);
-    if is_no_power(own.map_or(name, |(_, before)| before)) {
+    let is_unknown = own.is_none() && LightUnit::is_written_in(name);
+    if is_unknown || is_no_power(own.map_or(name, |(_, before)| before)) {
         return Err(format!(
             "'{}' is no power a nanometre: expected such (W/nm) or photons, and a name that says so",
             short(name)
@@ -225,6 +238,15 @@ mod tests {
             "nm,W/m2/cm-1\n400,160000\n500,500000\n800,640000\n",
             "# W/m2/Hz\n400 160000\n500 500000\n800 640000\n",
             "nm,W/m2/eV\n400,160000\n500,500000\n800,640000\n",
+            "nm,flux (Jy)\n400,160000\n500,500000\n800,640000\n",
+            "nm,relative power (1/nm)\n400,1\n500,2\n800,1\n",
+            "# spectral irradiance, W/m2/cm-1\n400 160000\n500 500000\n800 640000\n",
+            "# spectral irradiance, W/(m2 Hz)\n400 160000\n500 500000\n800 640000\n",
+            "# spectral irradiance, umol/m2/s/nm\n400 400\n500 1000\n800 800\n",
+            "nm,µE m-2 s-1 nm-1\n400, 400\n500, 1000\n800, 800\n",
+            "nm,PHOTLAM\n400, 400\n500, 1000\n800, 800\n",
+            "# phot/s/cm2/nm\n400 400\n500 1000\n800 800\n",
+            "# bought 2020/11/28, 3 mW/cm2 in all, see http://a.b/c\n400 1\n500 2\n800 1\n",
             "\u{feff}Å, W\n4000, 1\n5000, 2\n8000, 1\n",
         ] {
             assert_eq!(read(text).unwrap(), light, "{text}");
@@ -242,6 +264,13 @@ mod tests {
             ("nm,log10(W)\n400, 1\n500, 2\n", "log10(W)' is no power"),
             ("nm,A/W\n400, 1\n500, 2\n", "'A/W' is no power"),
             ("nm,f_nu\n400, 1\n500, 2\n", "'f_nu' is no power"),
+            ("nm,foo/bar\n400, 1\n500, 2\n", "'foo/bar' is no power"),
+            ("nm,1/s/m2/nm\n400, 1\n500, 2\n", "'1/s/m2/nm' is no power"),
+            ("nm,s-1 m-2 nm-1\n400, 1\n500, 2\n", "'s-1 m-2 nm-1' is no power"),
+            ("nm,W/m2 cm-1\n400, 1\n500, 2\n", "'W/m2 cm-1' is no power"),
+            ("nm,photons/s/0.1%BW\n400, 1\n500, 2\n", "'photons/s/0.1%BW' is no power"),
+            ("# units: #/s/m2/nm\n400 1\n500 2\n", "'#/s/m2/nm' is no power"),
+            ("# lamp, W/m2/1/cm\n400 1\n500 2\n", "'W/m2/1/cm', which is no unit"),
             ("# Units: counts\n400 1\n500 2\n", "'counts' is no power"),
             ("# dB\n400 1\n500 2\n", "'dB' is no power"),
             ("# reflectance of white tile\n400 1\n500 2\n", "'reflectance of white tile'"),

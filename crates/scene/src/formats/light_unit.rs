@@ -43,6 +43,29 @@ impl LightUnit {
         endings(name).find_map(|(before, words)| Some((Sum::of(words)?.spectral()?, before)))
     }
 
+    /// Whether a name holds what is written as a unit is: a quotient or exponents of lengths and times, understood or not.
+    pub(super) fn is_written_in(name: &str) -> bool {
+        let is_power = |word: &str| {
+            let base = power(word).filter(|(_, exponent, rest)| *exponent != 1 && rest.is_empty());
+            base.is_some_and(|(base, ..)| ["m", "cm", "mm", "um", "µm", "nm", "s", "sr", "Hz", "eV"].contains(&base))
+        };
+        let is_quotient = |word: &str| {
+            let ends = word.split_once('/').map(|(above, below)| (above.trim_end(), below.trim_start()));
+            ends.is_some_and(|(above, below)| !above.is_empty() && !below.is_empty() && word != "n/a")
+        };
+        let symbols = symbols(name);
+        let mut words = symbols.split(|c: char| c.is_whitespace() || "()[],;:=*·".contains(c));
+        is_quotient(&symbols) || words.any(|word| is_power(word) || is_quotient(word))
+    }
+
+    /// Whether a word of a comment is a unit of watts or photons, or of what counts them, that is not understood.
+    pub(super) fn is_strange(word: &str) -> bool {
+        let symbols = symbols(word);
+        let counts = Sum::of(symbols.split('/').next().unwrap_or_default());
+        let is_of_light = counts.is_some_and(|sum| sum.watts != 0 || sum.photons != 0);
+        Self::is_written_in(word) && is_of_light && Self::of_spectrum(word).is_none()
+    }
+
     /// That of photons a nanometre of a relative spectrum.
     pub(super) const PHOTONS: Self = Self { is_photons: true, ..Self::RADIANCE };
 
@@ -137,6 +160,12 @@ fn symbols(text: &str) -> String {
             "ergs" => "erg",
             "angstrom" | "angstroms" | "ångström" => "Å",
             "hertz" => "Hz",
+            // Of astronomers.
+            "photlam" => "photon/s/cm^2/Å",
+            "photnu" => "photon/s/cm^2/Hz",
+            "flam" => "erg/s/cm^2/Å",
+            "fnu" => "erg/s/cm^2/Hz",
+            "jansky" | "janskys" => "Jy",
             // Sr is written as often as sr.
             "sr" => "sr",
             _ => word,
@@ -199,6 +228,8 @@ struct Sum {
     wavenumbers: i32,
     moles: i32,
     log10_factor: i32,
+    /// Whether a centimetre stands in it that may be one of wavelength or of a wavenumber.
+    is_per_cm: bool,
 }
 
 impl Sum {
@@ -212,6 +243,7 @@ impl Sum {
     /// Adds the exponents of a product of units, so many times.
     fn add_product(&mut self, text: &str, times: i32) -> Option<()> {
         let mut rest = text.trim();
+        rest = if rest.starts_with("1/") { &rest[1..] } else { rest };
         let mut sign = 1;
         while let Some(first) = rest.chars().next() {
             match first {
@@ -238,10 +270,17 @@ impl Sum {
                 self.seconds += exponent;
                 (&mut self.watts, if name == "J" { 0 } else { -7 })
             }
-            "mol" | "mmol" | "umol" | "µmol" | "μmol" | "nmol" => {
+            "mol" | "mmol" | "umol" | "µmol" | "μmol" | "nmol" | "uE" | "µE" | "μE" => {
                 self.moles += exponent;
                 let log10 = [("mol", 0), ("mmol", -3), ("nmol", -9)].iter().find(|(own, _)| *own == name);
                 (&mut self.photons, log10.map_or(-6, |(_, log10)| *log10))
+            }
+            // 1e-26 W m⁻² Hz⁻¹.
+            "Jy" | "MJy" | "mJy" | "uJy" | "µJy" | "μJy" => {
+                self.metres -= 2 * exponent;
+                self.hertz -= exponent;
+                let log10 = [("Jy", -26), ("MJy", -20), ("mJy", -29)].iter().find(|(own, _)| *own == name);
+                (&mut self.watts, log10.map_or(-32, |(_, log10)| *log10))
             }
             "Hz" => (&mut self.hertz, 0),
             "GHz" => (&mut self.hertz, 9),
@@ -257,10 +296,13 @@ impl Sum {
             "uW" | "µW" | "μW" => (&mut self.watts, -6),
             "nW" => (&mut self.watts, -9),
             "pW" => (&mut self.watts, -12),
-            "photon" | "photons" | "quanta" | "ph" | "q" => (&mut self.photons, 0),
+            "photon" | "photons" | "phot" | "quanta" | "ph" | "q" => (&mut self.photons, 0),
             "s" | "sec" => (&mut self.seconds, 0),
             "m" => (&mut self.metres, 0),
-            "cm" => (&mut self.metres, -2),
+            "cm" => {
+                self.is_per_cm |= exponent == -1;
+                (&mut self.metres, -2)
+            }
             "mm" => (&mut self.metres, -3),
             "sr" => (&mut self.steradians, 0),
             "nm" => (&mut self.wavelengths, 0),
@@ -282,13 +324,16 @@ impl Sum {
             (0, 0, 1) => Some(Some(1e9)),
             _ => None,
         }
-        .filter(|own| own.is_none() || self.wavelengths == 0)
+        .filter(|own| !self.is_per_cm && (own.is_none() || self.wavelengths == 0))
     }
 
     /// Returns the unit of a relative spectrum.
     fn spectral(&self) -> Option<LightUnit> {
+        // What is per nm alone is a power.
+        let is_bare = (self.seconds, self.metres, self.steradians, self.wavelengths) == (0, 0, 0, -1);
         let is_photons = match (self.watts, self.photons) {
             (1, 0) => false,
+            (0, 0) if is_bare => false,
             (0, 1) => true,
             _ => return None,
         };
@@ -388,6 +433,7 @@ mod tests {
             ("mW/(m^2/sr^-1)/cm^-1", 0.04),
             ("W/m^2/sr/THz", 1.199_169_832),
             ("W/m2/sr/eV", 4.959_367_936e-3),
+            ("MJy/sr", 1.199_169_832e-8),
             ("erg/s/cm2/sr/A", 1e-2),
         ] {
             let unit = LightUnit::parse(text).unwrap();
