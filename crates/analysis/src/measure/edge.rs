@@ -285,9 +285,11 @@ impl EdgeRequest {
 
 /// Returns how far an edge lies from another across the latter, and the standard error of that, pixels.
 fn offset_px(response: &EdgeResponse, from: &EdgeResponse) -> (f64, f64) {
+    if std::ptr::eq(response, from) {
+        return (0.0, 0.0);
+    }
     let along = response.normal[0] * from.normal[0] + response.normal[1] * from.normal[1];
-    let error =
-        if std::ptr::eq(response, from) { 0.0 } else { response.position_error_px.hypot(from.position_error_px) };
+    let error = response.position_error_px.hypot(from.position_error_px);
     (response.position_px * along - from.position_px, error)
 }
 

@@ -28,12 +28,22 @@ pub(super) fn masked_areas(frame: &Fields<'_>, (rows, columns): (usize, usize)) 
     let (areas, rest) = corners.as_chunks::<4>();
     let is_within =
         |&[top, left, bottom, right]: &[usize; 4]| top <= bottom && left <= right && bottom <= rows && right <= columns;
-    if rest.is_empty() && areas.iter().all(is_within) {
-        Ok(areas.to_vec())
-    } else {
-        Err(format!("has masked areas of {corners:?}, expected some within {columns} × {rows} pixels"))
+    if !rest.is_empty() || areas.len() > MOST_MASKED || !areas.iter().all(is_within) {
+        let shown = &corners[..corners.len().min(8)];
+        let n = areas.len();
+        return Err(format!(
+            "has {n} masked areas from {shown:?} on, expected up to {MOST_MASKED} within {columns} × {rows} pixels"
+        ));
     }
+    let n_pixels: usize = areas.iter().map(|&[top, left, bottom, right]| (bottom - top) * (right - left)).sum();
+    if n_pixels > rows * columns {
+        return Err(format!("has masked areas of {n_pixels} pixels, more than the frame: they overlap"));
+    }
+    Ok(areas.to_vec())
 }
+
+/// The most areas without light that a file may have: cameras have one to four.
+const MOST_MASKED: usize = 64;
 
 impl Area {
     /// Reads the default crop of the active area of a frame of so many rows and columns.

@@ -118,12 +118,16 @@ impl FileLevels {
     }
 
     /// Returns the levels whose black is raised to the mean of the pixels of areas (top, left, bottom and right) that no light reaches.
-    pub(super) fn raised_to(mut self, masked: &MaskedSamples) -> Self {
+    pub(super) fn raised_to(mut self, masked: &MaskedSamples) -> Result<Self, String> {
         let n = self.white.len();
         for (plane, raised) in masked.above_black.iter().enumerate() {
             self.black.iter_mut().skip(plane).step_by(n).for_each(|black| *black += raised);
+            let (black, white) = (self.highest_black(plane), self.white[plane]);
+            if black.is_nan() || black >= white {
+                return Err(format!("is saturated at {white}, expected more than the {black} of its masked pixels"));
+            }
         }
-        self
+        Ok(self)
     }
 
     /// Returns what the pixels of areas hold that no light reaches.

@@ -205,7 +205,7 @@ impl DngFile {
         let masked = file_levels.masked(&stored, &areas, &area);
         let is_by_masked = reading.black == DngBlack::Masked || !frame.has(BLACK_LEVEL);
         let file_levels = match &masked {
-            Some(masked) if is_by_masked => file_levels.raised_to(masked),
+            Some(masked) if is_by_masked => file_levels.raised_to(masked)?,
             None if reading.black == DngBlack::Masked => {
                 return Err(
                     "has no masked pixels to take for black, expected MaskedAreas or the black level".to_owned()

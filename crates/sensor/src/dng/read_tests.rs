@@ -1013,8 +1013,20 @@ fn masked_pixels_are_black_where_a_file_states_none_or_it_is_asked() {
     });
     assert_eq!(black(&with, DngBlack::Stated), 7.0);
     assert!((black(&with, DngBlack::Masked) - mean).abs() < 1e-9);
-    let beyond = stored.file(|d| d.set(MASKED_AREAS, Value::Long(vec![0, 0, 2, 25])));
-    assert!(DngFile::from_bytes(&beyond).unwrap_err().contains("masked areas"));
+    for (areas, reason) in [
+        (vec![0, 0, 2, 25], "masked areas"),
+        (vec![0, 0, 2], "masked areas"),
+        ([0, 0, 16, 24].repeat(2), "overlap"),
+        ([0, 0, 1, 1].repeat(65), "up to 64"),
+    ] {
+        let file = stored.file(|d| d.set(MASKED_AREAS, Value::Long(areas.clone())));
+        assert!(DngFile::from_bytes(&file).unwrap_err().contains(reason), "{areas:?}");
+    }
+    let bright = stored.file(|d| {
+        areas(d);
+        d.set(WHITE_LEVEL, Value::Long(vec![1]));
+    });
+    assert!(DngFile::from_bytes(&bright).unwrap_err().contains("masked pixels"));
 }
 
 #[test]
