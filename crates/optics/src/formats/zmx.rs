@@ -373,6 +373,13 @@ impl Zmx {
         wavelengths_um.sort_by_key(|(number, ..)| *number);
         wavelengths_um.truncate(self.n_wavelengths.filter(|&n| n > 0).unwrap_or(usize::MAX));
         let wavelengths_nm = wavelengths_um.iter().map(|(_, um, _)| nm_of_um(*um)).collect();
+        let last = wavelengths_um.last().map_or(0, |(number, ..)| *number);
+        let is_there = |number: &usize| wavelengths_um.iter().any(|(own, ..)| own == number);
+        let missing: Vec<String> =
+            (1..last).filter(|number| !is_there(number)).take(MOST_NAMED).map(|number| number.to_string()).collect();
+        if !missing.is_empty() {
+            notes.push(format!("the file states no wavelength {}", missing.join(", ")));
+        }
         // The first where none is named.
         let reference = match self.primary {
             0 | 1 => 0,

@@ -299,6 +299,12 @@ fn what_is_replaced_or_left_out_is_noted() {
             "GLAS ___BLANK 1 0 1.5168 64.17 0.03",
             "surface 1: the deviation of its partial dispersion P_g,F from that of usual glasses, 0.03, is left out",
         ),
+        (
+            "FTYP 0 0 2 1 0 0 0\nXFLN 0 0 0\nYFLN 0 5 0\nWAVM 1 5.875618E-1 1\nWAVM 2 0.55 1\nPWAV 1",
+            "FTYP 0 0 2 3 0 0 0\nYFLN 0 5 0\nWAVM 1 0.5 1\nWAVM 3 0.55 1\nPWAV 3",
+            "the file states no wavelength 2",
+        ),
+        ("WAVM 2 0.55 1", "WAVM 1 0.55 1", "wavelength 1 is stated twice: 0.55 µm takes the place of 0.5875618 µm"),
         ("  CURV 0.0\n", "  TYPE EVENASPH\n  PARM 2 1E-5\n  CURV 0.0\n", "the film is no sphere or conic"),
         ("  CURV 0.0\n", "  TYPE ZERNSAG\n  CURV 0.0\n", "the film is no sphere or conic"),
         (
