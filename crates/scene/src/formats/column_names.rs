@@ -1,5 +1,7 @@
 //! What the names of columns say of their numbers, in tables of lights and of reflectances.
 
+use super::light_unit::LightUnit;
+
 /// Parts of the names of what is neither a power nor a reflectance; between spaces they are whole words.
 const NEITHER: [&str; 21] = [
     "absor",
@@ -51,13 +53,32 @@ const WORDS: [&str; 24] = [
     "fnu",
     "abs",
 ];
+/// Words of how far numbers spread.
+const SPREADS: [&str; 7] = ["sd", "stdev", "stddev", "sem", "rmse", "variance", "uncertainty"];
 /// What may stand beside these in the name of a quantity.
 const BESIDE: [&str; 10] = ["r", "t", "i", "a", "u", "nm", "sample", "reflectance", "transmittance", "value"];
 /// Parts of the names of shares, and of powers of which it is not known a what.
 const NO_POWERS: [&str; 10] =
     ["transmi", "reflectance", "albedo", " %t ", " %r ", "wavenumber", " cm 1 ", "hz ", " ev ", "cumulat"];
 /// Parts of the names of light, and of what may be a reflectance's logarithm.
-const NO_REFLECTANCES: [&str; 7] = ["density", "radian", "emission", "w/m", "w m 2", "w/cm", "counts"];
+const NO_REFLECTANCES: [&str; 14] = [
+    "density",
+    "radian",
+    "emission",
+    "w/m",
+    "w m 2",
+    "w/cm",
+    "counts",
+    "sqrt",
+    "refractive",
+    "cross section",
+    "fluoresc",
+    "luminescen",
+    "emittance",
+    " a u ",
+];
+/// Whole names of what reflectances are turned into.
+const TURNED: [&str; 3] = ["1-r", "1/r", "km"];
 /// Shares, and what stands behind their names where 1 is no perfect white.
 const SHARES: [&str; 3] = ["reflectance", "transmittance", "albedo"];
 const SCALES: [&str; 8] = ["*1", "×1", "x1", "/1", "0-10", "0-255", "0-4095", "0-65535"];
@@ -99,8 +120,8 @@ fn words(spaced: &str) -> Vec<&str> {
 
 /// Whether a name is one of these words and what may stand beside them: beside others they are names, as of log cabins.
 fn is_of_words(words: &[&str]) -> bool {
-    words.iter().any(|word| WORDS.contains(word))
-        && words.iter().all(|word| WORDS.contains(word) || BESIDE.contains(word))
+    let is_own = |word: &&str| WORDS.contains(word) || SPREADS.contains(word);
+    words.iter().any(is_own) && words.iter().all(|word| is_own(word) || BESIDE.contains(word))
 }
 
 /// Whether the name of a light's column says that it holds no power a nanometre.
@@ -121,7 +142,12 @@ pub(super) fn is_no_reflectance(name: &str) -> bool {
     let has = |parts: &[&str]| parts.iter().any(|part| bare.contains(part));
     let is_scaled = has(&SHARES) && has(&SCALES) && !bare.contains('%');
     let is_photon = |word: &&str| word.starts_with("photon") && !word.starts_with("photonic");
-    words.iter().any(|word| *word == "od" || is_photon(word))
+    let has_unit =
+        name.split(['(', '[']).skip(1).any(|inner| LightUnit::is_written_in(inner.trim_end_matches([')', ']'])));
+    let is_turned = TURNED.contains(&bare.as_str());
+    has_unit
+        || is_turned
+        || words.iter().any(|word| *word == "od" || is_photon(word))
         || is_scaled
         || is_of_words(&words)
         || NEITHER.iter().chain(&NO_REFLECTANCES).any(|part| spaced.contains(part))
@@ -183,12 +209,23 @@ mod tests {
         {
             assert!(!is_no_power(name), "{name}");
         }
+        for name in ["SD", "R stdev", "1-R", "alpha (cm-1)", "PL intensity (a.u.)", "sqrt(R)", "refractive index"] {
+            assert!(is_no_reflectance(name), "{name}");
+        }
         for name in ["reflectance*10000", "Reflectance (0-255)", "W/m2/nm", "photon flux", "skin OD", "radiance"] {
             assert!(is_no_reflectance(name), "{name}");
         }
-        for name in
-            ["log cabin", "ABS plastic", "photonic paint", "reflectance", "Reflectance (0-100 %)", "leaf 0-45", "red"]
-        {
+        for name in [
+            "Std red",
+            "error bar red",
+            "log cabin",
+            "ABS plastic",
+            "photonic paint",
+            "reflectance",
+            "Reflectance (0-100 %)",
+            "leaf 0-45",
+            "red",
+        ] {
             assert!(!is_no_reflectance(name), "{name}");
         }
         for (name, is_none) in [

@@ -254,7 +254,12 @@ fn unit_described(description: &str) -> Option<String> {
     if description.to_lowercase().contains("reflect") {
         return None;
     }
-    let ends = description.match_indices([')', ']']).map(|(at, _)| at + 1).chain([description.len()]);
+    // What is behind a bracket may be its exponent.
+    let is_end = |at: &usize| {
+        let is_exponent = |c: char| c.is_numeric() || "^*-−⁻+".contains(c);
+        !description[*at..].starts_with(is_exponent)
+    };
+    let ends = description.match_indices([')', ']']).map(|(at, _)| at + 1).filter(is_end).chain([description.len()]);
     let unit = |end: usize| LightUnit::in_words(&description[..end]);
     let of_radiance = ends.filter_map(unit).find(|(unit, _)| unit.quantity == Quantity::Radiance);
     of_radiance.map(|(_, words)| words.to_owned())

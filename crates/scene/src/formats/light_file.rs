@@ -117,7 +117,7 @@ fn unit_of_power<'a>(name: &str, comments: impl Iterator<Item = &'a str>) -> Res
 
 /// Returns the unit of power, or of photons, that a name has; `None` where it says nothing of it.
 fn power_in(name: &str) -> Result<Option<LightUnit>, String> {
-    let own = LightUnit::of_spectrum(name);
+    let own = LightUnit::of_spectrum(name).filter(|(_, before)| !LightUnit::is_written_in(before));
     let is_unknown = own.is_none() && LightUnit::is_written_in(name);
     if is_unknown || is_no_power(own.map_or(name, |(_, before)| before)) {
         return Err(format!(
@@ -280,7 +280,7 @@ mod tests {
             ("400, 1\n400, 2\n", "400"),
             ("4000, 1\n7000, 2\n", "may be nm or Å"),
         ] {
-            let message = read(text).unwrap_err().to_string();
+            let message = read(text).map_err(|error| error.to_string()).expect_err(text);
             assert!(message.contains(word) && message.contains("light.csv"), "{message}");
         }
     }
