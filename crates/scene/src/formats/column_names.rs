@@ -77,8 +77,8 @@ const NO_REFLECTANCES: [&str; 14] = [
     "emittance",
     " a u ",
 ];
-/// Whole names of what reflectances are turned into.
-const TURNED: [&str; 3] = ["1-r", "1/r", "km"];
+/// Whole names of what is made of reflectances.
+const TURNED: [&str; 5] = ["1-r", "1/r", "km", "std", "loss"];
 /// Shares, and what stands behind their names where 1 is no perfect white.
 const SHARES: [&str; 3] = ["reflectance", "transmittance", "albedo"];
 const SCALES: [&str; 8] = ["*1", "×1", "x1", "/1", "0-10", "0-255", "0-4095", "0-65535"];
@@ -209,7 +209,9 @@ mod tests {
         {
             assert!(!is_no_power(name), "{name}");
         }
-        for name in ["SD", "R stdev", "1-R", "alpha (cm-1)", "PL intensity (a.u.)", "sqrt(R)", "refractive index"] {
+        for name in
+            ["SD", "std", "R stdev", "1-R", "alpha (cm-1)", "PL intensity (a.u.)", "sqrt(R)", "refractive index"]
+        {
             assert!(is_no_reflectance(name), "{name}");
         }
         for name in ["reflectance*10000", "Reflectance (0-255)", "W/m2/nm", "photon flux", "skin OD", "radiance"] {
