@@ -115,7 +115,16 @@ pub(super) fn band_folder(folder: &Path, options: &ReadOptions) -> Result<Cube, 
         grays.iter_mut().for_each(|gray| gray.stretch(top));
     }
     let planes = grays.into_iter().map(|gray| gray.values).collect();
-    Ok(Cube { planes, top, wavelengths_nm: Some(wavelengths_nm), quantity: None, unit: None, called: None, notes })
+    Ok(Cube {
+        planes,
+        top,
+        wavelengths_nm: Some(wavelengths_nm),
+        quantity: None,
+        unit: None,
+        called: None,
+        packed: None,
+        notes,
+    })
 }
 
 /// Refuses two pictures of one wavelength, and one of none.
@@ -150,7 +159,7 @@ fn grays_of(pictures: &[Numbered], notes: &mut Vec<String>) -> Result<(Vec<GrayP
     }
     notes.extend(merged(told.into_iter()));
     // Where some are packed all are quantities, be their factor 1.
-    if grays.iter().any(|gray| gray.page.is_packed) {
+    if grays.iter().any(|gray| gray.page.packed.is_some()) {
         grays.iter_mut().for_each(|gray| gray.top = None);
     }
     let (rows, columns) = grays[0].values.dim();

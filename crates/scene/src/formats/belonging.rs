@@ -2,7 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use super::stated::{bare, note_of};
+use super::{
+    depth_names::words_of,
+    stated::{bare, note_of},
+};
 
 /// Whether reading a scene may read another file in its folder: the numbers of a header, a depth, camera data, references of a
 /// line scanner.
@@ -46,6 +49,30 @@ impl Reference {
     }
 }
 
+/// Whether a name has a word for a reference, whatever stands with it: what may be one of a cube beside it.
+pub(super) fn may_be_reference(name: &str) -> bool {
+    const WORDS: [&str; 15] = [
+        "white",
+        "dark",
+        "ref",
+        "reference",
+        "wref",
+        "dref",
+        "wr",
+        "dr",
+        "spectralon",
+        "flat",
+        "flatfield",
+        "panel",
+        "whitepanel",
+        "tile",
+        "darkframe",
+    ];
+    let stem = bare_stem(name);
+    words_of(name).iter().any(|word| WORDS.contains(&word.as_str()))
+        || ["white", "dark", "reference"].iter().any(|word| stem.starts_with(word) || stem.ends_with(word))
+}
+
 /// Returns the letters and digits of a file's name without its ending, in small letters.
 pub(super) fn bare_stem(name: &str) -> String {
     bare(name.rsplit_once('.').map_or(name, |(stem, _)| stem))
@@ -72,6 +99,18 @@ pub(super) fn notes_of_companions(path: &Path) -> impl Iterator<Item = String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn cubes_that_may_be_references_are_known_by_a_word() {
+        for name in
+            ["white_panel.hdr", "calibration_white.hdr", "WR.hdr", "Spectralon.hdr", "451_whiteTile.hdr", "flat.hdr"]
+        {
+            assert!(may_be_reference(name), "{name}");
+        }
+        for name in ["451.hdr", "flatland.hdr", "drone.hdr"] {
+            assert!(!may_be_reference(name), "{name}");
+        }
+    }
 
     #[test]
     fn references_are_known_by_their_names() {

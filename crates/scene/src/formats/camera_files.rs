@@ -406,8 +406,24 @@ fn n_samples(n: f64, name: &str) -> Result<usize, String> {
 }
 
 /// Names of lists of coefficients of a distortion.
-const LISTS: [&str; 8] =
-    ["distortion", "distcoeff", "dist", "coeffs", "distcoeffs", "distortioncoefficients", "distortioncoeffs", "d"];
+const LISTS: [&str; 16] = [
+    "distortion",
+    "distcoeff",
+    "dist",
+    "coeffs",
+    "distcoeffs",
+    "distortioncoefficients",
+    "distortioncoeffs",
+    "d",
+    "distortioncoeff",
+    "distortionparams",
+    "distortionparameters",
+    "distortionvector",
+    "distcoef",
+    "distcoefs",
+    "disto",
+    "kc",
+];
 
 /// Whether the file names a model of fisheyes.
 fn is_of_fisheye(keys: &mut Keys) -> Result<bool, String> {
@@ -416,24 +432,39 @@ fn is_of_fisheye(keys: &mut Keys) -> Result<bool, String> {
         |name: &str| if LISTS.contains(&bare(name).as_str()) { numbers_of(keys.get(name)?, name).ok() } else { None };
     let own = keys.names().find_map(list);
     let is_zero = own.is_some_and(|own| own.iter().all(|v| *v == 0.0));
-    for name in ["camera_model", "distortion_model", "model", "type"] {
-        let Some(model) = keys.get(name).and_then(Value::as_str).map(str::to_owned) else { continue };
+    const MODELS: [&str; 11] = [
+        "cameramodel",
+        "distortionmodel",
+        "model",
+        "type",
+        "lensmodel",
+        "lenstype",
+        "modeltype",
+        "distortiontype",
+        "projection",
+        "projectiontype",
+        "projectionmodel",
+    ];
+    for called in MODELS {
+        let Some(name) = keys.names().find(|name| bare(name) == called).map(str::to_owned) else { continue };
+        let Some(model) = keys.get(&name).and_then(Value::as_str).map(str::to_owned) else { continue };
         match is_fisheye(&model, is_zero) {
             Some(is_fisheye) => {
                 is_any |= is_fisheye;
-                keys.take(name);
+                keys.take(&name);
             }
-            // Who made the camera may stand there as well, which is named.
-            None if ["model", "type"].contains(&name) && !is_model(&model) => {}
+            // Who made the camera or the lens may stand there as well, which is named.
+            None if !["cameramodel", "distortionmodel"].contains(&called) && !is_model(&model) => {}
             None => return Err(unknown_model(&model)),
         }
     }
     // A sample of OpenCV writes 1 or 0.
-    for name in ["is_fisheye", "fisheye_model"] {
+    for called in ["isfisheye", "fisheyemodel", "fisheye"] {
+        let Some(name) = keys.names().find(|name| bare(name) == called).map(str::to_owned) else { continue };
         let is = |own: &Value| own.as_bool().or(own.as_f64().map(|own| own != 0.0));
-        if let Some(is_fisheye) = keys.get(name).and_then(is) {
+        if let Some(is_fisheye) = keys.get(&name).and_then(is) {
             is_any |= is_fisheye;
-            keys.take(name);
+            keys.take(&name);
         }
     }
     Ok(is_any)
@@ -487,8 +518,8 @@ fn distortion_of(keys: &mut Keys, is_fisheye: bool, is_nerf: bool) -> Result<Dis
         k[place] = number(keys, &[name])?.unwrap_or(0.0);
     }
     for (names, places) in [
-        (["k", "radial", "radialdistortion"], &[0, 1, 4, 5, 6, 7][..]),
-        (["p", "tangential", "tangentialdistortion"], &[2, 3]),
+        (["k", "radial", "radialdistortion", "radialcoeffs"], &[0, 1, 4, 5, 6, 7][..]),
+        (["p", "tangential", "tangentialdistortion", "tangentialcoeffs"], &[2, 3]),
     ] {
         // A text says something else, and so does a matrix.
         let is_list = |own: &&str| names.contains(&bare(own).as_str()) && keys.get(own).is_some_and(Value::is_array);

@@ -38,6 +38,25 @@ fn unknown_keys_are_named() {
     assert_eq!(read(&in_samples, 500, 741).unwrap().notes, [""; 0]);
 }
 
+#[test]
+fn models_and_lists_are_known_however_they_are_called() {
+    let of = |more: &str| {
+        let text = format!(r#"{{"w":640,"h":480,"fx":525,"fy":526,"cx":320,"cy":240,{more}}}"#);
+        let read = read(&text, 480, 640).unwrap();
+        (read.distortion, read.notes)
+    };
+    let fisheye = of(r#""k1":0.1,"k2":0.2,"is_fisheye":true"#);
+    for model in [r#""projection":"fisheye""#, r#""lensModel":"equidistant""#, r#""fisheye":true"#, r#""isFisheye":1"#]
+    {
+        assert_eq!(of(&format!(r#""k1":0.1,"k2":0.2,{model}"#)), fisheye, "{model}");
+    }
+    let polynomial = of(r#""k1":0.1,"k2":0.2,"p1":0.01,"p2":0.02,"k3":0.3"#);
+    for name in ["disto", "kc", "distortion_params", "dist_coef"] {
+        assert_eq!(of(&format!(r#""{name}":[0.1,0.2,0.01,0.02,0.3]"#)), polynomial, "{name}");
+    }
+    assert_eq!(of(r#""radial_coeffs":[0.1,0.2,0.3],"p1":0.01,"p2":0.02"#), polynomial);
+}
+
 /// What a tester's files had that was dropped or refused with the wrong words.
 #[test]
 fn keys_that_stand_twice_and_lists_of_items_are_seen() {

@@ -100,6 +100,7 @@ pub(super) fn read_chart(path: &Path) -> Result<Cube, SceneError> {
         wavelengths_nm: Some(wavelengths_nm),
         quantity: Some(FileQuantity::Reflectance),
         unit: None,
+        packed: None,
         called: None,
         notes,
     })

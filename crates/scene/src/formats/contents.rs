@@ -224,6 +224,8 @@ pub(super) struct Cube {
     pub(super) quantity: Option<FileQuantity>,
     /// The unit of light that the file states, and its words.
     pub(super) unit: Option<(LightUnit, String)>,
+    /// The factor that the file states of its numbers, which they have.
+    pub(super) packed: Option<f64>,
     /// The name of its array.
     pub(super) called: Option<String>,
     pub(super) notes: Vec<String>,
@@ -242,6 +244,13 @@ impl Cube {
         let order = ascending(path, &wavelengths_nm, 0..wavelengths_nm.len())?;
         let unit = self.unit(path, options)?;
         let (level, what) = self.level(path, options, unit)?;
+        if let (Some(factor), Some(scale)) = (self.packed, options.reading.scale)
+            && (scale / factor - 1.0).abs() < 1e-6
+        {
+            let reason = format!("its numbers have the factor {factor} that it states: expected it without --scale");
+            return Err(SceneError::Units { file: path.to_owned(), reason });
+        }
+        let what = self.packed.map_or(what.clone(), |factor| format!("{what}, by the factor {factor} that it states"));
         self.notes.extend(self.note_of_name(path, options));
         self.notes.extend(self.note_of_kind(path, unit.is_some()));
         let values = |reason: SpectrumError| SceneError::Values { file: path.to_owned(), reason };
@@ -376,6 +385,16 @@ impl Cube {
             let understood = if LightUnit::lacks_wavelength(words) { ", a nanometre understood" } else { "" };
             return Ok((1.0, format!("radiance in {}{understood}", short(words))));
         }
+        // One number says what white is: that of the file, or the one told.
+        if let (Some(factor), Some(level)) = (self.packed, options.white_level) {
+            if (level * factor - 1.0).abs() > 1e-6 {
+                return units(&format!(
+                    "it states a factor of {factor} on its numbers, by which they are no codes, and a white level of {level} says \
+                     something else: expected it without --white-level, or --scale"
+                ));
+            }
+            return Ok((1.0, format!("reflectance, {level} being a perfect white")));
+        }
         match (options.white_level, self.top) {
             (Some(level), _) => Ok((level, format!("reflectance, {level} being a perfect white"))),
             (None, Some(top)) if reading.scale.is_none() => {
@@ -411,4 +430,37 @@ pub(super) fn straightened_depth(plane: &Array2<f32>, how: &Straightened) -> Arr
         let nearest = |v: f64, n: usize| v.round().clamp(0.0, n as f64 - 1.0) as usize;
         plane[(nearest(y, rows), nearest(x, columns))]
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{super::reading::FileReading, *};
+
+    #[test]
+    fn stated_factors_and_those_told_are_applied_once() {
+        let first = |white_level: Option<f64>, scale: Option<f64>| {
+            let cube = Cube {
+                planes: vec![Array2::from_elem((1, 1), 0.5)],
+                top: None,
+                wavelengths_nm: Some(vec![500.0]),
+                quantity: Some(FileQuantity::Reflectance),
+                unit: None,
+                packed: Some(1e-4),
+                called: None,
+                notes: vec![],
+            };
+            let reading = FileReading { scale, ..FileReading::default() };
+            let options = ReadOptions { white_level, reading, ..ReadOptions::default() };
+            let contents = cube.into_contents(Path::new("a.h5"), &options).map_err(|error| error.to_string())?;
+            let Image::Spectral(image) = contents.image else { return Err("no bands".to_owned()) };
+            Ok((image.planes()[0][(0, 0)], contents.what))
+        };
+        for (level, scale) in [(None, None), (Some(10_000.0), None)] {
+            let (number, what) = first(level, scale).unwrap();
+            assert!(number == 0.5 && what.contains("the factor 0.0001"), "{number} {what}");
+        }
+        assert_eq!(first(None, Some(2.0)).unwrap().0, 1.0);
+        assert!(first(Some(100.0), None).unwrap_err().contains("--white-level"));
+        assert!(first(None, Some(1e-4)).unwrap_err().contains("without --scale"));
+    }
 }

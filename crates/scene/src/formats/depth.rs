@@ -125,6 +125,15 @@ pub(super) fn read_depth(path: &Path, words: DepthWords<'_>) -> Result<RawDepth,
             "{name}: its depths are whole numbers, up to {most}, and taken for metres: millimetres are --depth-unit mm"
         )
     }));
+    // Those of renderers and of programs that guess depths go from 0 to 1, whatever they are called.
+    let are_shares = numbers.top.is_none() && unit_m == 1.0 && most > 0.0 && most <= 1.0;
+    notes.extend((are_shares && !is_stated && words.kind.is_none()).then(|| {
+        let name = name_of(path);
+        format!(
+            "{name}: its depths go up to {most:.3}, and are taken for metres: --depth-unit m says so, and --depth-kind if they are those of \
+             a depth buffer or inverse"
+        )
+    }));
     notes.extend(numbers.length_in.filter(|_| words.unit.is_none()).map(|name| {
         let (file, name) = (name_of(path), short(&name));
         format!("{file}: the length in the name '{name}' is not used: --depth-unit says what 1 of its numbers is")
@@ -263,12 +272,57 @@ mod tests {
         for (own, expected) in all.iter().zip([0.5, 2.0, 1.0 / 1.7, 1.0 / 1.4]) {
             assert!((own - expected).abs() < 1e-6, "{all}");
         }
+        for kind in ["buffer:0.5,2", "ndc:0.5,2", "inverse:0.5,2"] {
+            let wrong = read(&[[1, 2, 3, 4]], words(Some("mm"), Some(kind))).unwrap_err().to_string();
+            assert!(wrong.contains("'mm'") && wrong.contains("codes"), "{wrong}");
+        }
         let wrong = read(&[[1001; 4]], words(Some("1000/m"), Some("buffer:0.5,2"))).unwrap_err().to_string();
         assert!(wrong.contains("1001") && wrong.contains("from 0 to 1000"), "{wrong}");
         assert!(read(&[[1; 4]], words(Some("px"), None)).unwrap_err().to_string().contains("disparity"));
         assert!(read(&[[1; 4]], words(Some("mm"), Some("disparity:1"))).is_err());
         assert!(read(&[[1; 4]], words(Some("mm"), Some("inverse"))).is_err());
         assert!(read(&[[3; 4]], words(None, Some("inverse:0.5,2"))).unwrap_err().to_string().contains("alike"));
+    }
+
+    #[test]
+    fn numbers_of_buffers_tell_what_they_count() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.npy");
+        let read = |kind: &str, bytes: &[u8], words: DepthWords<'_>| {
+            fs::write(&path, super::super::npy::tests::npy(kind, false, "(1, 2)", bytes)).unwrap();
+            read_depth(&path, words)
+        };
+        let codes = |codes: [u32; 2]| codes.map(u32::to_le_bytes).concat();
+        let last_24 = 16_777_215;
+        for (own, unit, expected) in [
+            ([last_24, 0], None, None),
+            ([last_24, 0], Some("16777215/m"), Some([2.0, 0.5])),
+            ([last_24, 0], Some("4294967295/m"), Some([0.501_469, 0.5])),
+            ([u32::MAX, 0], None, Some([2.0, 0.5])),
+        ] {
+            let found = read("<u4", &codes(own), words(unit, Some("buffer:0.5,2")));
+            match (found, expected) {
+                (Ok(found), Some(expected_m)) => {
+                    let z_m = found.axial_m(None).unwrap();
+                    assert!(z_m.iter().zip(expected_m).all(|(z_m, own)| (z_m - own).abs() < 1e-6), "{z_m} {unit:?}");
+                }
+                (Err(error), None) => assert!(error.to_string().contains("16777215/m"), "{error}"),
+                (found, _) => panic!("{own:?} {unit:?}: {:?}", found.err()),
+            }
+        }
+        let floats = |floats: [f32; 2]| floats.map(f32::to_le_bytes).concat();
+        let wrong = read("<f4", &floats([0.5, 1.0]), words(Some("1000/m"), Some("buffer:0.5,2"))).err().unwrap();
+        assert!(wrong.to_string().contains("whole numbers up to 1000"), "{wrong}");
+        // Whatever their names, numbers up to 1 may be no metres.
+        for (own, told, is_noted) in [
+            ([0.5, 0.9], DepthWords::default(), true),
+            ([0.5, 0.9], words(Some("m"), None), false),
+            ([0.5, 0.9], words(None, Some("axial")), false),
+            ([0.5, 1.5], DepthWords::default(), false),
+        ] {
+            let notes = read("<f4", &floats(own), told).unwrap().notes;
+            assert_eq!(notes.iter().any(|note| note.contains("taken for metres")), is_noted, "{own:?} {notes:?}");
+        }
     }
 
     #[test]

@@ -19,7 +19,7 @@ pub(super) struct SaidOfDepth {
 
 const DEPTHS: [&str; 4] = ["depth", "depths", "depthmap", "z"];
 const DISTANCES: [&str; 3] = ["distance", "distances", "dist"];
-const RAYS: [&str; 11] = [
+const RAYS: [&str; 12] = [
     "ray",
     "rays",
     "raydepth",
@@ -29,6 +29,7 @@ const RAYS: [&str; 11] = [
     "euclidean",
     "slant",
     "slantrange",
+    "spherical",
     "sight",
     "range",
 ];
@@ -38,20 +39,86 @@ const MIST: &str = "its name says that it is a mist, whose numbers are no length
 const INVERSE: &str = "its name or words say that it holds disparities or inverse distances: expected --depth-kind, as disparity:BASELINE_M or inverse";
 const BUFFER: &str = "its name or words say that it is a depth buffer or holds normalized device coordinates, and no lengths: expected \
                       --depth-kind buffer:NEAR_M,FAR_M (numbers from 0 to 1) or ndc:NEAR_M,FAR_M (from -1), or lengths and their --depth-unit";
+/// What stands beside the word of a depth that has another meaning than a length: of buffers, of inverses and of shares.
+const OF_BUFFERS: [&str; 14] = [
+    "buffer",
+    "buf",
+    "ndc",
+    "gl",
+    "opengl",
+    "hw",
+    "hardware",
+    "nonlinear",
+    "projective",
+    "reversed",
+    "reverse",
+    "hdrp",
+    "urp",
+    "unorm",
+];
+/// Where a renderer counts depths that are no lengths; names of files may be of such things.
+const OF_SPACES: [&str; 4] = ["clip", "device", "window", "screen"];
+const OF_INVERSES: [&str; 13] = [
+    "inv",
+    "rcp",
+    "recip",
+    "reciprocal",
+    "inverted",
+    "nearness",
+    "closeness",
+    "diopter",
+    "diopters",
+    "dioptre",
+    "dioptres",
+    "dpt",
+    "idepth",
+];
+const OF_SHARES: [&str; 17] = [
+    "log",
+    "log2",
+    "log10",
+    "ln",
+    "sqrt",
+    "logarithm",
+    "logarithmic",
+    "rel",
+    "relative",
+    "norm",
+    "normalized",
+    "normalised",
+    "ordinal",
+    "unscaled",
+    "scaleless",
+    "affine",
+    "invariant",
+];
+/// Programs that guess depths without a scale.
+const OF_GUESSES: [&str; 4] = ["midas", "marigold", "leres", "depthanything"];
 const RELATIVE: &str = "its name or words say that its numbers are relative, or logarithms, and no lengths: expected lengths, or --depth-unit or --depth-kind";
 
 impl SaidOfDepth {
-    /// Of an array, a channel, or what a file says of it.
+    /// Of the name of an array or a channel, the last of a path.
+    pub(super) fn of_name(name: &str) -> Self {
+        Self::of(name.rsplit('/').next().unwrap_or(name))
+    }
+
+    /// Of what a file says of an array.
     pub(super) fn of(words: &str) -> Self {
-        let own = words_of(words.rsplit('/').next().unwrap_or(words));
+        let own = words_of(words);
         let has = |known: &[&str]| own.iter().any(|word| known.contains(&word.as_str()));
         let radial = has(&RAYS) || has(&DISTANCES) || has(&["perspective"]);
-        let is_axial = has(&["axial", "axis", "planar", "perpendicular"]) || has_pair(&own, &["image"], &["plane"]);
+        let is_axial =
+            has(&["axial", "axis", "planar", "perpendicular"]) || has_pair(&own, &["image", "to"], &["plane"]);
         let is_radial = if is_axial { Some(false) } else { radial.then_some(true) };
         Self {
             unit_m: unit_of(&own),
             is_radial,
-            lacks: lacks(&own),
+            lacks: lacks(&own).or_else(|| {
+                let is_inverse = ["1/m", "1/z", "1/depth", "m-1", "m^-1", "m⁻¹"].iter().any(|unit| {
+                    words.split([' ', '(', ')', '[', ']', ',', ':']).any(|word| word.eq_ignore_ascii_case(unit))
+                });
+                is_inverse.then_some(INVERSE).or(has_pair(&own, &OF_SPACES, &DEPTHS).then_some(BUFFER))
+            }),
             is_of_depth: has(&DEPTHS) || has(&DISTANCES),
             has_length: (0..own.len()).any(|i| is_counted(&own, i)),
         }
@@ -68,13 +135,15 @@ impl SaidOfDepth {
             words.next_back().is_some_and(|word| known.contains(&word.as_str()))
         };
         const LENGTHS: [&str; 7] = ["depth", "depths", "distance", "distances", "dist", "length", "lengths"];
-        let is_axial = has(&["axial", "planar"]) || has_pair(&own, &["image"], &["plane"]);
+        let is_axial = has(&["axial", "planar"]) || has_pair(&own, &["image", "to"], &["plane"]);
         let radial = has(&["radial", "euclidean", "raydepth", "raylength", "raydistance", "slantrange"])
             || is_last(&DISTANCES)
             || is_last(&["range"])
             || has_pair(&own, &DISTANCES, &["to", "from"])
             || has_pair(&own, &DEPTHS, &["perspective"])
             || has_pair(&own, &["perspective"], &DEPTHS)
+            || has_pair(&own, &["spherical"], &DEPTHS)
+            || has_pair(&own, &["along"], &["ray", "rays"])
             || has_pair(&own, &["ray"], &LENGTHS)
             || has_pair(&own, &LENGTHS, &["ray"]);
         let is_radial = if is_axial { Some(false) } else { radial.then_some(true) };
@@ -99,20 +168,28 @@ pub(super) fn is_called(name: &str, wanted: &str) -> bool {
 /// Returns the words of a name, as `inv`, `depth` and `mm` of `invDepth_mm`, in small letters.
 pub(super) fn words_of(name: &str) -> Vec<String> {
     let mut apart = String::new();
-    for c in name.chars() {
-        // A capital behind a small letter begins a word.
-        if c.is_uppercase() && apart.ends_with(char::is_lowercase) {
+    let all: Vec<char> = name.chars().collect();
+    for (i, c) in all.iter().enumerate() {
+        // A capital behind a small letter begins a word, and so does the last one of several, as in HDRPDepth.
+        let is_behind_capitals = || {
+            let is_small = all.get(i + 1).is_some_and(|next| next.is_lowercase());
+            is_small && i > 1 && all[i - 2..i].iter().all(|before| before.is_uppercase())
+        };
+        if c.is_uppercase() && (apart.ends_with(char::is_lowercase) || is_behind_capitals()) {
             apart.push(' ');
         }
-        apart.push(c);
+        apart.push(*c);
     }
     let words = apart.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty()).map(str::to_lowercase);
-    // A unit may stand without a gap, as in depthmm.
-    let with_unit =
-        |word: &str, name: &str| word.strip_prefix(name).filter(|rest| length_m(rest).is_some()).map(str::to_owned);
-    let parts = |word: String| match ["depth", "z"].iter().find_map(|name| Some((name, with_unit(&word, name)?))) {
-        Some((name, unit)) => vec![(*name).to_owned(), unit],
-        None => vec![word],
+    // What is said of a depth may stand without a gap, as in depthmm and invz.
+    let is_said = |rest: &str| [&OF_BUFFERS[..], &OF_INVERSES, &OF_SHARES].iter().any(|known| known.contains(&rest));
+    let parts = |word: String| {
+        let apart = ["depth", "z"].iter().find_map(|name| {
+            let behind = word.strip_prefix(name).filter(|rest| length_m(rest).is_some() || is_said(rest));
+            let before = word.strip_suffix(name).filter(|rest| is_said(rest));
+            behind.map(|rest| [*name, rest]).or(before.map(|rest| [rest, *name])).map(|parts| parts.map(str::to_owned))
+        });
+        apart.map_or_else(|| vec![word.clone()], Vec::from)
     };
     words.flat_map(parts).collect()
 }
@@ -150,34 +227,29 @@ fn lacks(words: &[String]) -> Option<&'static str> {
         let rest = word.strip_prefix("disp");
         word.contains("disparit") || rest.is_some_and(|rest| rest == "map" || is_number(rest))
     };
-    const INVERSES: [&str; 11] = [
-        "inv",
-        "idepth",
-        "invdepth",
-        "depthinv",
-        "reciprocal",
-        "inverted",
-        "diopter",
-        "diopters",
-        "dioptre",
-        "dioptres",
-        "dpt",
-    ];
-    const RELATIVES: [&str; 9] =
-        ["log", "logarithm", "logarithmic", "rel", "relative", "norm", "normalized", "normalised", "ordinal"];
     if is(&["mist"]) {
         return Some(MIST);
     }
-    if is(&["ndc", "zbuffer", "depthbuffer"]) || has_pair(words, &DEPTHS, &["buffer"]) {
+    let beside_depth = |known: &[&str]| has_pair(words, known, &DEPTHS) || has_pair(words, &DEPTHS, known);
+    let is_buffer = is(&["ndc"])
+        || beside_depth(&OF_BUFFERS)
+        || has_pair(words, &DEPTHS, &["texture"])
+        || has_pair(words, &["non"], &["linear"])
+        || has_pair(words, &OF_SPACES, &["space"]);
+    if is_buffer {
         return Some(BUFFER);
     }
-    if words.iter().any(|word| is_disparity(word) || word.contains("inverse")) || is(&INVERSES) {
+    let is_over = words
+        .windows(3)
+        .any(|own| ["1", "one"].contains(&own[0].as_str()) && own[1] == "over" && DEPTHS.contains(&own[2].as_str()));
+    if words.iter().any(|word| is_disparity(word) || word.contains("inverse")) || is(&OF_INVERSES) || is_over {
         return Some(INVERSE);
     }
-    let is_relative = has_pair(words, &RELATIVES, &DEPTHS)
-        || has_pair(words, &DEPTHS, &RELATIVES)
-        || has_pair(words, &RELATIVES, &DISTANCES)
-        || is(&["logdepth", "reldepth"]);
+    let is_relative = beside_depth(&OF_SHARES)
+        || has_pair(words, &OF_SHARES, &DISTANCES)
+        || has_pair(words, &["to"], &["scale"])
+        || is(&OF_GUESSES)
+        || has_pair(words, &["depth"], &["anything"]);
     is_relative.then_some(RELATIVE)
 }
 
@@ -252,13 +324,15 @@ mod tests {
             "rangeMap",
             "perspective_depth",
             "raylength",
+            "depth_along_ray",
+            "spherical_depth",
         ] {
             assert_eq!(both(name), [Some(true); 2], "{name}");
         }
         for name in ["depth", "z", "depth_0001", "depth_arranged", "X-ray.room"] {
             assert_eq!(SaidOfDepth::of_file(name).is_radial, None, "{name}");
         }
-        for name in ["distance_to_image_plane", "depth_planar", "img_0_DepthPlanar"] {
+        for name in ["distance_to_image_plane", "distance_to_plane", "depth_planar", "img_0_DepthPlanar"] {
             assert_eq!(both(name), [Some(false); 2], "{name}");
         }
         assert_eq!(SaidOfDepth::of("distance along the optical axis").is_radial, Some(false));
@@ -290,10 +364,42 @@ mod tests {
             "zbuffer",
             "depth_buffer_0001",
             "zBuffer",
+            "depth_buf",
+            "gl_depth",
+            "depth_nonlinear",
+            "non-linear depth",
+            "projective_depth",
+            "reversedZ",
+            "reversed_z",
+            "_CameraDepthTexture",
+            "HDRPDepth",
+            "screen_space_depth",
+            "invz",
+            "zinv",
+            "one_over_z",
+            "rcp_depth",
+            "recipDepth",
+            "nearness",
+            "closeness",
+            "depth_unscaled",
+            "depth_up_to_scale",
+            "affine_invariant_depth",
+            "ln_depth",
+            "log10_depth",
+            "sqrt_depth",
+            "midas_0001",
+            "depth_anything_v2",
         ] {
             assert!(SaidOfDepth::of(name).lacks.is_some() && SaidOfDepth::of_file(name).lacks.is_some(), "{name}");
         }
-        for name in ["display", "depth", "log_cabin", "relative_to_the_camera", "norm_room", "dispatch"] {
+        for words in ["clip_z", "deviceDepth", "window depth", "inverse depth (1/m)", "depth [m-1]", "1/z"] {
+            assert!(SaidOfDepth::of(words).lacks.is_some(), "{words}");
+        }
+        for name in ["cam/1/z", "1/depth", "clip/depth", "frame_1_z"] {
+            assert_eq!(SaidOfDepth::of_name(name).lacks, None, "{name}");
+        }
+        for name in ["window_depth", "display", "depth", "log_cabin", "relative_to_the_camera", "norm_room", "dispatch"]
+        {
             assert_eq!(SaidOfDepth::of_file(name).lacks, None, "{name}");
         }
     }

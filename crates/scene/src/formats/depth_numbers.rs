@@ -78,11 +78,11 @@ pub(super) fn depth_numbers(path: &Path, told: Option<&str>) -> Result<Noted<Dep
             let (name, array) = read_npz_plane(path, told)?.told_in(&mut notes);
             let (values, top) = plane_of(path, array)?;
             names = name.clone();
-            DepthNumbers { from: named(&name), unit_m: SaidOfDepth::of(&name).unit_m, ..of(values, top) }
+            DepthNumbers { from: named(&name), unit_m: SaidOfDepth::of_name(&name).unit_m, ..of(values, top) }
         }
         _ if is_of(path, MATLAB_OR_HDF5) => {
             let Plane { name, values, top, unit_m, words } = read_plane(path, told)?.told_in(&mut notes);
-            let named_m = SaidOfDepth::of(&name).unit_m;
+            let named_m = SaidOfDepth::of_name(&name).unit_m;
             if let (Some(unit_m), Some(named_m)) = (unit_m, named_m)
                 && unit_m != named_m
             {
@@ -95,7 +95,7 @@ pub(super) fn depth_numbers(path: &Path, told: Option<&str>) -> Result<Noted<Dep
         }
         "exr" => {
             let DepthChannel { name, plane, kind, frame } = read_depth_exr(path, told)?.told_in(&mut notes);
-            let (from, unit_m) = (format!("channel {}", named(&name)), SaidOfDepth::of(&name).unit_m);
+            let (from, unit_m) = (format!("channel {}", named(&name)), SaidOfDepth::of_name(&name).unit_m);
             names = name;
             DepthNumbers { from, kind, unit_m, frame: Some(frame), ..of(plane, None) }
         }
@@ -125,7 +125,7 @@ pub(super) fn depth_numbers(path: &Path, told: Option<&str>) -> Result<Noted<Dep
     };
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
     // What stands nearest to the numbers counts first.
-    let said = [SaidOfDepth::of(&called), SaidOfDepth::of(&names), SaidOfDepth::of_file(&stem)];
+    let said = [SaidOfDepth::of(&called), SaidOfDepth::of_name(&names), SaidOfDepth::of_file(&stem)];
     if numbers.kind == DepthKind::Axial && said.iter().find_map(|own| own.is_radial) == Some(true) {
         numbers.kind = DepthKind::Radial;
     }

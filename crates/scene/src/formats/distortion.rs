@@ -21,6 +21,13 @@ impl Distortion {
     /// # Errors
     /// When the model has fewer.
     pub(super) fn of_list(list: &[f64], is_fisheye: bool) -> Result<Self, String> {
+        // OpenCV has no lists of so many: three are k1, k2 and k3 elsewhere.
+        if !is_fisheye && [3, 6, 7].contains(&list.len()) && list[2..].iter().any(|v| *v != 0.0) {
+            let n = list.len();
+            return Err(format!(
+                "which {n} coefficients its distortion has is not known: expected 2, 4, 5 or 8 (k1, k2, p1, p2, k3 to k6), or their names"
+            ));
+        }
         fn of<const N: usize>(list: &[f64]) -> Result<[f64; N], String> {
             if list.iter().skip(N).any(|v| *v != 0.0) {
                 return Err(format!("its distortion has more than {N} coefficients"));
@@ -80,5 +87,7 @@ mod tests {
         assert_abs_diff_eq!(x, angle + 0.1 * angle.powi(3) + 0.01 * angle.powi(9), epsilon = 1e-12);
         assert_eq!(Distortion::Fisheye([0.1; 4]).apply((0.0, 0.0)), (0.0, 0.0));
         assert!(Distortion::of_list(&[0.1; 5], true).is_err());
+        assert!([3, 6, 7].iter().all(|n| Distortion::of_list(&vec![0.1; *n], false).is_err()));
+        assert!(Distortion::of_list(&[0.1, 0.2, 0.0], false).is_ok());
     }
 }

@@ -10,7 +10,7 @@ use std::{
 use dioptric_spectrum::{Quantity, SpectralImage, WavelengthGrid};
 
 use super::{
-    belonging::{Reference, bare_stem},
+    belonging::{Reference, bare_stem, may_be_reference},
     camera::CameraFile,
     column_names::{is_no_power, is_no_reflectance},
     contents::{Contents, Image},
@@ -57,11 +57,18 @@ pub(super) fn contents_of_envi(path: &Path, options: &ReadOptions) -> Result<Con
         _ => &[],
     };
     notes.extend(references.iter().flat_map(|reference| reference.notes.clone()));
+    let mut beside = vec![];
     if references.is_empty() {
-        let beside = [Reference::White, Reference::Dark].map(|reference| file.files_beside(reference));
-        let names = beside.into_iter().collect::<Result<Vec<_>, _>>()?.concat();
-        notes.extend(note_of(path, "reference", &names.iter().map(|file| name_of(file)).collect::<Vec<_>>()));
+        let known = [Reference::White, Reference::Dark].map(|reference| file.files_beside(reference));
+        beside = known.into_iter().collect::<Result<Vec<_>, _>>()?.concat();
     }
+    // Others may be references of which the names are not known.
+    let own = bare_stem(&name_of(&file.header_path));
+    beside.extend(headers_beside(&file.header_path)?.into_iter().filter(|path| {
+        let name = name_of(path);
+        may_be_reference(&name) && Reference::of_name(&name, &own).is_none()
+    }));
+    notes.extend(note_of(path, "reference", &beside.iter().map(|file| name_of(file)).collect::<Vec<_>>()));
     notes.extend(file.notes_of_exposures(references));
     if let (Meaning::Light(..), Some(own)) = (&meaning, file.header.reflectance_scale) {
         let name = name_of(path);
@@ -366,6 +373,12 @@ impl EnviFile {
             return Ok((Meaning::Light(factors), format!("radiance in {words}")));
         }
         let level = options.white_level.or(own_level);
+        // Gains and a level that say the same of what is white are applied once.
+        if let (Some(gains), Some(level)) = (&header.gains, level)
+            && gains.iter().all(|gain| (gain * level - 1.0).abs() < 1e-6)
+        {
+            return Ok((Meaning::Reflectance(scale), "reflectance by its gains".to_owned()));
+        }
         if let Some(level) = level {
             return Ok((Meaning::Reflectance(scale / level), format!("reflectance, {level} being a perfect white")));
         }
@@ -484,13 +497,9 @@ impl EnviFile {
 
     /// Returns the headers of references beside this one, in their order: those with its own name, or else all.
     fn files_beside(&self, wanted: Reference) -> Result<Vec<PathBuf>, SceneError> {
-        let folder = self.header_path.parent().filter(|folder| !folder.as_os_str().is_empty());
-        let folder = folder.unwrap_or(Path::new("."));
-        let entries = fs::read_dir(folder).map_err(|error| unreadable(folder, error))?;
         let own = bare_stem(&name_of(&self.header_path));
-        let mut found: Vec<(bool, PathBuf)> = entries
-            .filter_map(|entry| Some(entry.ok()?.path()))
-            .filter(|path| path.extension().is_some_and(|e| e.eq_ignore_ascii_case("hdr")) && *path != self.header_path)
+        let mut found: Vec<(bool, PathBuf)> = headers_beside(&self.header_path)?
+            .into_iter()
             .filter_map(|path| {
                 let found = Reference::of_name(&name_of(&path), &own).filter(|(reference, _)| *reference == wanted);
                 found.map(|(_, is_own)| (!is_own, path))
@@ -520,6 +529,18 @@ impl EnviFile {
         reference.notes.extend(note_of(&self.header_path, "reference", &others));
         Ok(Some(reference))
     }
+}
+
+/// Returns the other headers in the folder of one, by name.
+fn headers_beside(header_path: &Path) -> Result<Vec<PathBuf>, SceneError> {
+    let folder = header_path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let entries = fs::read_dir(folder).map_err(|error| unreadable(folder, error))?;
+    let mut found: Vec<PathBuf> = entries
+        .filter_map(|entry| Some(entry.ok()?.path()))
+        .filter(|path| path.extension().is_some_and(|e| e.eq_ignore_ascii_case("hdr")) && path != header_path)
+        .collect();
+    found.sort();
+    Ok(found)
 }
 
 /// Returns the file of numbers: `a.raw` and the like beside `a.hdr`, or `a.raw` beside `a.raw.hdr`.

@@ -254,12 +254,10 @@ fn unit_described(description: &str) -> Option<String> {
     if description.to_lowercase().contains("reflect") {
         return None;
     }
-    // What is behind a bracket may be its exponent.
-    let is_end = |at: &usize| {
-        let is_exponent = |c: char| c.is_numeric() || "^*-−⁻+".contains(c);
-        !description[*at..].starts_with(is_exponent)
-    };
-    let ends = description.match_indices([')', ']']).map(|(at, _)| at + 1).filter(is_end).chain([description.len()]);
+    // An exponent behind a bracket belongs to the unit, as in (cm-1)-1.
+    let goes_on = |rest: &str| rest.starts_with(['-', '−', '⁻', '^', '*']);
+    let ends = description.match_indices([')', ']']).map(|(at, _)| at + 1);
+    let ends = ends.filter(|end| !goes_on(&description[*end..])).chain([description.len()]);
     let unit = |end: usize| LightUnit::in_words(&description[..end]);
     let of_radiance = ends.filter_map(unit).find(|(unit, _)| unit.quantity == Quantity::Radiance);
     of_radiance.map(|(_, words)| words.to_owned())
@@ -602,6 +600,13 @@ mod tests {
     const GOOD: &str = "ENVI\n; made by hand\nsamples = 4\nlines   = 3\nbands = 2\nheader offset = 16\ndata type = 12\n\
         interleave = BIL\nbyte order = 1\nWavelength Units = Micrometers\nwavelength = {0.5,\n 0.6,\n}\n\
         reflectance scale factor = 10000.0\n";
+
+    #[test]
+    fn exponents_behind_brackets_belong_to_units() {
+        for words in ["W m⁻² sr⁻¹ (cm⁻¹)⁻¹", "mW m-2 sr-1 (cm-1)-1"] {
+            assert_eq!(unit_described(&format!("calibrated radiance, {words}")).as_deref(), Some(words));
+        }
+    }
 
     #[test]
     fn a_header_is_read() {

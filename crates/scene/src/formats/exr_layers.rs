@@ -182,6 +182,7 @@ pub(super) fn read_layers(path: &Path) -> Result<(Head, Vec<RawLayer>), SceneErr
         .map_err(|error| unreadable(path, explain(&error)))?;
     let layers: Result<Vec<_>, _> = image.layer_data.into_iter().map(|layer| raw_layer(path, layer)).collect();
     let mut layers = layers?;
+    tell_apart(&mut layers);
     let Some(first) = layers.first_mut() else { return Err(unreadable(path, "it has no layer")) };
     // What the crate takes for an attribute of all layers by its type.
     let of_all = image.attributes.other.keys().map(|name| (words_of(name), ())).collect();
@@ -204,6 +205,28 @@ pub(super) fn read_layers(path: &Path) -> Result<(Head, Vec<RawLayer>), SceneErr
         chromaticities: image.attributes.chromaticities.filter(|own| !are_srgb(own)),
     };
     Ok((head, layers))
+}
+
+/// Puts the name of its part before each channel that has the name of one of another part seen by the same eye.
+fn tell_apart(layers: &mut [RawLayer]) {
+    let all: Vec<(usize, Option<String>, String)> = layers
+        .iter()
+        .enumerate()
+        .flat_map(|(i, layer)| layer.planes.iter().map(move |(name, _)| (i, layer.view.clone(), name.clone())))
+        .filter(|(i, _, name)| {
+            let is_band = band_name::parse(name).is_some() || band_name::layer_of(name).is_some();
+            name.contains('.') && !is_band && layers[*i].name != HIDDEN_LAYER
+        })
+        .collect();
+    for (i, layer) in
+        layers.iter_mut().enumerate().filter(|(_, layer)| !layer.name.is_empty() && layer.name != HIDDEN_LAYER)
+    {
+        for (name, _) in &mut layer.planes {
+            if all.iter().any(|(own, view, other)| *own != i && *view == layer.view && other == name) {
+                *name = format!("{}.{name}", layer.name);
+            }
+        }
+    }
 }
 
 fn raw_layer(path: &Path, layer: Layer<AnyChannels<FlatSamples>>) -> Result<RawLayer, SceneError> {

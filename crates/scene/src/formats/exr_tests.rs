@@ -140,6 +140,28 @@ fn attributes_of_ours_that_cannot_be_are_named() {
 }
 
 #[test]
+fn parts_of_channels_of_one_name_are_asked_for_by_theirs() {
+    let file = file();
+    let part = |name: &str, light: f32| {
+        let channels = ["Combined.R", "Combined.G", "Combined.B", "Depth.Z"];
+        let list: SmallVec<[_; 4]> = channels.iter().map(|name| AnyChannel::new(*name, flat(light))).collect();
+        let attributes = LayerAttributes { layer_name: Some(Text::from(name)), ..LayerAttributes::default() };
+        Layer::new((2, 2), attributes, Encoding::FAST_LOSSLESS, AnyChannels::sort(list))
+    };
+    let layers = SmallVec::<[_; 2]>::from_vec(vec![part("ViewLayer", 1.0), part("ViewLayer2", 3.0)]);
+    let attributes = exr::prelude::ImageAttributes::with_size((2, 2));
+    Image::from_layers(attributes, layers).write().to_file(&file.path).unwrap();
+    let read = |variable: Option<&str>| {
+        let reading = FileReading { variable: variable.map(str::to_owned), ..FileReading::default() };
+        read_scene(&file.path, &ReadOptions { reading, ..ReadOptions::default() })
+    };
+    assert!(read(None).unwrap_err().to_string().contains("'ViewLayer.Combined', 'ViewLayer2.Combined'"));
+    for (name, depth_m) in [("ViewLayer.Combined", 1.0), ("ViewLayer2.Combined", 3.0)] {
+        assert_eq!(read(Some(name)).unwrap().require_depth().unwrap().range_m(), (depth_m, depth_m));
+    }
+}
+
+#[test]
 fn parts_of_bands_are_one_picture() {
     let file = file();
     let part = |name: &str, channels: Vec<(&str, FlatSamples)>| {

@@ -183,6 +183,7 @@ pub(super) fn read_npz(path: &Path, options: &ReadOptions) -> Result<Cube, Scene
         wavelengths_nm: own,
         quantity: None,
         unit: None,
+        packed: None,
         called: Some(bare(&chosen).to_owned()),
         notes,
     })

@@ -19,6 +19,8 @@ const NONES: [f32; 8] = [65_535.0, -1.0, -99.0, -999.0, -9999.0, -99_999.0, -32_
 const LARGEST_HALF: f32 = 65_504.0;
 /// The largest numbers of types of whole numbers, which stand for none in arrays of these.
 const TOPS: [f64; 4] = [32_767.0, 65_535.0, 2_147_483_647.0, 4_294_967_295.0];
+/// The last code of 24 bits.
+const OF_24_BITS: f32 = 16_777_215.0;
 
 /// Depths as they stand in a file.
 pub(super) struct RawDepth {
@@ -77,11 +79,11 @@ impl RawDepth {
         if is_disparity && words.unit.is_none() {
             self.unit = DepthUnit::Samples(1.0);
         }
-        let is_inverse = matches!(self.kind, DepthKind::Inverse);
+        let is_inverse = !(is_disparity || matches!(self.kind, DepthKind::Axial | DepthKind::Radial));
         let is_length = |unit: &str| ["mm", "cm"].iter().any(|length| unit.ends_with(length));
         let fits = match self.unit {
             DepthUnit::Samples(_) => is_disparity,
-            // An inverse distance is so many a metre.
+            // An inverse distance is so many a metre, and a number of a buffer so many codes in place of 1.
             DepthUnit::Metres(_) => !(is_disparity || is_inverse && words.unit.is_some_and(is_length)),
         };
         if fits {
@@ -90,7 +92,7 @@ impl RawDepth {
         Err(SceneError::Setting {
             what: "the unit of the depth",
             value: format!("'{}'", words.unit.unwrap_or_default()),
-            expected: "px or 256/px for a disparity, m or 1000/m for an inverse distance, a length for all else"
+            expected: "px or 256/px for a disparity, m or 1000/m for an inverse distance or so many codes of a buffer, a length for all else"
                 .to_owned(),
         })
     }
@@ -102,6 +104,24 @@ impl RawDepth {
             (_, Some(top)) => top,
             (DepthUnit::Metres(factor) | DepthUnit::Samples(factor), None) => 1.0 / factor,
         };
+        let is_buffer = matches!(self.kind, DepthKind::Buffer { .. } | DepthKind::Ndc { .. });
+        if is_buffer
+            && has_unit
+            && one > 1.0
+            && let Some(other) = self.values.iter().find(|v| v.is_finite() && v.fract() != 0.0)
+        {
+            let reason = format!("it holds {other}, expected whole numbers up to {one}, as --depth-unit says");
+            return Err(unreadable(&self.file, reason));
+        }
+        // Buffers of 24 bits are read back as numbers of 32.
+        let in_24_bits = |v: &f32| !v.is_finite() || v.abs() <= OF_24_BITS;
+        if is_buffer && !has_unit && one > f64::from(OF_24_BITS) && self.values.iter().all(in_24_bits) {
+            let reason = format!(
+                "its numbers have 32 bits, of which 24 hold them all: expected --depth-unit {OF_24_BITS}/m (1 is the last of 24 bits) \
+                 or {one}/m"
+            );
+            return Err(unreadable(&self.file, reason));
+        }
         let ([low, high], [low_m, high_m]) = match self.kind {
             DepthKind::InverseBetween { near_m, far_m } => {
                 let finite = self.values.iter().copied().filter(|v| v.is_finite()).map(f64::from);

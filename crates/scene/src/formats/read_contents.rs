@@ -195,17 +195,19 @@ fn pages_of_tiff(path: &Path, options: &ReadOptions) -> Result<Contents, SceneEr
             }
             notes.extend(stack.page.notes_of_description(path));
             let TiffStack { mut planes, wavelengths_nm, mut top, page } = stack;
-            let (mut quantity, mut unit) = (None, None);
+            let (mut quantity, mut unit, mut packed) = (None, None, page.packed);
             match UnitOf::read(page.unit.as_deref()) {
                 UnitOf::Light(own, words) => unit = Some((own, words)),
                 UnitOf::Reflectance => quantity = Some(FileQuantity::Reflectance),
                 UnitOf::Percent => {
                     planes.iter_mut().for_each(|plane| plane.mapv_inplace(|v| 0.01 * v));
                     (quantity, top) = (Some(FileQuantity::Reflectance), None);
+                    packed = Some(0.01 * packed.unwrap_or(1.0));
                 }
                 UnitOf::Unknown => notes.extend(page.note_of_unit(path)),
             }
-            Cube { planes, top, wavelengths_nm, quantity, unit, called: None, notes }.into_contents(path, options)
+            Cube { planes, top, wavelengths_nm, quantity, unit, called: None, packed, notes }
+                .into_contents(path, options)
         }
     }
 }
@@ -220,7 +222,7 @@ fn of_npy(path: &Path, options: &ReadOptions) -> Result<Contents, SceneError> {
         .map_err(|reason| unreadable(path, reason))?;
     let note = super::axes::note(&array.sides, options.reading.axes.as_deref(), n_bands, true);
     notes.extend(note.map(|note| format!("{}: {note}", name_of(path))));
-    Cube { planes, top: array.top, wavelengths_nm: None, quantity: None, unit: None, called: None, notes }
+    Cube { planes, top: array.top, wavelengths_nm: None, quantity: None, unit: None, called: None, packed: None, notes }
         .into_contents(path, options)
 }
 

@@ -133,13 +133,27 @@ pub(super) fn note_of(file: &Path, kind: &str, names: &[String]) -> Option<Strin
     if names.is_empty() {
         return None;
     }
-    let shown: Vec<String> = names.iter().take(MOST_NAMES).map(|name| format!("'{}'", short(name))).collect();
-    let more = match names.len().saturating_sub(MOST_NAMES) {
+    // Of many what may change numbers stands first, all of it.
+    let is_first = |name: &&String| names.len() > MOST_NAMES && is_of_numbers(name);
+    let (first, rest): (Vec<&String>, Vec<&String>) = names.iter().partition(is_first);
+    let n = MOST_NAMES.max(first.len()).min(names.len());
+    let last_of = |name: &String| match name.rsplit_once('/') {
+        Some((_, last)) if name.chars().count() > MOST_CHARACTERS => short(&format!("…/{last}")),
+        _ => short(name),
+    };
+    let shown: Vec<String> = first.into_iter().chain(rest).take(n).map(|name| format!("'{}'", last_of(name))).collect();
+    let more = match names.len() - n {
         0 => String::new(),
         n => format!(" and {n} more"),
     };
     let (plural, are) = if names.len() == 1 { ("", "is") } else { ("s", "are") };
     Some(format!("{}: its {kind}{plural} {}{more} {are} not used", name_of(file), shown.join(", ")))
+}
+
+/// Whether a name is that of what makes quantities of numbers.
+fn is_of_numbers(name: &str) -> bool {
+    let lower = name.to_lowercase();
+    ["scale", "factor", "gain", "offset", "unit", "slope", "intercept"].iter().any(|word| lower.contains(word))
 }
 
 /// Returns the letters and digits of a name, in small letters.
@@ -309,5 +323,14 @@ mod tests {
         let many = (0..9).map(|i| (format!("{i}\n{}", "x".repeat(99)), ())).collect();
         let note = Stated::new("channel", many).note(file, |_| false).unwrap();
         assert!(note.contains("and 3 more") && note.chars().count() < 400 && !note.contains('\n'), "{note}");
+    }
+
+    #[test]
+    fn what_may_change_numbers_stands_first_of_many() {
+        let names = ["a", "b", "c", "d", "e", "f", "g", "Scalefactor"].map(str::to_owned);
+        let note = note_of(Path::new("x"), "key", &names).unwrap();
+        assert_eq!(note, "x: its keys 'Scalefactor', 'a', 'b', 'c', 'd', 'e' and 2 more are not used");
+        let long = ["HDFEOS/SWATHS/PRS_L1_HCO/Data Fields/VNIR_Cube".to_owned()];
+        assert_eq!(note_of(Path::new("x"), "variable", &long).unwrap(), "x: its variable '…/VNIR_Cube' is not used");
     }
 }

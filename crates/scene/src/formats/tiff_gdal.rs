@@ -93,6 +93,11 @@ impl GdalWords {
         !self.packing.is_empty()
     }
 
+    /// The factor of its first sample, where its numbers are packed.
+    pub(super) fn factor(&self) -> Option<f64> {
+        self.packing.first().map(|own| own[0])
+    }
+
     /// Makes the quantities of the planes' numbers, sample by sample.
     pub(super) fn unpack(&self, planes: &mut [Array2<f32>]) {
         if self.is_packed() {

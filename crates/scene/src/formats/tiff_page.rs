@@ -207,7 +207,7 @@ impl Page {
             descriptions: self.descriptions.clone(),
             called: self.names().chain(self.descriptions.iter()).cloned().collect::<Vec<_>>().join("; "),
             unit: self.gdal.unit.clone().or_else(|| self.descriptions.iter().find_map(|text| unit_of_numbers(text))),
-            is_packed: self.gdal.is_packed(),
+            packed: self.gdal.factor(),
             orientation: self.orientation,
             depth_map: self.depth_map,
         }
@@ -306,8 +306,8 @@ pub(super) struct PageWords {
     pub(super) called: String,
     /// The unit of its numbers.
     pub(super) unit: Option<String>,
-    /// Whether its numbers were packed, so that they are quantities.
-    pub(super) is_packed: bool,
+    /// The factor that made quantities of its numbers, where they were packed.
+    pub(super) packed: Option<f64>,
     orientation: u16,
     pub(super) depth_map: Option<DepthMapTags>,
 }

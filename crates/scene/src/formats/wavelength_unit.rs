@@ -46,7 +46,8 @@ pub(super) fn without_unit(numbers: &[f64]) -> Option<Vec<f64>> {
     if !are_counted(numbers) && all(0.15..20.0) {
         return in_nm("um", numbers);
     }
-    all(150.0..20_000.0).then(|| numbers.to_vec())
+    let are_angstrom = !numbers.is_empty() && numbers.iter().all(|number| *number >= MAYBE_ANGSTROM);
+    (all(150.0..20_000.0) && !are_angstrom).then(|| numbers.to_vec())
 }
 
 /// Whether numbers count bands, from 0 or 1, or are those of some of them, as 2, 3, 4 and 8 of a satellite.
@@ -260,8 +261,12 @@ mod tests {
         assert_eq!(of(None, &[1.0, 2.0, 3.0]), Ok(None));
         assert_eq!(of(None, &[2.0, 3.0, 4.0, 8.0]), Ok(None));
         assert_eq!(of(Some("THz"), &[599.584_916]).map(|list| list.map(|list| list[0].round())), Ok(Some(500.0)));
-        for (unit, numbers) in [(None, [22_222.0, 15_384.0]), (Some("zorp"), [1.0, 2.0]), (Some("um"), [450.0, 550.0])]
-        {
+        for (unit, numbers) in [
+            (None, [22_222.0, 15_384.0]),
+            (None, [4500.0, 6200.0]),
+            (Some("zorp"), [1.0, 2.0]),
+            (Some("um"), [450.0, 550.0]),
+        ] {
             assert!(of(unit, &numbers).unwrap_err().contains("'waves'"), "{unit:?}");
         }
     }

@@ -291,7 +291,9 @@ fn cube_of(path: &Path, file: &MatFile, name: &str, reading: &FileReading) -> Re
     }
     let top = (is_integer && percent == 1.0).then(|| numbers.top());
     let unit = if let UnitOf::Light(unit, text) = unit { Some((unit, text)) } else { None };
-    Ok(NumberCube { planes, top, wavelengths_nm: own, quantity, unit, called: Some(last_part(name).to_owned()), notes })
+    let packed = Some(percent * packing.scale).filter(|_| packing.is_packed() || percent != 1.0);
+    let called = Some(last_part(name).to_owned());
+    Ok(NumberCube { planes, top, wavelengths_nm: own, quantity, unit, called, packed, notes })
 }
 
 /// What the unit of numbers says that they are.

@@ -91,7 +91,7 @@ pub(super) enum Value {
 /// How numbers are packed, and of what unit they are.
 pub(super) struct Packing<'a> {
     attributes: &'a [Attribute],
-    scale: f64,
+    pub(super) scale: f64,
     offset: f64,
     missing: Vec<f64>,
     /// The number of a perfect white (`Scale_Factor` of NEON, by which numbers are divided).
