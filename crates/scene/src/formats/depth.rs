@@ -9,7 +9,7 @@ use super::{
     belonging::notes_of_companions,
     camera_files::beside,
     contents::{MATLAB_OR_HDF5, is_of},
-    depth_names::SaidOfDepth,
+    depth_names::{SaidOfDepth, may_be_of_a_buffer},
     depth_numbers::{DepthNumbers, depth_numbers},
     raw_depth::{DepthWords, RawDepth},
     reading::{DepthKind, DepthUnit},
@@ -127,11 +127,12 @@ pub(super) fn read_depth(path: &Path, words: DepthWords<'_>) -> Result<RawDepth,
     }));
     // Those of renderers and of programs that guess depths go from 0 to 1, whatever they are called.
     let are_shares = numbers.top.is_none() && unit_m == 1.0 && most > 0.0 && most <= 1.0;
-    notes.extend((are_shares && !is_stated && words.kind.is_none()).then(|| {
-        let name = name_of(path);
+    let is_asked = are_shares || may_be_of_a_buffer(&name_of(path));
+    notes.extend((is_asked && !is_stated && words.kind.is_none()).then(|| {
+        let (name, most_m) = (name_of(path), f64::from(most) * unit_m);
         format!(
-            "{name}: its depths go up to {most:.3}, and are taken for metres: --depth-unit m says so, and --depth-kind if they are those of \
-             a depth buffer or inverse"
+            "{name}: its depths go up to {most_m:.3} m, and are taken for lengths: --depth-unit says so, and --depth-kind if they are those \
+             of a depth buffer or inverse"
         )
     }));
     notes.extend(numbers.length_in.filter(|_| words.unit.is_none()).map(|name| {
@@ -321,8 +322,9 @@ mod tests {
             ([0.5, 1.5], DepthWords::default(), false),
         ] {
             let notes = read("<f4", &floats(own), told).unwrap().notes;
-            assert_eq!(notes.iter().any(|note| note.contains("taken for metres")), is_noted, "{own:?} {notes:?}");
+            assert_eq!(notes.iter().any(|note| note.contains("taken for lengths")), is_noted, "{own:?} {notes:?}");
         }
+        assert!(may_be_of_a_buffer("device_depth.png") && !may_be_of_a_buffer("window_1_depth.png"));
     }
 
     #[test]

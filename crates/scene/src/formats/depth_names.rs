@@ -157,6 +157,11 @@ impl SaidOfDepth {
     }
 }
 
+/// Whether the name of a file may be that of a depth buffer, or of what it shows.
+pub(super) fn may_be_of_a_buffer(file: &str) -> bool {
+    has_pair(&words_of(file), &OF_SPACES, &DEPTHS)
+}
+
 /// Whether an array is called so, whatever unit of length and number stand with it, as in `depth_mm`.
 pub(super) fn is_called(name: &str, wanted: &str) -> bool {
     let bare = |name: &str| -> Vec<String> {
