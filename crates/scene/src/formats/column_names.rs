@@ -53,8 +53,8 @@ const WORDS: [&str; 24] = [
     "fnu",
     "abs",
 ];
-/// Words of how far numbers spread.
-const SPREADS: [&str; 7] = ["sd", "stdev", "stddev", "sem", "rmse", "variance", "uncertainty"];
+/// Words of how far numbers spread, and of arbitrary units.
+const SPREADS: [&str; 8] = ["sd", "stdev", "stddev", "sem", "rmse", "variance", "uncertainty", "au"];
 /// What may stand beside these in the name of a quantity.
 const BESIDE: [&str; 10] = ["r", "t", "i", "a", "u", "nm", "sample", "reflectance", "transmittance", "value"];
 /// Parts of the names of shares, and of powers of which it is not known a what.
@@ -78,7 +78,7 @@ const NO_REFLECTANCES: [&str; 14] = [
     " a u ",
 ];
 /// Whole names of what is made of reflectances.
-const TURNED: [&str; 5] = ["1-r", "1/r", "km", "std", "loss"];
+const TURNED: [&str; 6] = ["1-r", "1/r", "km", "std", "loss", "error"];
 /// Shares, and what stands behind their names where 1 is no perfect white.
 const SHARES: [&str; 3] = ["reflectance", "transmittance", "albedo"];
 const SCALES: [&str; 8] = ["*1", "×1", "x1", "/1", "0-10", "0-255", "0-4095", "0-65535"];

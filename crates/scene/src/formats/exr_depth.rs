@@ -34,6 +34,7 @@ pub(super) fn depth_name<'a>(names: impl Iterator<Item = &'a str>, prefix: &str)
         // An eye may stand behind it.
         let depth = prefix.replacen("Combined", "Depth", 1);
         wanted.extend(["Z", "V"].map(|letter| format!("{depth}.{letter}")));
+        wanted.extend(prefix.strip_suffix(".Combined").map(|layer| format!("{layer}.Z")));
     } else if !prefix.is_empty() {
         wanted.push(format!("{prefix}.Z"));
     }
@@ -109,6 +110,7 @@ mod tests {
         // That of the only view layer.
         check(&["A.Depth.Z", "A.Combined.R"], "Composite.Combined", Some("A.Depth.Z"));
         check(&["A.Depth.Z", "B.Depth.Z"], "Composite.Combined", None);
+        check(&["A.Depth.Z", "Composite.Z"], "Composite.Combined", Some("Composite.Z"));
         check(&["A.Depth.Z", "A.Noisy.R"], "", Some("A.Depth.Z"));
         check(&["distance", "Z"], "", Some("Z"));
         check(&["X", "Y", "Z"], "", None);

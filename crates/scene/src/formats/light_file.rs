@@ -89,16 +89,18 @@ fn unit_of_power<'a>(name: &str, comments: impl Iterator<Item = &'a str>) -> Res
         {
             return Ok(unit);
         }
-        // A unit at its end, or any that is not understood.
+        // A unit at its end, behind other words or alone behind a comma.
+        let last = comment.rsplit([',', ';']).next().unwrap_or_default().trim();
+        let is_unit = |words: &str| LightUnit::is_written_in(words) || words == last && words.len() > 2;
         let at_end = LightUnit::of_spectrum(comment)
-            .filter(|(_, before)| LightUnit::is_written_in(comment.get(before.len()..).unwrap_or_default()));
+            .filter(|(_, before)| is_unit(comment.get(before.len()..).unwrap_or_default().trim()));
         if let Some((unit, _)) = at_end {
             return Ok(unit);
         }
-        if let Some(word) = comment.split([' ', '\t', ',', ';']).find(|word| LightUnit::is_strange(word)) {
+        if LightUnit::is_written_so(last) {
             return Err(format!(
                 "its comment says '{}', which is no unit of power a nanometre: expected such (W/nm) or photons",
-                short(word)
+                short(last)
             ));
         }
         let lower = comment.to_lowercase();
@@ -245,6 +247,9 @@ mod tests {
             "# spectral irradiance, umol/m2/s/nm\n400 400\n500 1000\n800 800\n",
             "nm,µE m-2 s-1 nm-1\n400, 400\n500, 1000\n800, 800\n",
             "nm,PHOTLAM\n400, 400\n500, 1000\n800, 800\n",
+            "# spectral irradiance, uJy\n400 160000\n500 500000\n800 640000\n",
+            "# spectral irradiance, W m**-2 (cm**-1)**-1\n400 160000\n500 500000\n800 640000\n",
+            "# spectral irradiance, micromol/m2/s/nm\n400 400\n500 1000\n800 800\n",
             "# phot/s/cm2/nm\n400 400\n500 1000\n800 800\n",
             "# bought 2020/11/28, 3 mW/cm2 in all, see http://a.b/c\n400 1\n500 2\n800 1\n",
             "\u{feff}Å, W\n4000, 1\n5000, 2\n8000, 1\n",
@@ -271,6 +276,8 @@ mod tests {
             ("nm,photons/s/0.1%BW\n400, 1\n500, 2\n", "'photons/s/0.1%BW' is no power"),
             ("# units: #/s/m2/nm\n400 1\n500 2\n", "'#/s/m2/nm' is no power"),
             ("# lamp, W/m2/1/cm\n400 1\n500 2\n", "'W/m2/1/cm', which is no unit"),
+            ("# spectral irradiance, 1/s/m2/nm\n400 1\n500 2\n", "'1/s/m2/nm', which is no unit"),
+            ("# spectral irradiance, W/m2 cm-1\n400 1\n500 2\n", "'W/m2 cm-1', which is no unit"),
             ("# Units: counts\n400 1\n500 2\n", "'counts' is no power"),
             ("# dB\n400 1\n500 2\n", "'dB' is no power"),
             ("# reflectance of white tile\n400 1\n500 2\n", "'reflectance of white tile'"),

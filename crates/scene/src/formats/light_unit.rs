@@ -58,12 +58,11 @@ impl LightUnit {
         is_quotient(&symbols) || words.any(|word| is_power(word) || is_quotient(word))
     }
 
-    /// Whether a word of a comment is a unit of watts or photons, or of what counts them, that is not understood.
-    pub(super) fn is_strange(word: &str) -> bool {
-        let symbols = symbols(word);
-        let counts = Sum::of(symbols.split('/').next().unwrap_or_default());
-        let is_of_light = counts.is_some_and(|sum| sum.watts != 0 || sum.photons != 0);
-        Self::is_written_in(word) && is_of_light && Self::of_spectrum(word).is_none()
+    /// Whether a text is written as a unit is and holds no other words than may be symbols: of three letters.
+    pub(super) fn is_written_so(text: &str) -> bool {
+        let symbols = symbols(text);
+        let mut words = symbols.split(|c: char| !c.is_alphabetic());
+        Self::is_written_in(text) && words.all(|word| word.chars().count() <= 3 || Sum::of(word).is_some())
     }
 
     /// That of photons a nanometre of a relative spectrum.
@@ -124,8 +123,8 @@ fn endings(text: &str) -> impl Iterator<Item = (&str, &str)> {
 fn symbols(text: &str) -> String {
     let raised = [('⁻', "-"), ('⁰', "0"), ('¹', "1"), ('²', "2"), ('³', "3")];
     let text = raised.iter().fold(text.to_owned(), |text, (from, to)| text.replace(*from, to));
-    // Exponents of LaTeX.
-    let text = text.replace(['{', '}', '$'], "");
+    // Exponents of LaTeX and of programs.
+    let text = text.replace(['{', '}', '$'], "").replace("**", "^");
     let mut result = String::new();
     let mut is_square = false;
     let mut rest = text.as_str();
@@ -146,6 +145,11 @@ fn symbols(text: &str) -> String {
                 is_square = true;
                 continue;
             }
+            "mole" | "moles" => "mol",
+            "millimol" | "millimole" | "millimoles" => "mmol",
+            "micromol" | "micromole" | "micromoles" => "umol",
+            "nanomol" | "nanomole" | "nanomoles" => "nmol",
+            "microeinstein" | "microeinsteins" => "uE",
             "watt" | "watts" => "W",
             "milliwatt" | "milliwatts" => "mW",
             "microwatt" | "microwatts" => "uW",
