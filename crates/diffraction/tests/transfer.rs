@@ -206,7 +206,7 @@ fn strehl_ratio_of_defocus_is_its_closed_form_to_a_thousandth() {
     }
 }
 
-/// An opening with straight edges leaves 1 − f/f_c along each of them: cells that the edges cut count by the squares of their shares where
+/// An opening with straight edges leaves 1 − f/fc along each of them: cells that the edges cut count by the squares of their shares where
 /// they meet themselves, which takes a third of a cell of the 487 across.
 #[test]
 fn slits_have_the_modulation_of_their_width() {

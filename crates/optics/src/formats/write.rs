@@ -246,12 +246,13 @@ impl LensFile {
     pub fn left_out(&self, extension: &str) -> Vec<String> {
         let holds_use = matches!(extension, "ron" | "zmx" | "seq");
         let is_blazed = self.lens.diffractive().iter().any(|phase| phase.blaze.is_some());
+        let states_wavelengths = !self.wavelengths_nm.is_empty() || self.reference_wavelength_nm.is_some();
         let stated = [
             ("its array of microlenses", self.microlens.is_some() && extension != "json"),
             ("the place of the film", self.film_distance_mm.is_some() && !holds_use),
             ("the curvature of the film", self.lens.image_surface().curvature_per_mm != 0.0 && !holds_use),
             ("the distance of the object", self.object_distance_mm.is_some() && !holds_use),
-            ("wavelengths", !(self.wavelengths_nm.is_empty() && self.reference_wavelength_nm.is_none()) && !holds_use),
+            ("wavelengths", states_wavelengths && !holds_use),
             ("fields", !self.fields.is_empty() && !holds_use),
             ("names of surfaces", !self.surface_comments.is_empty() && !holds_use),
             ("comments", !self.comments.is_empty() && !holds_use),
