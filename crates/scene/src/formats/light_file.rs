@@ -93,6 +93,7 @@ fn unit_of_power<'a>(name: &str, comments: impl Iterator<Item = &'a str>) -> Res
         let last = comment.rsplit([',', ';']).next().unwrap_or_default().trim();
         let is_unit = |words: &str| LightUnit::is_written_in(words) || words == last && words.len() > 2;
         let at_end = LightUnit::of_spectrum(comment)
+            .filter(|(_, before)| !LightUnit::is_written_in(before))
             .filter(|(_, before)| is_unit(comment.get(before.len()..).unwrap_or_default().trim()));
         if let Some((unit, _)) = at_end {
             return Ok(unit);
@@ -276,6 +277,7 @@ mod tests {
             ("nm,photons/s/0.1%BW\n400, 1\n500, 2\n", "'photons/s/0.1%BW' is no power"),
             ("# units: #/s/m2/nm\n400 1\n500 2\n", "'#/s/m2/nm' is no power"),
             ("# lamp, W/m2/1/cm\n400 1\n500 2\n", "'W/m2/1/cm', which is no unit"),
+            ("# spectral irradiance, s-1 m-2 nm-1\n400 1\n500 2\n", "'s-1 m-2 nm-1', which is no unit"),
             ("# spectral irradiance, 1/s/m2/nm\n400 1\n500 2\n", "'1/s/m2/nm', which is no unit"),
             ("# spectral irradiance, W/m2 cm-1\n400 1\n500 2\n", "'W/m2 cm-1', which is no unit"),
             ("# Units: counts\n400 1\n500 2\n", "'counts' is no power"),
