@@ -230,7 +230,9 @@ fn lacks(words: &[String]) -> Option<&'static str> {
     let is = |known: &[&str]| words.iter().any(|word| known.contains(&word.as_str()));
     let is_disparity = |word: &String| {
         let rest = word.strip_prefix("disp");
-        word.contains("disparit") || rest.is_some_and(|rest| rest == "map" || is_number(rest))
+        word.contains("disparit")
+            || ["sgbm", "parallax"].contains(&word.as_str())
+            || rest.is_some_and(|rest| rest == "map" || is_number(rest))
     };
     if is(&["mist"]) {
         return Some(MIST);
@@ -253,8 +255,9 @@ fn lacks(words: &[String]) -> Option<&'static str> {
     let is_relative = beside_depth(&OF_SHARES)
         || has_pair(words, &OF_SHARES, &DISTANCES)
         || has_pair(words, &["to"], &["scale"])
-        || is(&OF_GUESSES)
-        || has_pair(words, &["depth"], &["anything"]);
+        || words.last().is_some_and(|word| word == "relative")
+        // Capitals within the names of programs part them.
+        || (1..=3).any(|n| words.windows(n).any(|own| OF_GUESSES.contains(&own.concat().as_str())));
     is_relative.then_some(RELATIVE)
 }
 
@@ -393,6 +396,9 @@ mod tests {
             "log10_depth",
             "sqrt_depth",
             "midas_0001",
+            "MiDaS_out",
+            "LeReS",
+            "adabins_relative",
             "depth_anything_v2",
         ] {
             assert!(SaidOfDepth::of(name).lacks.is_some() && SaidOfDepth::of_file(name).lacks.is_some(), "{name}");
