@@ -30,6 +30,7 @@ mod error;
 mod exit_pupil;
 mod exposure;
 mod files;
+mod flat_field;
 mod frames;
 mod hdr;
 mod highlights;
