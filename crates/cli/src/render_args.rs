@@ -215,6 +215,12 @@ pub(crate) struct LightFieldArgs {
     /// Irradiance that was rendered with this camera, as `irradiance.exr` of `run` or `render` [default: rendered now]
     #[arg(long, value_name = "FILE.exr")]
     pub(crate) irradiance: Option<PathBuf>,
+    /// Frame that was taken behind the array, a DNG file as it left the sensor, or linear light
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["irradiance", "samples"])]
+    pub(crate) frame: Option<PathBuf>,
+    /// Frame of an even white that evens out the other, and in which the array's pitch, turn and offset are found
+    #[arg(long, value_name = "FILE", requires = "frame")]
+    pub(crate) white: Option<PathBuf>,
     /// Samples a pixel, where it is rendered now [default: those of the camera file]
     #[arg(long, value_name = "N")]
     pub(crate) samples: Option<u32>,
@@ -233,6 +239,12 @@ pub(crate) struct LightFieldArgs {
     /// Samples each way that depth is sought over: more for noise, fewer for small objects
     #[arg(long, value_name = "N", default_value_t = 3)]
     pub(crate) radius_px: usize,
+    /// Writes each view as linear light too, with the true depth and disparity of each sample
+    #[arg(long)]
+    pub(crate) exr: bool,
+    /// Writes views and true disparity as the 4D Light Field Benchmark (HCI) lays them out, too
+    #[arg(long)]
+    pub(crate) hci: bool,
     /// Folder for the results
     #[arg(long, short, value_name = "DIR", default_value = "dioptric-lightfield")]
     pub(crate) out: PathBuf,

@@ -63,7 +63,7 @@ pub use film_files::convert_irradiance;
 pub use frame_files::{FrameFile, Frames, LensFacts, Outputs, picture_png, write_frames};
 pub use json::{write_file, write_json};
 pub use keys::{Key, PICTURE, PictureOptions, light_word, white_word};
-pub use light_field::{DepthEstimate, DepthSearch, LightField, ViewGeometry};
+pub use light_field::{ArrayFrame, DepthEstimate, DepthSearch, LightField, ParallelCameras, ViewGeometry};
 pub use lights::{parse_illuminant, parse_white};
 pub use numbers::{number, parse_bytes, parse_directions, parse_numbers, parse_pairs};
 pub use paintings::{PaintingFolder, program_build};

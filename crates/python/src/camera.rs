@@ -3,7 +3,9 @@
 use std::{path::PathBuf, sync::Arc};
 
 use dioptric_analysis::MethodComparison;
-use dioptric_pipeline::{Camera as CameraFile, Given, KeptCamera, RenderEffort, SceneSource, StopSpec, parse_bytes};
+use dioptric_pipeline::{
+    ArrayFrame, Camera as CameraFile, Given, KeptCamera, RenderEffort, SceneSource, StopSpec, parse_bytes,
+};
 use ndarray::Array3;
 use pyo3::{
     IntoPyObjectExt,
@@ -319,22 +321,35 @@ space=None, defect_threshold=None)")]
     /// ----------
     /// views : int, optional
     ///     Along each side of the pupil behind an array; one a pixel across its image without it.
+    /// frame : path, optional
+    ///     A frame that was taken behind the array, a DNG file or an EXR file of linear light; rendered now without it.
+    /// white : path, optional
+    ///     A frame of an even white, which evens out the other and shows where the array is.
     /// progress : bool or callable
     ///     As of `render`.
     ///
     /// Returns
     /// -------
     /// LightField
-    #[pyo3(signature = (*, views=None, progress=None))]
+    #[pyo3(signature = (*, views=None, frame=None, white=None, progress=None))]
     fn light_field(
         &self,
         py: Python<'_>,
         views: Option<&Bound<'_, PyAny>>,
+        frame: Option<PathBuf>,
+        white: Option<PathBuf>,
         progress: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<LightField> {
         let n_views = views.map(|value| count("views", value)).transpose()?;
+        if white.is_some() && frame.is_none() {
+            return Err(wrong("white", "given", "none without a frame"));
+        }
         run(py, &Follower::of(progress)?, |progress, cancel| {
-            Ok(LightField::new(self.kept.light_field(n_views, progress, cancel)?))
+            let Some(frame) = &frame else {
+                return Ok(LightField::new(self.kept.light_field(n_views, progress, cancel)?));
+            };
+            let frame = ArrayFrame::read(frame, white.as_deref())?;
+            Ok(LightField::new(self.kept.decoded_frame(&frame, n_views, progress, cancel)?.0))
         })
     }
 

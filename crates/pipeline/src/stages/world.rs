@@ -3,9 +3,9 @@
 use std::{fs, path::Path, sync::Arc};
 
 use dioptric_backward::{
-    Auxiliary, Bands, Camera, GatheredView, LensCamera, LensCameraSettings, LensOrigin, LightPaths, Pinhole, PixelGrid,
-    RenderSettings, Renderer, Rendering, ViewDetail, auxiliary, gathered_view, layered_depth, write_auxiliary_exr,
-    write_rendering_exr,
+    Auxiliary, Bands, Camera, FilmLine, GatheredView, LensCamera, LensCameraSettings, LensOrigin, LightPaths, Pinhole,
+    PixelGrid, RenderSettings, Renderer, Rendering, ViewDetail, auxiliary, depth_along, gathered_view, layered_depth,
+    write_auxiliary_exr, write_rendering_exr,
 };
 use dioptric_optics::{Lens, glam::DVec2};
 use dioptric_scene::{HiddenLayer, Scene, SceneLight, View};
@@ -437,6 +437,14 @@ impl WorldRender {
     /// When the work is cancelled.
     pub fn auxiliary(&self, cancel: &Cancel) -> Result<Auxiliary, PipelineError> {
         Ok(auxiliary(&self.world, &self.camera, &self.bands.grid, cancel)?)
+    }
+
+    /// Returns the depth of what is met along lines from the film through the array before it, m from the center of the entrance pupil.
+    pub(super) fn depth_along(&self, lines_mm: &[FilmLine], cancel: &Cancel) -> Result<Vec<f32>, PipelineError> {
+        match &self.camera {
+            Camera::Lens(lens) => Ok(depth_along(&self.world, lens, lines_mm, cancel)?),
+            _ => Ok(vec![f32::NAN; lines_mm.len()]),
+        }
     }
 
     /// Writes a picture with its standard errors and its depth, and beside it `auxiliary.exr`; returns the names of the files.
