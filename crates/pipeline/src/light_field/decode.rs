@@ -149,7 +149,7 @@ impl<'a> Raster<'a> {
     }
 
     /// Returns the place of a sample on the array, mm from the element at the offset.
-    fn from_offset_mm(&self, row: usize, column: usize) -> DVec2 {
+    fn sample_place_mm(&self, row: usize, column: usize) -> DVec2 {
         self.step_mm * DVec2::new((self.left + column as i64) as f64, (self.top - row as i64) as f64)
     }
 
@@ -157,7 +157,7 @@ impl<'a> Raster<'a> {
     fn view(&self, plane: &Array2<f32>, from_middle_mm: DVec2) -> Array2<f32> {
         let offset_mm = DVec2::from(self.array.offset_mm);
         Array2::from_shape_fn((self.rows, self.columns), |(row, column)| {
-            let about = elements_about(self.array, self.from_offset_mm(row, column));
+            let about = elements_about(self.array, self.sample_place_mm(row, column));
             let sample = |(from_offset_mm, weight): &(DVec2, f64)| {
                 let (row, column) = self.film.pixel_at(self.behind(offset_mm + *from_offset_mm) + from_middle_mm);
                 if *weight > 0.0 { *weight as f32 * bilinear(plane, row, column) } else { 0.0 }
@@ -171,7 +171,7 @@ impl<'a> Raster<'a> {
         let places = (0..self.rows).flat_map(|row| (0..self.columns).map(move |column| (row, column)));
         places
             .map(|(row, column)| {
-                let array_mm = DVec2::from(self.array.offset_mm) + self.from_offset_mm(row, column);
+                let array_mm = DVec2::from(self.array.offset_mm) + self.sample_place_mm(row, column);
                 FilmLine { film_mm: self.behind(array_mm) + from_middle_mm, array_mm }
             })
             .collect()

@@ -112,7 +112,7 @@ impl ViewGeometry {
 }
 
 impl ParallelCameras {
-    /// Disparity times 1/z − 1/z_f, px m.
+    /// Disparity times the difference of 1/z from that in focus, px m.
     fn px_m(&self) -> f64 {
         1e-3 * self.scale_mm * self.baseline_mm / self.pitch_mm
     }

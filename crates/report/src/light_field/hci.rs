@@ -3,7 +3,7 @@
 //!
 //! `input_CamNNN.png` are the views row by row from the top left, `gt_depth_lowres.pfm` (m) and `gt_disp_lowres.pfm` (px) the truth of the one
 //! in the middle and `…_CamNNN.pfm` of each, and `parameters.cfg` the parallel cameras: with its names a disparity is
-//! baseline_mm · focal_length_mm · max(resolution) / sensor_size_mm · (1/z − 1/focus_distance), z and focus in mm.
+//! `baseline_mm · focal_length_mm · max(resolution) / sensor_size_mm · (1/z − 1/focus_distance)`, z and focus in mm.
 
 use std::{fmt::Write as _, path::Path};
 
