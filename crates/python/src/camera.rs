@@ -176,6 +176,8 @@ impl Camera {
     /// burst : int
     /// bracket_stops : list of float
     ///     Several frames, merged.
+    /// both_gains : bool
+    ///     Whether each pixel is read with both gains of a dual-gain sensor, merged.
     /// interleaved_ratio : float
     ///     Pairs of rows exposed for the chosen time and for one so many times shorter in turn, merged.
     /// interleaved_gain_ratio : float
@@ -206,7 +208,7 @@ scene=None, fov_deg=None, depth_m=None, width_mm=None, distance_mm=None, fill_de
 white_level=None, quantity=None, unit=None, scale=None, scene_wavelengths_nm=None, variable=None, axes=None, \
 no_data=None, depth=None, depth_unit=None, depth_kind=None, depth_variable=None, view=None, panorama=None, illuminant=None, \
 illuminance_lux=None, scene_light=None, mean_luminance_cd_m2=None, mean_lux=None, wavelengths_nm=None, \
-exposure_s=None, analog_gain=None, gain_mode=None, binning=None, temperature_c=None, metering=None, chip_seed=None, noise=None, burst=None, bracket_stops=None, interleaved_ratio=None, \
+exposure_s=None, analog_gain=None, gain_mode=None, binning=None, temperature_c=None, metering=None, chip_seed=None, noise=None, burst=None, bracket_stops=None, both_gains=None, interleaved_ratio=None, \
 interleaved_gain_ratio=None, seed=None, white=None, demosaic=None, denoise=None, highlights=None, \
 lens_corrections=None, color=None, sharpen_px=None, local_tone=None, perspective=None, brightness=None, curve=None, \
 space=None, defect_threshold=None)")]
