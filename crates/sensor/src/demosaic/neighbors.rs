@@ -4,7 +4,7 @@
 //! place. Two neighbors p, q behind filters a, b differ by x_p − x_q = (y_p − y_q) + (r_a − r_b): about a place the mean of such
 //! differences is that of the colors, since the light rises as often as it falls. Each pair of filters has the mean of nine windows about
 //! the pixel, those in which differences agree before others (Kuwahara et al., 1976), and the colors are what fits all pairs best.
-//! A second round weighs each two neighbors by how alike their light y = x − r_c was found. So every pixel tells the light,
+//! Further rounds weigh each two neighbors by how alike their light y = x − r_c was found. So every pixel tells the light,
 //! and each color is y + r_c: exactly, wherever the color does not change within the windows.
 //!
 //! Where windows disagree, the color does change, and the plane of a tent with each pixel's own detail takes over.
@@ -22,7 +22,7 @@ use crate::Tile;
 /// Rows and columns of a block, small enough for the cache.
 const BLOCK: (usize, usize) = (64, 128);
 /// Rounds of means.
-const ROUNDS: usize = 2;
+const ROUNDS: usize = 3;
 /// The least radius of a window, pixels: that of a tent, which lies at the pixel or as far beside it.
 const LEAST_RADIUS: usize = 2;
 /// Neighbors whose light differs by this much, in logarithms, count half.
@@ -30,7 +30,7 @@ const LIGHT_STEP: f32 = 0.2;
 /// Differences of neighbors that vary by less than this, in logarithms, are as good as equal.
 const LEAST_DEVIATION: f32 = 0.01;
 /// Windows that disagree by this much, in logarithms, count half of the pixel's color.
-const COLOR_STEP: f32 = 0.3;
+const COLOR_STEP: f32 = 0.5;
 /// A pixel's neighbors to the right and below, each with its weight: all pairs of neighbors once.
 const NEIGHBORS: [(isize, isize, f32); 4] = [(0, 1, 1.0), (1, 0, 1.0), (1, 1, 0.5), (1, -1, 0.5)];
 
