@@ -94,15 +94,36 @@ impl ImageTexture {
 
     /// Reads a picture that is held within another file, of the kinds that [`read`](Self::read) takes.
     pub(crate) fn of_bytes(bytes: &[u8], encoding: Encoding, wrap: Wrap) -> Result<Self, String> {
+        #[cfg(feature = "gltf")]
+        if bytes.starts_with(b"\xabKTX 20\xbb") {
+            return Self::of_ktx2(bytes, encoding, wrap);
+        }
         let reader = image::ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| e.to_string())?;
         match reader.format() {
-            None => return Err("expected a PNG, JPEG, TGA, TIFF, WebP or EXR picture".to_owned()),
+            None => return Err("expected a PNG, JPEG, TGA, TIFF, WebP, KTX 2 or EXR picture".to_owned()),
             Some(image::ImageFormat::Jpeg) if cfg!(not(feature = "jpeg")) => {
                 return Err("this build cannot read JPEG, expected one with the feature 'jpeg'".to_owned());
             }
             Some(_) => {}
         }
         let picture = dioptric_pictures::decode_within(bytes, TEXEL_BYTES).map_err(|e| e.to_string())?;
+        Self::of_picture(&picture, encoding, wrap)
+    }
+
+    /// Reads a KTX 2 picture packed by Basis Universal.
+    #[cfg(feature = "gltf")]
+    fn of_ktx2(bytes: &[u8], encoding: Encoding, wrap: Wrap) -> Result<Self, String> {
+        use basisu::{DecodeFlags, TargetFormat::Rgba32, Transcoder};
+        let unread = "of KTX 2, expected one packed by Basis Universal as ETC1S or UASTC of 8 bits";
+        let texture = Transcoder::new(bytes).ok().filter(|texture| texture.supports(Rgba32) && !texture.is_video());
+        let texture = texture.ok_or(unread)?;
+        let (columns, rows) = texture.base_dimensions();
+        if u64::from(columns) * u64::from(rows) > MAX_SAMPLES {
+            return Err(format!("{columns} x {rows} samples: expected 1 to 2²⁸"));
+        }
+        let rgba = texture.transcode(0, Rgba32, DecodeFlags::NONE).map_err(|_| unread)?;
+        let rgba = image::DynamicImage::ImageRgba8(image::RgbaImage::from_raw(columns, rows, rgba).ok_or(unread)?);
+        let picture = if texture.has_alpha() { rgba } else { rgba.to_rgb8().into() };
         Self::of_picture(&picture, encoding, wrap)
     }
 

@@ -6,8 +6,8 @@ use dioptric_spectrum::{SmoothReflectance, lanes};
 use glam::{DAffine3, DVec3, Vec2, Vec3};
 
 use crate::{
-    Bsdf, Emission, GroupId, Hit, InstanceId, Light, LightSample, Material, MaterialId, Ray, Receiver, Relief, Shape,
-    ShapeId, SpectralCurve, Texture, TextureId, TriangleMesh, WorldCamera, WorldError,
+    Bsdf, Emission, Film, GroupId, Hit, InstanceId, Light, LightSample, Material, MaterialId, Ray, Receiver, Relief,
+    Shape, ShapeId, SpectralCurve, Texture, TextureId, TriangleMesh, WorldCamera, WorldError,
     group::{Crossing, Group, GroupParts, Instance, Parts, Primitive},
     lights::Lights,
     material::{Surface, Surfaces},
@@ -587,6 +587,20 @@ impl WorldBuilder {
         }
     }
 
+    /// Says what share of the base of glTF's material lets diffuse light through, and its color.
+    pub fn set_behind(&mut self, material: MaterialId, share: TextureId, color: TextureId) {
+        if let Some(surface) = self.surfaces.get_mut(material.0 as usize) {
+            surface.behind = Some([share, color]);
+        }
+    }
+
+    /// Lays a film over the base of glTF's material.
+    pub fn set_film(&mut self, material: MaterialId, film: Film) {
+        if let Some(surface) = self.surfaces.get_mut(material.0 as usize) {
+            surface.film = Some(film);
+        }
+    }
+
     /// Says what the medium that fills shapes of a material takes from light, 1/m. Shapes must be closed, and their material
     /// let light in.
     pub fn set_absorption(&mut self, material: MaterialId, per_m: SpectralCurve) {
@@ -814,6 +828,8 @@ impl WorldBuilder {
         }
         for surface in &self.surfaces {
             let more = surface.relief.map(Relief::texture).into_iter().chain(surface.coverage).chain(surface.glow);
+            let more =
+                more.chain(surface.behind.into_iter().flatten()).chain(surface.film.map(|film| film.thickness_nm));
             for texture in surface.material.textures().into_iter().chain(more) {
                 named("a material", "texture", texture.0, self.textures.len())?;
             }

@@ -54,14 +54,12 @@ const WORDS: &[(&str, &str)] = &[
     ("skins", "inverseBindMatrices:index joints:indices skeleton:index"),
     ("texture", "index:index scale:1 strength:1=0|1 texCoord:index"),
     ("textures", "sampler:index source:index"),
-    (
-        "EXT_meshopt_compression",
-        "buffer:index byteLength:index byteOffset:index byteStride:index count:index fallback:flag \
-         filter:text=NONE|OCTAHEDRAL|QUATERNION|EXPONENTIAL mode:text=ATTRIBUTES|TRIANGLES|INDICES",
-    ),
+    ("EXT_meshopt_compression", MESHOPT),
     ("EXT_mesh_gpu_instancing", "attributes:object"),
     ("EXT_mesh_gpu_instancing.attributes", "*:index"),
     ("EXT_texture_webp", "source:index"),
+    ("KHR_draco_mesh_compression", "attributes:object bufferView:index"),
+    ("KHR_draco_mesh_compression.attributes", "*:index"),
     ("KHR_lights_punctual", "light:index lights:objects"),
     ("KHR_lights_punctual.lights", "color:3=0| intensity:1=0| range:1=0| spot:object type:text"),
     ("KHR_lights_punctual.lights.spot", "innerConeAngle:1=0|1.5708 outerConeAngle:1=0|1.5708"),
@@ -71,9 +69,19 @@ const WORDS: &[(&str, &str)] = &[
         "clearcoatFactor:1=0|1 clearcoatNormalTexture:object clearcoatRoughnessFactor:1=0|1 clearcoatRoughnessTexture:object \
          clearcoatTexture:object",
     ),
+    (
+        "KHR_materials_diffuse_transmission",
+        "diffuseTransmissionColorFactor:3=0|1 diffuseTransmissionColorTexture:object diffuseTransmissionFactor:1=0|1 \
+         diffuseTransmissionTexture:object",
+    ),
     ("KHR_materials_dispersion", "dispersion:1=0|"),
     ("KHR_materials_emissive_strength", "emissiveStrength:1=0|"),
     ("KHR_materials_ior", "ior:1=0|"),
+    (
+        "KHR_materials_iridescence",
+        "iridescenceFactor:1=0|1 iridescenceIor:1=1| iridescenceTexture:object iridescenceThicknessMaximum:1=0| \
+         iridescenceThicknessMinimum:1=0| iridescenceThicknessTexture:object",
+    ),
     (
         "KHR_materials_pbrSpecularGlossiness",
         "diffuseFactor:4=0|1 diffuseTexture:object glossinessFactor:1=0|1 specularFactor:3=0|1 specularGlossinessTexture:object",
@@ -96,8 +104,14 @@ const WORDS: &[(&str, &str)] = &[
     ("KHR_materials_variants.mappings", "material:index variants:indices"),
     ("KHR_materials_variants.variants", ""),
     ("KHR_mesh_quantization", ""),
+    ("KHR_meshopt_compression", MESHOPT),
+    ("KHR_texture_basisu", "source:index"),
     ("KHR_texture_transform", "offset:2 rotation:1 scale:2 texCoord:index"),
 ];
+
+/// The words of buffers packed by meshoptimizer.
+const MESHOPT: &str = "buffer:index byteLength:index byteOffset:index byteStride:index count:index fallback:flag \
+     filter:text=NONE|OCTAHEDRAL|QUATERNION|EXPONENTIAL|COLOR mode:text=ATTRIBUTES|TRIANGLES|INDICES";
 
 /// Whether an extension is read.
 pub(super) fn is_read(extension: &str) -> bool {

@@ -4,6 +4,7 @@
 //! read must be told.
 
 mod accessors;
+mod draco;
 mod json;
 mod materials;
 mod meshes;
@@ -47,9 +48,6 @@ const BASE64: GeneralPurpose = GeneralPurpose::new(
         .with_decode_allow_trailing_bits(true),
 );
 
-/// Extensions that geometry can't be read without.
-const OF_GEOMETRY: [&str; 2] = ["KHR_draco_mesh_compression", "KHR_meshopt_compression"];
-
 /// Reads the default scene.
 pub(super) fn read(path: &Path, place: DAffine3, cancel: &Cancel) -> Result<WorldBuilder, WorldError> {
     let unreadable = |reason: String| WorldError::Unreadable { file: path.to_owned(), reason };
@@ -64,12 +62,6 @@ pub(super) fn read(path: &Path, place: DAffine3, cancel: &Cancel) -> Result<Worl
     if !version.is_some_and(|version| version.starts_with("2.")) {
         let found = version.map_or("no version".to_owned(), |version| format!("version {version}"));
         return Err(unreadable(format!("its asset has {found}, expected 2.0 of glTF")));
-    }
-    let required = list(&root, "extensionsRequired").iter().filter_map(Value::as_str);
-    if let Some(name) = required.into_iter().find(|name| OF_GEOMETRY.contains(name)) {
-        let reason =
-            format!("it needs the extension {name}, which isn't supported; expected a file exported without it");
-        return Err(unreadable(reason));
     }
     let left = Left::out_of(&mut root);
     let mut reader = Reader {
@@ -98,7 +90,8 @@ pub(super) fn read(path: &Path, place: DAffine3, cancel: &Cancel) -> Result<Worl
         reader.buffers.push(data);
     }
     for (number, view) in list(&root, "bufferViews").iter().enumerate() {
-        let Some(packed) = extension(view, "EXT_meshopt_compression") else { continue };
+        let packed = extension(view, "KHR_meshopt_compression").or(extension(view, "EXT_meshopt_compression"));
+        let Some(packed) = packed else { continue };
         let unpacked = meshopt::unpacked(packed, &reader.buffers);
         let unpacked = unpacked.map_err(|reason| reader.fault(format!("packed buffer view {number} {reason}")))?;
         reader.n_bytes += unpacked.0.len() as u64;
@@ -184,10 +177,13 @@ impl Reader<'_> {
         if path.is_file() { path } else { self.folder.join(unescaped(uri).replace('\\', "/")) }
     }
 
-    fn rows(&self, accessor: usize) -> Result<Rows, WorldError> {
+    fn source(&self) -> Source<'_> {
         let most_zeros = 1 << 16 | usize::try_from(self.n_bytes).unwrap_or(usize::MAX).min(1 << 28);
-        let source = Source { root: self.root, buffers: &self.buffers, unpacked: &self.unpacked, most_zeros };
-        source.rows(accessor).map_err(|reason| self.fault(reason))
+        Source { root: self.root, buffers: &self.buffers, unpacked: &self.unpacked, most_zeros }
+    }
+
+    fn rows(&self, accessor: usize) -> Result<Rows, WorldError> {
+        self.source().rows(accessor).map_err(|reason| self.fault(reason))
     }
 
     fn note_left(&mut self, left: Left) {

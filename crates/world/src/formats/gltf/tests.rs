@@ -27,10 +27,14 @@ fn file(count: &str, indices: usize) -> String {
 }
 
 fn read_text(text: &str) -> Result<World, WorldError> {
+    read_with(text, &crate::ReadOptions::default())
+}
+
+fn read_with(text: &str, options: &crate::ReadOptions) -> Result<World, WorldError> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("world.gltf");
     std::fs::write(&path, text).unwrap();
-    crate::read_world(&path, &crate::ReadOptions::default(), &Cancel::new())
+    crate::read_world(&path, options, &Cancel::new())
 }
 
 fn seen(world: &World, [x, y]: [f32; 2]) -> crate::Hit {
@@ -62,8 +66,6 @@ fn ranges_beyond_a_buffer_are_refused() {
     assert!(read_text(&no_accessor).unwrap_err().to_string().contains("accessor 9 is named, of which there are 2"));
     assert!(read_text("{}").unwrap_err().to_string().contains("expected 2.0"));
     assert!(read_text("{\n\"asset\": }").unwrap_err().to_string().contains("line 2"));
-    let draco = file("3", 3).replace("\"scene\":0", r#""scene":0,"extensionsRequired":["KHR_draco_mesh_compression"]"#);
-    assert!(read_text(&draco).unwrap_err().to_string().contains("KHR_draco_mesh_compression"));
 }
 
 #[test]
@@ -411,4 +413,163 @@ fn brushed_metal_spreads_light_along_its_turn() {
     assert!((f64::from(across) / value(fine, rough) - 1.0).abs() < 1e-3, "{across} {}", value(fine, rough));
     let turned = brushed(r#","anisotropyRotation":1.5707963"#);
     assert!((turned[0] / across - 1.0).abs() < 1e-3 && (turned[1] / along - 1.0).abs() < 1e-3, "{turned:?}");
+}
+
+/// A film half a micrometre thick over a black base shows each wavelength its own interference, and half of it half of that.
+#[test]
+fn films_have_the_colors_of_interference() {
+    let with = |factor: f32| {
+        let film = format!(
+            "\"KHR_materials_iridescence\":{{\"iridescenceFactor\":{factor},\"iridescenceIor\":1.4,\"iridescenceThicknessMaximum\":500}}"
+        );
+        let world = extended(&film);
+        assert_eq!(world.notes(), [""; 0]);
+        world
+    };
+    let nm = [420.0, 500.0, 560.0, 640.0];
+    for cos in [1.0_f32, 0.6, 0.3] {
+        let outgoing = Vec3::new((1.0 - cos * cos).sqrt(), 0.0, cos);
+        let albedo = |world: &World| world.bsdf(&seen(world, [0.2, 0.2]), outgoing, &nm).albedo();
+        let [none, half, whole] = [0.0, 0.5, 1.0].map(|factor| albedo(&with(factor)));
+        for (lane, nm) in nm.into_iter().enumerate() {
+            let expected = crate::film::reflectance(cos, 1.4, 0.04, 2.0 * 1.4 * 500.0 / nm);
+            assert!((whole[lane] - expected).abs() < 1e-5, "{nm} nm at {cos}: {} {expected}", whole[lane]);
+            assert!((half[lane] - 0.5 * (none[lane] + expected)).abs() < 1e-5, "{nm} nm at {cos}");
+        }
+    }
+    // A pane with the film lets through what that leaves.
+    let pane = extended(
+        "\"KHR_materials_transmission\":{\"transmissionFactor\":1},\"KHR_materials_iridescence\":{\"iridescenceFactor\":1}",
+    );
+    let white = pane.bsdf(&seen(&pane, [0.2, 0.2]), Vec3::Z, &[550.0]).albedo()[0];
+    assert!((white - crate::film::reflectance(1.0, 1.3, 0.04, 2.0 * 1.3 * 400.0 / 550.0)).abs() < 1e-4, "{white}");
+}
+
+/// A leaf: of what its layer lets in, three quarters go through, green, by Lambert's law; a quarter of its own color comes back.
+#[test]
+fn leaves_let_diffuse_light_through() {
+    let leaf = "\"KHR_materials_diffuse_transmission\":{\"diffuseTransmissionFactor\":0.75,\"diffuseTransmissionColorFactor\":[0,1,0]}";
+    let world = extended(leaf);
+    assert_eq!(world.notes(), [""; 0]);
+    let hit = seen(&world, [0.2, 0.2]);
+    let bsdf = world.bsdf(&hit, Vec3::Z, &[450.0, 540.0, 640.0]);
+    for cos in [1.0_f32, 0.5] {
+        let below = Vec3::new((1.0 - cos * cos).sqrt(), 0.0, -cos);
+        let [blue, green, red] = bsdf.eval(below);
+        let expected = 0.75 * 0.96 * cos / std::f32::consts::PI;
+        assert!((green / expected - 1.0).abs() < 0.05, "{green} {expected}");
+        assert!(blue < 0.2 * green && red < 0.2 * green, "{blue} {green} {red}");
+    }
+    // Where both are there, what goes through straight takes from the diffuse.
+    let clear = extended(&format!("{leaf},\"KHR_materials_transmission\":{{\"transmissionFactor\":1}}"));
+    let below = clear.bsdf(&seen(&clear, [0.2, 0.2]), Vec3::Z, &[540.0]).eval(Vec3::new(0.9, 0.0, -0.435_89))[0];
+    assert!(below < 0.02, "{below}");
+    // Without an end the index mirrors all.
+    let mirror = extended("\"KHR_materials_ior\":{\"ior\":0}");
+    assert!((mirror.bsdf(&seen(&mirror, [0.2, 0.2]), Vec3::Z, &[540.0]).albedo()[0] - 1.0).abs() < 1e-5);
+}
+
+/// A picture of 16 × 16, its quarters red and green over blue and yellow, as Basis Universal packs it in either way, the second also by Zstandard.
+const ETC1S: &str = "\
+    q0tUWCAyMLsNChoKAAAAAAEAAAAQAAAAEAAAAAAAAAAAAAAAAQAAAAEAAAABAAAAaAAAACwAAACUAAAAJAAAALgAAAAAAAAAlgAAAAAAAABOAQ\
+    AAAAAAAAQAAAAAAAAAAAAAAAAAAAAsAAAAAAAAAAIAKACjAQIAAwMAAAgAAAAAAAAAAAA/AAAAAAAAAAAA/////x8AAABLVFh3cml0ZXIAQmFz\
+    aXMgVW5pdmVyc2FsIDIuNTAAAAQAAwAyAAAADQAAAC8AAAAAAAAAAAAAAAAAAAAEAAAAAAAAAAAAAAAgQJyAAQAAQJAhZJxUAFMABAAAAEDQjq\
+    4NwBQAAQAAABC0IxGAKQACAAAAACQLZ7DrAayqqqr6////V1VVVQUUwEQAAAAAAAASgQCYAQAAAAAAQAIRECFgAAAACDYqPII3YQDMAAAAAAAA\
+    IAUIABxkVBE=";
+/// The same as UASTC.
+const UASTC: &str = "\
+    q0tUWCAyMLsNChoKAAAAAAEAAAAQAAAAEAAAAAAAAAAAAAAAAQAAAAEAAAACAAAAaAAAACwAAACUAAAAJAAAAAAAAAAAAAAAAAAAAAAAAAC4AA\
+    AAAAAAAD0AAAAAAAAAAAEAAAAAAAAsAAAAAAAAAAIAKACmAQIAAwMAABAAAAAAAAAAAAB/AAAAAAAAAAAA/////x8AAABLVFh3cml0ZXIAQmFz\
+    aXMgVW5pdmVyc2FsIDIuNTAAACi1L/1gAACdAQD4l9vD4z/ahADXAxnlfzD6F0VG+r8yZwPXXBrlP+K6AAcABRIAIJ8BuQOWAlhsJgIE4AI=";
+
+#[test]
+fn pictures_packed_by_basis_universal_are_read() {
+    let mut root = wordy();
+    root["materials"] =
+        serde_json::json!([{"pbrMetallicRoughness": {"metallicFactor": 0, "baseColorTexture": {"index": 0}}}]);
+    root["textures"] = serde_json::json!([{"extensions": {"KHR_texture_basisu": {"source": 0}}}]);
+    for packed in [ETC1S, UASTC] {
+        root["images"] = serde_json::json!([{"uri": format!("data:image/ktx2;base64,{packed}")}]);
+        // The corners of the picture, row by row, lie at the vertices of triangles of their own.
+        for (uv, expected) in [
+            ([0.2_f32, 0.2_f32], [220, 30, 30]),
+            ([0.8, 0.2], [30, 200, 40]),
+            ([0.2, 0.8], [40, 50, 210]),
+            ([0.8, 0.8], [230, 210, 40]),
+        ] {
+            let transform = serde_json::json!({"KHR_texture_transform": {"offset": uv, "scale": [0, 0]}});
+            let mut root = root.clone();
+            root["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]["extensions"] = transform;
+            root["materials"][0]["extensions"] = serde_json::json!({"KHR_materials_unlit": {}});
+            let world = read_text(&root.to_string()).unwrap();
+            let glow = world.emission(&seen(&world, [0.2, 0.2]), Vec3::Z, &[450.0, 540.0, 640.0]);
+            let expected = expected.map(|code| dioptric_spectrum::srgb_decode(f64::from(code) / 255.0) as f32);
+            let light = SpectralCurve::from_rgb_light([1.0; 3]).at(&[450.0, 540.0, 640.0]);
+            let share = SpectralCurve::from_rgb_reflectance(expected).at(&[450.0, 540.0, 640.0]);
+            for lane in 0..3 {
+                let expected = light[lane] * share[lane];
+                // ETC1S has five bits a color.
+                assert!((glow[lane] - expected).abs() < 0.05, "{uv:?}: {glow:?} {expected}");
+            }
+        }
+    }
+    root["images"] = serde_json::json!([{"uri": format!("data:image/ktx2;base64,{}", &ETC1S[..200])}]);
+    let notes = read_text(&root.to_string()).unwrap().notes().join("\n");
+    assert!(notes.contains("KTX 2, expected one packed by Basis Universal"), "{notes}");
+}
+
+/// A sheet z = x y of 3 × 3 squares with colors and texture coordinates, packed by Google's Draco 1.5.7 in either way.
+const EDGES: &str = "\
+    RFJBQ08CAgEBAAAAEBICEgIABu/T6lOtGv8BEf8Ca0H/AmtBA/8AAAAAAAEAAAEACQMAAAIBAwkCAAECAQICBAACAQEBAQAPAwEMJwEoAwEMBQ\
+    DY2F+KquqqKsepqqkqAAAAqKpwHAAAwI0DAADkOAAAAHIcAADgxgEAAHIcAAAAxwEAAHQcAADgxgEAAHAcAAAANw4AAAAA/z8AAAAAAAAAAAAA\
+    AAAAAAAAgD8OBQEBAA0DAQgTAQQDARQBGAMBCAYAZSho32+qqqqqqqr9AWiXNM0ANAQwdzQAIQJIHm879wNgiNIAlBIdAA4AAAABAuBAAAAAAP\
+    8PAAAAAAAAAAAAAAAAgD8MAQEBAQOsAQE6AQH//5sBAQEDAQEHAGpcLzcfqQAAAAD/AAAA";
+/// The same, one vertex after the other.
+const SEQUENCE: &str = "\
+    RFJBQ08CAgEAAAASEAEAAQQBBQQBAgUCBgUCAwYDBwYEBQgFCQgFBgkGCgkGBwoHCwoICQwJDQwJCg0KDg0KCw4LDw4BAwAJAwAAAwkCAAECAg\
+    QAAgICAQABAQAPAwEELwE8AwAgi1BVAQAAQFUFAAAAVRUAAAAEAFUVAFBVAQAcR1UFAHQcVRUAwHEEAFU1VVVVAQA5TlUFAOA4VRUAkOMEAFWV\
+    VVVVAQBVVVUFAFRVVRUAUFUBAAAAAP8/AAAAAQEADQMBBCcBPAMAIIuqKgCoKgCoKgAIQKqqKgCoKgCoKgAIQKqqKgCoKgCoKgAIQKqqKgCoKg\
+    CoKgAAAAAAAP8PAAAAAQEBA6sBAS0BAQED//+bAQ8MwHOsQcfZviRbG1KAAAAAAP8AAAAAAAAAAAAAAAAAAAAAAIA/DgAAAAAAAAAAAACAPww=";
+
+#[test]
+fn meshes_packed_by_draco_are_read() {
+    for packed in [EDGES, SEQUENCE] {
+        let with = |packed: &str| {
+            let mut root: Value = serde_json::from_str(&file("3", 3)).unwrap();
+            let n_bytes = BASE64_STANDARD.decode(packed).unwrap().len();
+            let accessor = |kind: &str, component: u64, is_normalized: bool| serde_json::json!({"componentType": component, "count": 16, "type": kind, "normalized": is_normalized});
+            root["accessors"] = serde_json::json!([
+                accessor("VEC3", 5126, false),
+                accessor("VEC2", 5126, false),
+                accessor("VEC4", 5121, true),
+                accessor("SCALAR", 5123, false)
+            ]);
+            root["bufferViews"] = serde_json::json!([{"buffer": 0, "byteLength": n_bytes}]);
+            let uri = format!("data:application/octet-stream;base64,{packed}");
+            root["buffers"] = serde_json::json!([{"byteLength": n_bytes, "uri": uri}]);
+            root["extensionsRequired"] = serde_json::json!(["KHR_draco_mesh_compression"]);
+            root["materials"] = serde_json::json!([{"pbrMetallicRoughness": {"metallicFactor": 0}}]);
+            root["meshes"][0]["primitives"][0] = serde_json::json!({
+                "attributes": {"POSITION": 0, "TEXCOORD_0": 1, "COLOR_0": 2}, "indices": 3, "material": 0,
+                "extensions": {"KHR_draco_mesh_compression": {"bufferView": 0, "attributes": {"POSITION": 0, "TEXCOORD_0": 1, "COLOR_0": 2}}}
+            });
+            read_text(&root.to_string())
+        };
+        let world = with(packed).unwrap();
+        assert_eq!((world.notes(), world.n_primitives()), (&[][..], 18));
+        for [x, y] in [[0.3, 0.05], [0.36, 0.35], [0.6, 0.9], [0.95, 0.3]] {
+            let hit = seen(&world, [x, y]);
+            // On edges the sheet is x y; within squares flat to a ninth of a quarter.
+            let z_m = 5.0 - hit.distance_m;
+            assert!((z_m - x * y).abs() < 1.0 / 36.0, "{x} {y}: {z_m}");
+            assert!((hit.uv.x - x).abs() < 1e-3 && (hit.uv.y - y).abs() < 1e-3, "{x} {y}: {}", hit.uv);
+            let albedo = world.bsdf(&hit, Vec3::Z, &[450.0, 540.0, 640.0]).albedo();
+            let base = SpectralCurve::from_rgb_reflectance([x, y, 0.0]).at(&[450.0, 540.0, 640.0]);
+            assert!((0..3).all(|lane| (albedo[lane] - 0.04 - 0.96 * base[lane]).abs() < 0.01), "{albedo:?} {base:?}");
+        }
+        let mut broken = BASE64_STANDARD.decode(packed).unwrap();
+        broken.truncate(60);
+        let error = with(&BASE64_STANDARD.encode(broken)).unwrap_err().to_string();
+        assert!(error.contains("packed by Draco can't be unpacked"), "{error}");
+    }
 }
