@@ -15,6 +15,7 @@ struct Readme;
 mod area_light;
 mod bsdf;
 mod camera;
+mod choices;
 mod curve;
 mod error;
 mod film;
@@ -50,6 +51,7 @@ mod world;
 
 pub use bsdf::{Bsdf, BsdfSample};
 pub use camera::{CameraKind, WorldCamera};
+pub use choices::{Animation, Choices};
 pub use curve::{Beyond, SpectralCurve};
 pub use error::WorldError;
 pub use film::Film;

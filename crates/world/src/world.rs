@@ -6,8 +6,8 @@ use dioptric_spectrum::{SmoothReflectance, lanes};
 use glam::{DAffine3, DVec3, Vec2, Vec3};
 
 use crate::{
-    Bsdf, Emission, Film, GroupId, Hit, InstanceId, Light, LightSample, Material, MaterialId, Ray, Receiver, Relief,
-    Shape, ShapeId, SpectralCurve, Texture, TextureId, TriangleMesh, WorldCamera, WorldError,
+    Bsdf, Choices, Emission, Film, GroupId, Hit, InstanceId, Light, LightSample, Material, MaterialId, Ray, Receiver,
+    Relief, Shape, ShapeId, SpectralCurve, Texture, TextureId, TriangleMesh, WorldCamera, WorldError,
     group::{Crossing, Group, GroupParts, Instance, Parts, Primitive},
     lights::Lights,
     material::{Surface, Surfaces},
@@ -33,6 +33,7 @@ pub struct World {
     textures: Vec<Texture>,
     lights: Lights,
     cameras: Vec<WorldCamera>,
+    choices: Choices,
     notes: Vec<String>,
     /// Whether rays pass some of its surfaces.
     has_gaps: bool,
@@ -265,6 +266,11 @@ impl World {
         &self.cameras
     }
 
+    /// What its file can show in place of what it shows.
+    pub fn choices(&self) -> &Choices {
+        &self.choices
+    }
+
     /// What of a file wasn't understood, and what stands in its place; a sentence each.
     pub fn notes(&self) -> &[String] {
         &self.notes
@@ -495,6 +501,7 @@ pub struct WorldBuilder {
     textures: Vec<Texture>,
     lights: Vec<Light>,
     cameras: Vec<WorldCamera>,
+    choices: Choices,
     notes: Notes,
     sources: Vec<PathBuf>,
     up: DVec3,
@@ -530,6 +537,7 @@ impl WorldBuilder {
             textures: Vec::new(),
             lights: Vec::new(),
             cameras: Vec::new(),
+            choices: Choices::default(),
             notes: Notes::default(),
             sources: Vec::new(),
             up: DVec3::Y,
@@ -677,6 +685,16 @@ impl WorldBuilder {
         self.cameras.push(camera);
     }
 
+    /// Says what its file can show in place of what it shows.
+    pub fn set_choices(&mut self, choices: Choices) {
+        self.choices = choices;
+    }
+
+    /// What its file can show in place of what it shows.
+    pub fn choices(&self) -> &Choices {
+        &self.choices
+    }
+
     /// Adds a sentence about what wasn't understood; said again, it is counted.
     pub fn note(&mut self, note: impl Into<String>) {
         self.notes.add(note.into());
@@ -754,7 +772,7 @@ impl WorldBuilder {
         let (up, is_left_handed) = self.convention();
         let has_patterns = self.textures.iter().any(|texture| matches!(texture, Texture::Pattern { .. }));
         let patterned = Patterned::of(has_patterns, self.shapes.iter().map(|s| s.place), &self.things);
-        let Self { shapes, n_groups, instances, surfaces, textures, lights, cameras, .. } = self;
+        let Self { shapes, n_groups, instances, surfaces, textures, lights, cameras, choices, .. } = self;
         let (notes, sources) = (self.notes.sentences(), self.sources);
         let mut placed: Vec<PlacedShape> = shapes.into_iter().map(NewShape::placed).collect();
         let instances: Vec<Instance> = instances
@@ -786,6 +804,7 @@ impl WorldBuilder {
             textures,
             lights,
             cameras,
+            choices,
             notes,
             has_gaps,
             sources,

@@ -21,6 +21,10 @@ const WORDS: &[(&str, &str)] = &[
     ("accessors.sparse", "count:index indices:object values:object"),
     ("accessors.sparse.indices", "bufferView:index byteOffset:index componentType:code=5121|5123|5125"),
     ("accessors.sparse.values", "bufferView:index byteOffset:index"),
+    ("animations", "channels:objects samplers:objects"),
+    ("animations.channels", "sampler:index target:object"),
+    ("animations.channels.target", "node:index path:text=translation|rotation|scale|weights|pointer"),
+    ("animations.samplers", "input:index interpolation:text=LINEAR|STEP|CUBICSPLINE output:index"),
     ("asset", "copyright:text generator:text minVersion:text version:text"),
     ("buffers", "byteLength:index uri:text"),
     ("bufferViews", "buffer:index byteLength:index byteOffset:index byteStride:index target:code=34962|34963"),
@@ -58,6 +62,7 @@ const WORDS: &[(&str, &str)] = &[
     ("EXT_mesh_gpu_instancing", "attributes:object"),
     ("EXT_mesh_gpu_instancing.attributes", "*:index"),
     ("EXT_texture_webp", "source:index"),
+    ("KHR_animation_pointer", "pointer:text"),
     ("KHR_draco_mesh_compression", "attributes:object bufferView:index"),
     ("KHR_draco_mesh_compression.attributes", "*:index"),
     ("KHR_lights_punctual", "light:index lights:objects"),
@@ -105,6 +110,7 @@ const WORDS: &[(&str, &str)] = &[
     ("KHR_materials_variants.variants", ""),
     ("KHR_mesh_quantization", ""),
     ("KHR_meshopt_compression", MESHOPT),
+    ("KHR_node_visibility", "visible:flag"),
     ("KHR_texture_basisu", "source:index"),
     ("KHR_texture_transform", "offset:2 rotation:1 scale:2 texCoord:index"),
 ];
@@ -140,6 +146,14 @@ impl Left {
         let mut left = Self::default();
         left.look_at(root, "");
         left
+    }
+
+    /// Adds what was taken out of it later.
+    pub(super) fn append(&mut self, later: Self) {
+        self.words.extend(later.words);
+        self.wrong.extend(later.wrong);
+        self.near.extend(later.near);
+        self.extensions.extend(later.extensions);
     }
 
     fn look_at(&mut self, value: &mut Value, place: &str) {

@@ -119,7 +119,7 @@ impl Reader<'_> {
             self.builder.note("meshes that a node flattens, left out");
             return Ok(());
         }
-        let (material, glow) = self.material(index(primitive, "material"), !mesh.colors.is_empty())?;
+        let (material, glow) = self.material(self.material_of(primitive), !mesh.colors.is_empty())?;
         self.builder.add_shape_to(group, Shape::Mesh(mesh), place, material, glow);
         Ok(())
     }
@@ -139,6 +139,13 @@ impl Reader<'_> {
         let most_bytes = (bytes.len() as u64).saturating_mul(MOST_EXPANSION).clamp(1 << 20, super::MAX_BYTES);
         let unpacked = draco::unpacked(bytes, attributes.collect(), most_bytes);
         unpacked.map(Some).map_err(|reason| self.fault(format!("a mesh packed by Draco {reason}")))
+    }
+
+    /// Returns the material of a primitive, in the variant that is shown.
+    fn material_of(&self, primitive: &Value) -> Option<usize> {
+        let mappings = extension(primitive, "KHR_materials_variants").map_or(&[][..], |of| list(of, "mappings"));
+        let is_shown = |mapping: &&Value| numbers_of(mapping, "variants").iter().any(|of| Some(*of) == self.variant);
+        mappings.iter().find(is_shown).and_then(|mapping| index(mapping, "material")).or(index(primitive, "material"))
     }
 
     fn vertices(

@@ -4,6 +4,7 @@
 //! read must be told.
 
 mod accessors;
+mod animations;
 mod draco;
 mod json;
 mod materials;
@@ -28,7 +29,7 @@ use self::{
     accessors::{Rows, Source},
     json::{Left, extension, index, is_read, list, number, number_or, numbers},
 };
-use super::read_bytes;
+use super::{ReadOptions, read_bytes};
 use crate::{
     CameraKind, Emission, FallOff, GroupId, ImageTexture, Light, MaterialId, SpectralCurve, WorldBuilder, WorldCamera,
     WorldError,
@@ -49,7 +50,12 @@ const BASE64: GeneralPurpose = GeneralPurpose::new(
 );
 
 /// Reads the default scene.
-pub(super) fn read(path: &Path, place: DAffine3, cancel: &Cancel) -> Result<WorldBuilder, WorldError> {
+pub(super) fn read(
+    path: &Path,
+    place: DAffine3,
+    options: &ReadOptions,
+    cancel: &Cancel,
+) -> Result<WorldBuilder, WorldError> {
     let unreadable = |reason: String| WorldError::Unreadable { file: path.to_owned(), reason };
     let bytes = read_bytes(path, MAX_BYTES)?;
     let (text, binary) = parts(&bytes).map_err(unreadable)?;
@@ -63,7 +69,8 @@ pub(super) fn read(path: &Path, place: DAffine3, cancel: &Cancel) -> Result<Worl
         let found = version.map_or("no version".to_owned(), |version| format!("version {version}"));
         return Err(unreadable(format!("its asset has {found}, expected 2.0 of glTF")));
     }
-    let left = Left::out_of(&mut root);
+    let mut left = Left::out_of(&mut root);
+    let moved;
     let mut reader = Reader {
         builder: WorldBuilder::new(),
         root: &root,
@@ -77,6 +84,7 @@ pub(super) fn read(path: &Path, place: DAffine3, cancel: &Cancel) -> Result<Worl
         uses: HashMap::new(),
         globals: HashMap::new(),
         seen: HashSet::new(),
+        variant: None,
         n_bytes: bytes.len() as u64,
         cancel,
     };
@@ -97,6 +105,17 @@ pub(super) fn read(path: &Path, place: DAffine3, cancel: &Cancel) -> Result<Worl
         reader.n_bytes += unpacked.0.len() as u64;
         reader.unpacked.insert(number, unpacked);
     }
+    reader.builder.set_choices(reader.choices());
+    let pose = reader.pose(options)?;
+    if !pose.is_empty() {
+        let (mut posed, lost) = animations::posed(&root, &pose);
+        lost.iter().for_each(|way| reader.builder.note_of("animations of what isn't there, left out", way));
+        left.append(Left::out_of(&mut posed));
+        moved = posed;
+        reader.root = &moved;
+    }
+    let variants = &reader.builder.choices().variants;
+    reader.variant = options.variant.as_ref().and_then(|name| variants.iter().position(|known| known == name));
     reader.note_left(left);
     reader.scene(place)?;
     Ok(reader.builder)
@@ -146,6 +165,8 @@ struct Reader<'c> {
     /// Where nodes stand.
     globals: HashMap<usize, DAffine3>,
     seen: HashSet<usize>,
+    /// Which variant of the materials is shown.
+    variant: Option<usize>,
     n_bytes: u64,
     cancel: &'c Cancel,
 }
@@ -198,12 +219,10 @@ impl Reader<'_> {
         ] {
             words.iter().for_each(|word| self.builder.note_of(sentence, word));
         }
-        for variant in extension(self.root, "KHR_materials_variants").map_or(&[][..], |of| list(of, "variants")) {
-            let name = variant.get("name").and_then(Value::as_str).unwrap_or("without a name");
-            self.builder.note_of("variants of the materials, of which the file's own is shown", name);
-        }
-        if !list(self.root, "animations").is_empty() {
-            self.builder.note("animations: not followed, everything stands as it is written");
+        if self.variant.is_none() {
+            for variant in self.builder.choices().variants.clone() {
+                self.builder.note_of("variants of the materials, of which the file's own is shown", &variant);
+            }
         }
     }
 
@@ -267,6 +286,9 @@ impl Reader<'_> {
         let place = self.globals.get(&number).copied().unwrap_or(DAffine3::IDENTITY);
         if !place.is_finite() {
             return Err(self.fault(format!("node {number} stands nowhere: its numbers aren't finite")));
+        }
+        if extension(node, "KHR_node_visibility").and_then(|of| of.get("visible")) == Some(&Value::Bool(false)) {
+            return Ok(());
         }
         if let Some(mesh) = index(node, "mesh") {
             for instance in self.instances(node)?.unwrap_or_else(|| vec![DAffine3::IDENTITY]) {
