@@ -68,7 +68,7 @@ impl<'c> Reader<'c> {
                 continue;
             }
             if time_s > *end_s {
-                self.builder.note(format!("animation {name} ends at {end_s:.3} s: so it stands at {time_s} s"));
+                self.builder.note(format!("{name} ends at {end_s:.3} s, and stands so at {time_s} s"));
             }
             for (pointer, sampler) in channels {
                 posed.push(Posed {

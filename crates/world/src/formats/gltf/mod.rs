@@ -67,7 +67,9 @@ pub(super) fn read(
     let version = root.get("asset").and_then(|asset| asset.get("version")).and_then(Value::as_str);
     if !version.is_some_and(|version| version.starts_with("2.")) {
         let found = version.map_or("no version".to_owned(), |version| format!("version {version}"));
-        return Err(unreadable(format!("its asset has {found}, expected 2.0 of glTF")));
+        return Err(unreadable(format!(
+            "its asset has {found}, expected 2.0 of glTF, which gltf-pipeline makes of 1.0"
+        )));
     }
     let mut left = Left::out_of(&mut root);
     let moved;
@@ -126,7 +128,7 @@ fn parts(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>), String> {
     let Some(rest) = bytes.strip_prefix(b"glTF") else { return Ok((bytes, None)) };
     let word = |at: usize| rest.get(at..at + 4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
     if word(0) != Some(2) {
-        return Err(format!("version {} of GLB, expected 2", word(0).unwrap_or(0)));
+        return Err(format!("version {} of GLB, expected 2, which gltf-pipeline makes of 1", word(0).unwrap_or(0)));
     }
     let (mut json, mut binary, mut at) = (None, None, 8);
     while let (Some(length), Some(kind)) = (word(at), word(at + 4)) {
