@@ -613,18 +613,10 @@ fn leaves_let_diffuse_light_through() {
     assert!((mirror.bsdf(&seen(&mirror, [0.2, 0.2]), Vec3::Z, &[540.0]).albedo()[0] - 1.0).abs() < 1e-5);
 }
 
-/// A picture of 16 × 16, its quarters red and green over blue and yellow, as Basis Universal packs it in either way, the second also by Zstandard.
-const ETC1S: &str = "\
-    q0tUWCAyMLsNChoKAAAAAAEAAAAQAAAAEAAAAAAAAAAAAAAAAQAAAAEAAAABAAAAaAAAACwAAACUAAAAJAAAALgAAAAAAAAAlgAAAAAAAABOAQ\
-    AAAAAAAAQAAAAAAAAAAAAAAAAAAAAsAAAAAAAAAAIAKACjAQIAAwMAAAgAAAAAAAAAAAA/AAAAAAAAAAAA/////x8AAABLVFh3cml0ZXIAQmFz\
-    aXMgVW5pdmVyc2FsIDIuNTAAAAQAAwAyAAAADQAAAC8AAAAAAAAAAAAAAAAAAAAEAAAAAAAAAAAAAAAgQJyAAQAAQJAhZJxUAFMABAAAAEDQjq\
-    4NwBQAAQAAABC0IxGAKQACAAAAACQLZ7DrAayqqqr6////V1VVVQUUwEQAAAAAAAASgQCYAQAAAAAAQAIRECFgAAAACDYqPII3YQDMAAAAAAAA\
-    IAUIABxkVBE=";
-/// The same as UASTC.
-const UASTC: &str = "\
-    q0tUWCAyMLsNChoKAAAAAAEAAAAQAAAAEAAAAAAAAAAAAAAAAQAAAAEAAAACAAAAaAAAACwAAACUAAAAJAAAAAAAAAAAAAAAAAAAAAAAAAC4AA\
-    AAAAAAAD0AAAAAAAAAAAEAAAAAAAAsAAAAAAAAAAIAKACmAQIAAwMAABAAAAAAAAAAAAB/AAAAAAAAAAAA/////x8AAABLVFh3cml0ZXIAQmFz\
-    aXMgVW5pdmVyc2FsIDIuNTAAACi1L/1gAACdAQD4l9vD4z/ahADXAxnlfzD6F0VG+r8yZwPXXBrlP+K6AAcABRIAIJ8BuQOWAlhsJgIE4AI=";
+/// A picture of 16 × 16, its quarters red and green over blue and yellow, as Basis Universal packs it in either way, the
+/// second also by Zstandard.
+const PACKED: [&[u8]; 2] =
+    [include_bytes!("../../../tests/corpus/etc1s.ktx2"), include_bytes!("../../../tests/corpus/uastc.ktx2")];
 
 #[test]
 fn pictures_packed_by_basis_universal_are_read() {
@@ -632,8 +624,9 @@ fn pictures_packed_by_basis_universal_are_read() {
     root["materials"] =
         serde_json::json!([{"pbrMetallicRoughness": {"metallicFactor": 0, "baseColorTexture": {"index": 0}}}]);
     root["textures"] = serde_json::json!([{"extensions": {"KHR_texture_basisu": {"source": 0}}}]);
-    for packed in [ETC1S, UASTC] {
-        root["images"] = serde_json::json!([{"uri": format!("data:image/ktx2;base64,{packed}")}]);
+    for packed in PACKED {
+        root["images"] =
+            serde_json::json!([{"uri": format!("data:image/ktx2;base64,{}", BASE64_STANDARD.encode(packed))}]);
         // The corners of the picture, row by row, lie at the vertices of triangles of their own.
         for (uv, expected) in [
             ([0.2_f32, 0.2_f32], [220, 30, 30]),
@@ -657,7 +650,8 @@ fn pictures_packed_by_basis_universal_are_read() {
             }
         }
     }
-    root["images"] = serde_json::json!([{"uri": format!("data:image/ktx2;base64,{}", &ETC1S[..200])}]);
+    root["images"] =
+        serde_json::json!([{"uri": format!("data:image/ktx2;base64,{}", BASE64_STANDARD.encode(&PACKED[0][..200]))}]);
     let notes = read_text(&root.to_string()).unwrap().notes().join("\n");
     assert!(notes.contains("KTX 2, expected one packed by Basis Universal"), "{notes}");
 }
