@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand, ValueEnum};
 use dioptric_pipeline::{
-    Crop, Diffraction, LensReflections, PipelineError, WorldLamp, WorldSky, WorldView, parse_numbers,
+    Crop, Diffraction, LensReflections, PipelineError, WorldLamp, WorldSky, WorldSpec, WorldView, parse_numbers,
 };
 
 use crate::lens_args::{BandArgs, FilmArgs, LensStateArgs};
@@ -81,9 +81,8 @@ pub(crate) struct RenderArgs {
     pub(crate) white: Option<String>,
     #[command(flatten)]
     pub(crate) view: ViewArgs,
-    /// Length of the file's unit, m
-    #[arg(long, value_name = "M", default_value_t = 1.0, help_heading = "World")]
-    pub(crate) unit_m: f64,
+    #[command(flatten)]
+    pub(crate) reading: WorldReadArgs,
     /// Follows light over at most so many scatterings: 0 shows what glows, 1 direct light [default: all]
     #[arg(long, value_name = "N", help_heading = "Simulation")]
     pub(crate) bounces: Option<u32>,
@@ -107,6 +106,39 @@ pub(crate) struct RenderArgs {
     /// Folder for the results
     #[arg(long, short, value_name = "DIR", default_value = "dioptric-render", help_heading = "Results")]
     pub(crate) out: PathBuf,
+}
+
+/// How the file of a world is read.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "World")]
+pub(crate) struct WorldReadArgs {
+    /// Length of the file's unit, m
+    #[arg(long, value_name = "M", default_value_t = 1.0)]
+    unit_m: f64,
+    /// How far the animations of a glTF file have come, s [default: everything stands as it is written]
+    #[arg(long = "time", value_name = "S")]
+    time_s: Option<f64>,
+    /// Which animation moves it, by its name or its number from 1; without --time from its beginning on [default: the first, and others
+    /// that move what none before them does]
+    #[arg(long, value_name = "NAME|N")]
+    animation: Option<String>,
+    /// Which of the variants of its materials a glTF file shows [default: the file's own materials]
+    #[arg(long, value_name = "NAME")]
+    variant: Option<String>,
+}
+
+impl WorldReadArgs {
+    /// Returns a world that is read so.
+    pub(crate) fn spec_of(&self, file: &Path) -> WorldSpec {
+        let Self { unit_m, time_s, animation, variant } = self;
+        WorldSpec {
+            unit_m: *unit_m,
+            time_s: *time_s,
+            animation: animation.clone(),
+            variant: variant.clone(),
+            ..WorldSpec::of_file(file.to_owned())
+        }
+    }
 }
 
 /// From where a world is seen, and what lights it besides its own lights.
@@ -188,9 +220,8 @@ pub(crate) enum WorldCommand {
     Info {
         /// World: .pbrt, .gltf, .glb, .obj, .ply or .stl
         world: PathBuf,
-        /// Length of the file's unit, m
-        #[arg(long, value_name = "M", default_value_t = 1.0)]
-        unit_m: f64,
+        #[command(flatten)]
+        reading: WorldReadArgs,
     },
 }
 

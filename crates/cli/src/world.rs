@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use dioptric_pipeline::{Camera, KeptCamera, SceneSource, SceneSpec, Silent, WorldSpec, WorldSummary};
+use dioptric_pipeline::{Camera, KeptCamera, SceneSource, SceneSpec, Silent, WorldSummary};
 use dioptric_spectrum::Cancel;
 
 use crate::{
@@ -15,8 +15,8 @@ use crate::{
 const MOST_NAMED: usize = 24;
 
 pub(crate) fn run(command: &WorldCommand, common: &Common) -> anyhow::Result<()> {
-    let WorldCommand::Info { world, unit_m } = command;
-    let spec = WorldSpec { unit_m: *unit_m, ..WorldSpec::of_file(world.clone()) };
+    let WorldCommand::Info { world, reading } = command;
+    let spec = reading.spec_of(world);
     let mut camera = Camera::demo()?;
     camera.scene = SceneSpec { source: SceneSource::World(spec.clone()), ..SceneSpec::of_file(world.clone()) };
     let read = KeptCamera::new(camera).world(&Silent, &Cancel::new())?;
@@ -61,6 +61,12 @@ fn table(summary: &WorldSummary) -> Result<String, std::fmt::Error> {
             point(camera.eye_m),
             point(camera.forward)
         )?;
+    }
+    for (index, animation) in summary.animations.iter().enumerate() {
+        writeln!(text, "moves {:<4} '{}': for {:.3} s", index + 1, animation.name, animation.end_s)?;
+    }
+    if !summary.variants.is_empty() {
+        writeln!(text, "variants   {}", summary.variants.join(", "))?;
     }
     writeln!(text, "files      {}", summary.sources.len())?;
     for note in &summary.notes {

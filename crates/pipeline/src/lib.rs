@@ -78,10 +78,11 @@ pub use schema::{CAMERA_TEMPLATE, SENSOR_SCHEMA};
 pub use sense::{SenseRequest, Sensed};
 pub use shown::{ShowRequest, ShownPicture, open_display};
 pub use stages::{
-    AberrationSummary, CameraSummary, Capture, FilmPart, FilmPlace, FrameSet, Given, GivenParts, IRRADIANCE_FILE,
-    Imaged, Irradiance, IrradianceSummary, KeptCamera, LensAberrations, NarrowSurfaces, PaintReach, RESUME_FILE,
-    RenderingSummary, ResolvedLens, ResolvedScene, Resumed, SceneSummary, StageCounts, UnseenPoints, Video, VideoFrame,
-    VideoFrameFacts, WhiteOf, WorldRender, WorldSummary, has_kept_bands, world_camera, write_seen_png,
+    AberrationSummary, AnimationSummary, CameraSummary, Capture, FilmPart, FilmPlace, FrameSet, Given, GivenParts,
+    IRRADIANCE_FILE, Imaged, Irradiance, IrradianceSummary, KeptCamera, LensAberrations, NarrowSurfaces, PaintReach,
+    RESUME_FILE, RenderingSummary, ResolvedLens, ResolvedScene, Resumed, SceneSummary, StageCounts, UnseenPoints,
+    Video, VideoFrame, VideoFrameFacts, WhiteOf, WorldRender, WorldSummary, has_kept_bands, world_camera,
+    write_seen_png,
 };
 pub use video_files::{VideoFacts, write_video_frame};
 pub use words::{with_analog_gain, with_auto_exposure, with_exposure_s};

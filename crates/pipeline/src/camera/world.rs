@@ -25,6 +25,16 @@ pub struct WorldSpec {
     /// How long the file's unit of length is, m.
     #[serde(default = "one_meter")]
     pub unit_m: f64,
+    /// How far the animations of a glTF file have come, s; without it everything stands as it is written.
+    #[serde(default)]
+    pub time_s: Option<f64>,
+    /// Which animation moves it, by its name or its number from 1, from its beginning on if no time is given; if left out the
+    /// first, and others that move what none before them does.
+    #[serde(default)]
+    pub animation: Option<String>,
+    /// Which of the variants of its materials a glTF file shows, by name; the file's own materials if left out.
+    #[serde(default)]
+    pub variant: Option<String>,
     /// From where it is seen.
     #[serde(default)]
     pub view: WorldView,
@@ -213,6 +223,9 @@ impl WorldSpec {
         Self {
             file,
             unit_m: one_meter(),
+            time_s: None,
+            animation: None,
+            variant: None,
             view: WorldView::default(),
             sky: None,
             lamps: Vec::new(),
@@ -271,6 +284,7 @@ impl WorldSpec {
 
     pub(super) fn check(&self, checker: &Checker<'_>) -> Result<(), PipelineError> {
         checker.number("unit_m", self.unit_m)?;
+        self.time_s.map_or(Ok(()), |time_s| checker.number("time_s", time_s))?;
         let point = |key: &'static str, (x, y, z): (f64, f64, f64)| {
             [x, y, z].into_iter().try_for_each(|value| checker.number(key, value))
         };
@@ -303,6 +317,10 @@ impl WorldSpec {
         if self.is_still_life() {
             if self.unit_m != one_meter() {
                 checker.wrong("unit_m", &self.unit_m.to_string(), "1, the unit of the still life")?;
+            }
+            if self.time_s.is_some() || self.animation.is_some() || self.variant.is_some() {
+                let expected = "none: nothing in the still life moves or has variants";
+                checker.wrong("time_s, animation or variant", "given", expected)?;
             }
             if self.view != WorldView::OfFile || self.sky.is_some() || !self.lamps.is_empty() {
                 let expected = "none: the still life has a view and light of its own";

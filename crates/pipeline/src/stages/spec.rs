@@ -14,6 +14,7 @@ use dioptric_optics::{Iris, LensFile};
 use dioptric_scene::{FileReading, FillDepth, PointTable, Scene, may_be_read_with};
 use dioptric_sensor::{ExposureControl, Noise, OpticalFilter, Processing, Sensor, WhiteBalance};
 use dioptric_spectrum::Illuminant;
+use dioptric_world::ReadOptions;
 use serde::{Deserialize, Serialize};
 
 use super::{
@@ -117,7 +118,7 @@ pub(crate) struct SceneInputs {
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct WorldInputs {
     pub(crate) file: PathBuf,
-    pub(crate) unit_m: f64,
+    pub(crate) reading: ReadOptions,
     pub(crate) sky: Option<WorldSky>,
     pub(crate) lamps: Vec<WorldLamp>,
     files: Vec<FileStamp>,
@@ -274,7 +275,12 @@ impl GeometryInputs {
         let SceneSource::World(spec) = &self.source else { return None };
         let inputs = WorldInputs {
             file: spec.file.clone(),
-            unit_m: spec.unit_m,
+            reading: ReadOptions {
+                metres_per_unit: spec.unit_m,
+                time_s: spec.time_s,
+                animation: spec.animation.clone(),
+                variant: spec.variant.clone(),
+            },
             sky: spec.sky.clone(),
             lamps: spec.lamps.clone(),
             files: self.files.clone(),

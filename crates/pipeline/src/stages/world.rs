@@ -10,7 +10,7 @@ use dioptric_backward::{
 use dioptric_optics::{Lens, glam::DVec2};
 use dioptric_scene::{HiddenLayer, Scene, SceneLight, View};
 use dioptric_spectrum::{Cancel, DepthMap, Illuminant, Quantity, SpectralImage, WavelengthGrid};
-use dioptric_world::{CameraKind, Flux, Light, ReadOptions, World, WorldCamera, glam::DVec3, open_world};
+use dioptric_world::{CameraKind, Flux, Light, World, WorldCamera, glam::DVec3, open_world};
 use ndarray::Array2;
 
 use super::{
@@ -58,7 +58,7 @@ pub(super) fn read(inputs: &WorldInputs, watch: &Watch<'_>) -> Result<World, Pip
     if inputs.file.as_os_str() == WorldSpec::STILL_LIFE {
         return Ok(World::still_life());
     }
-    let mut builder = open_world(&inputs.file, &ReadOptions { metres_per_unit: inputs.unit_m }, watch.cancel)?;
+    let mut builder = open_world(&inputs.file, &inputs.reading, watch.cancel)?;
     for WorldLamp { at_m: (x, y, z), lumens } in &inputs.lamps {
         let intensity = Flux::Lumens(*lumens).spectrum(&Illuminant::D65.spectrum(), 4.0 * std::f64::consts::PI)?;
         builder.add_light(Light::Point { position: DVec3::new(*x, *y, *z), intensity });
@@ -81,7 +81,7 @@ pub(super) fn read(inputs: &WorldInputs, watch: &Watch<'_>) -> Result<World, Pip
         _ => MOST_LIKELY_M,
     };
     let extent_m = builder.extent_m();
-    if inputs.unit_m == 1.0 && extent_m > most_likely_m {
+    if inputs.reading.metres_per_unit == 1.0 && extent_m > most_likely_m {
         builder.note(format!(
             "the file says no unit: in metres, as it is taken, all of it is {extent_m:.0} m wide; --unit-m 0.001 takes millimetres"
         ));
@@ -479,5 +479,7 @@ fn fingerprint(world: &World, spec: &WorldSpec) -> String {
         hasher.update(&[u8::from(is_read)]);
         hasher.update(own.finalize().as_bytes());
     }
-    format!("{} {} {:?} {:?} {:?}", hasher.finalize().to_hex(), spec.unit_m, spec.view, spec.sky, spec.lamps)
+    let WorldSpec { unit_m, time_s, animation, variant, view, sky, lamps, .. } = spec;
+    let shown = (time_s, animation, variant);
+    format!("{} {unit_m} {shown:?} {view:?} {sky:?} {lamps:?}", hasher.finalize().to_hex())
 }
