@@ -278,6 +278,31 @@ fn a_mesh_alone_gives_a_picture() {
     assert_eq!(info["bounds_m"][1][0], 9.0);
 }
 
+/// A file that moves lists what it has; at a time it stands elsewhere, and what was rendered at another isn't gone on with.
+#[test]
+fn moments_and_variants_are_listed_and_shown() {
+    let folder = folder();
+    fs::write(folder.path().join("go.glb"), include_bytes!("../../world/tests/corpus/moving.glb")).unwrap();
+    let info = |words: &[&str]| -> serde_json::Value {
+        let text = output(folder.path(), &[&["world", "info", "go.glb", "--json"], words].concat());
+        serde_json::from_str(&text).unwrap()
+    };
+    let still = info(&[]);
+    assert_eq!(still["animations"], serde_json::json!([{"name": "go", "end_s": 2.0}]));
+    assert_eq!(still["variants"], serde_json::json!(["day"]));
+    // At 1 s the sheet is 1 m to the right and above, by the keys of a spline.
+    let [at_rest, moved] =
+        [still, info(&["--time", "1", "--animation", "1"])].map(|info| info["bounds_m"][1][0].as_f64());
+    assert!(moved > at_rest, "{moved:?} {at_rest:?}");
+    let words = |more: &[&'static str]| {
+        let words = ["render", "go.glb", "--frame", "--pixels", "12x8", "--samples", "8", "-o", "out"];
+        [&words[..], BANDS, more].concat()
+    };
+    output(folder.path(), &words(&["--time", "1"]));
+    assert!(!dioptric(folder.path(), &words(&["--time", "1.5", "--resume"])).status.success());
+    output(folder.path(), &words(&["--time", "1", "--resume"]));
+}
+
 /// What goes on is the content of all files: one that was touched or moved goes on, one of which an included material changed does not.
 #[test]
 fn resume_goes_by_contents() {

@@ -116,6 +116,8 @@ impl ImageTexture {
         use basisu::{DecodeFlags, TargetFormat::Rgba32, Transcoder};
         let unread = "of KTX 2, expected one packed by Basis Universal as ETC1S or UASTC of 8 bits";
         let (columns, rows) = ktx2_size(bytes).ok_or(unread)?;
+        let n_bytes = u64::from(columns) * u64::from(rows) * (4 + TEXEL_BYTES);
+        dioptric_files::memory::check(n_bytes, bytes.len() as u64).map_err(|e| e.to_string())?;
         let texture = Transcoder::new(bytes).ok().filter(|texture| texture.supports(Rgba32) && !texture.is_video());
         let texture = texture.ok_or(unread)?;
         let rgba = texture.transcode(0, Rgba32, DecodeFlags::NONE).map_err(|_| unread)?;
@@ -307,6 +309,8 @@ fn ktx2_size(bytes: &[u8]) -> Option<(u32, u32)> {
     for level in 0..n_levels as usize {
         is_sound &= is_within(long(80 + 24 * level)?, long(88 + 24 * level)?) && long(96 + 24 * level)? <= most;
     }
+    // Of UASTC the first level has them all.
+    is_sound &= model == 163 || most == if scheme == 0 { long(88)? } else { long(96)? };
     is_sound.then_some((columns, rows))
 }
 

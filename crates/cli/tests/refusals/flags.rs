@@ -160,6 +160,8 @@ pub(crate) const LINES: &[(&str, &str)] = &[
     ("render w.pbrt --samples 0", "--samples is 0, expected "),
     ("render w.pbrt --samples -8", "--samples is '-8'"),
     ("render w.pbrt --pixels 0x4", "size is 0, expected 1 to 65536"),
+    ("render w.pbrt --time -1", "--time is -1, expected 0 to 1e6 s"),
+    ("render w.pbrt --variant dusk", "it has no variant 'dusk'; expected one of its own: it has none"),
     ("render w.pbrt --unit-m 0", "--unit-m is 0, expected "),
     ("render w.pbrt --fov-deg 180", "--fov-deg is 180, expected "),
     ("render w.pbrt --crop 0,0,9999,1", "the part of the picture is 9999x1 at 0,0 of 640x480"),

@@ -174,6 +174,32 @@ impl FramesSpec {
         }
     }
 
+    /// Checks that frames are such as a sensor takes.
+    ///
+    /// # Errors
+    /// When its pixels are split and frames of another kind are merged, or both gains are asked of a sensor with one, or of one set to the high one.
+    pub(crate) fn check_sensor(&self, sensor: &Sensor, gain_mode: GainMode) -> Result<(), PipelineError> {
+        let of_whole_pixels = match self {
+            Self::MovingBurst { .. } => Some("a burst of a moving camera"),
+            Self::Interleaved { .. } => Some("interleaved rows"),
+            Self::BothGains => Some("reads with both gains"),
+            Self::Single | Self::Burst(_) | Self::BracketStops(_) => None,
+        };
+        if let Some(what) = of_whole_pixels.filter(|_| sensor.split_pixel.is_some()) {
+            let reason =
+                "cannot be merged where pixels are split; expected frames: Single, Burst or BracketStops".to_owned();
+            return Err(PipelineError::Unsuitable { what, reason });
+        }
+        let refused = |reason: String| Err(PipelineError::Unsuitable { what: "frames: BothGains", reason });
+        match (self, &sensor.high_gain, gain_mode) {
+            (Self::BothGains, None, _) => refused(format!("need high_gain, which {} does not state", sensor.name)),
+            (Self::BothGains, Some(_), GainMode::High) => {
+                refused("are read with both, expected gain_mode: Low, for whose saturation they are exposed".to_owned())
+            }
+            _ => Ok(()),
+        }
+    }
+
     /// Returns what the first frame is of the picture where it is not all of it, in ASCII.
     fn raw_note(&self, sensor: &Sensor) -> Option<String> {
         let of_several = match self {
@@ -225,9 +251,6 @@ impl FramesSpec {
             }
         };
         let small_sensor = sensor.small_photodiode();
-        if small_sensor.is_some() && matches!(self, Self::MovingBurst { .. }) {
-            return Err(split_pixels_want("a burst of a moving camera"));
-        }
         let mut small_frames = Vec::new();
         let (mut first, mut frames) = (None, Vec::new());
         for (number, exposure) in exposures.iter().enumerate() {
@@ -325,9 +348,6 @@ fn expose_interleaved(
     rows: &Interleaved,
     noise: &Noise,
 ) -> Result<Exposed, PipelineError> {
-    if sensor.split_pixel.is_some() {
-        return Err(split_pixels_want("interleaved rows"));
-    }
     let electrons = sensor.electrons_interleaved(&*rate([0.0; 2])?, exposure, rows, noise)?;
     // Volts depend neither on the time nor on the gain.
     let volts = sensor.volts(&electrons, exposure, noise)?;
@@ -343,14 +363,6 @@ fn expose_both_gains(
     exposure: &Exposure,
     noise: &Noise,
 ) -> Result<Exposed, PipelineError> {
-    if sensor.split_pixel.is_some() {
-        return Err(split_pixels_want("reads with both gains"));
-    }
-    if exposure.gain_mode == GainMode::High {
-        let reason =
-            "reads with both, expected exposure with gain_mode: Low, for whose saturation it is exposed".to_owned();
-        return Err(PipelineError::Unsuitable { what: "frames: BothGains", reason });
-    }
     let electrons = sensor.electrons(&*rate([0.0; 2])?, exposure, noise)?;
     let [high, low] = sensor.read_both_gains(&electrons, exposure, noise)?;
     let merged = Some(sensor.merge_gains(&[[high.raw.clone(), low.raw]])?);
@@ -362,11 +374,6 @@ fn expose_both_gains(
 fn digitized(sensor: &Sensor, rate: &ElectronRate, exposure: &Exposure, noise: &Noise) -> Result<Raw, SensorError> {
     let electrons = sensor.electrons(rate, exposure, noise)?;
     sensor.digitize(&sensor.volts(&electrons, exposure, noise)?, exposure)
-}
-
-fn split_pixels_want(what: &'static str) -> PipelineError {
-    let reason = "cannot be merged where pixels are split; expected frames: Single, Burst or BracketStops".to_owned();
-    PipelineError::Unsuitable { what, reason }
 }
 
 /// Returns the rate of an image that does not move; a moving burst is refused.

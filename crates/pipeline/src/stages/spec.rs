@@ -461,6 +461,7 @@ impl PictureInputs {
         let sensor = given.sensor.as_deref().map_or_else(|| camera.sensor.open(), |sensor| Ok(sensor.clone()))?;
         check_stack(camera, &sensor)?;
         check_patch(camera, &sensor)?;
+        camera.frames.check_sensor(&sensor, camera.exposure.shot().gain_mode)?;
         let irradiance = IrradianceInputs::of(camera, given, &sensor, quality);
         let frames = FrameInputs {
             electrons: ElectronInputs { irradiance, sensor, filters: FilterSpec::open_all(&camera.filters)? },
