@@ -68,6 +68,22 @@ pub enum WorldError {
         /// How many there are.
         n: usize,
     },
+    /// An object that isn't there.
+    #[error("no object is called '{name}'{near}")]
+    NoObject {
+        /// What was asked for.
+        name: String,
+        /// Which names are like it, or what there is.
+        near: String,
+    },
+    /// A material that isn't there.
+    #[error("no material is called '{name}'{near}")]
+    NoMaterial {
+        /// What was asked for.
+        name: String,
+        /// Which names are like it, or what there is.
+        near: String,
+    },
     /// More parts than are looked after.
     #[error("{what}: {n}: expected {limit} at most")]
     TooMany {

@@ -111,6 +111,7 @@ fn bare(
         }
         None => plain(&mut builder, !mesh.colors.is_empty()),
     };
+    builder.name_next(&path.file_stem().unwrap_or_default().to_string_lossy());
     builder.add_shape(Shape::Mesh(mesh), place, material, None);
     builder
 }

@@ -272,6 +272,10 @@ impl Reader<'_> {
         if !place.is_finite() {
             return Err(self.fault(format!("node {number} stands nowhere: its numbers aren't finite")));
         }
+        let name =
+            |of: &Value| of.get("name").and_then(Value::as_str).filter(|name| !name.is_empty()).map(str::to_owned);
+        let mesh = index(node, "mesh").and_then(|mesh| list(self.root, "meshes").get(mesh));
+        self.builder.begin_object(&name(node).or_else(|| name(mesh?)).unwrap_or_else(|| format!("node {number}")));
         if let Some(mesh) = index(node, "mesh") {
             for instance in self.instances(node)?.unwrap_or_else(|| vec![DAffine3::IDENTITY]) {
                 self.mesh(node, mesh, place * instance)?;
@@ -283,7 +287,9 @@ impl Reader<'_> {
         if let Some(camera) = index(node, "camera") {
             self.camera(camera, node, place)?;
         }
-        numbers_of(node, "children").into_iter().try_for_each(|child| self.node(child, depth + 1))
+        numbers_of(node, "children").into_iter().try_for_each(|child| self.node(child, depth + 1))?;
+        self.builder.end_object();
+        Ok(())
     }
 
     /// Returns the places of a node's mesh in it, where it has many.
