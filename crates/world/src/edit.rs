@@ -6,7 +6,7 @@ use dioptric_spectrum::{Observer, WavelengthGrid};
 use glam::{DAffine3, DMat3, DVec3};
 
 use crate::{
-    GroupId, Light, MaterialId, Shape, ShapeId, SpectralCurve, WorldBuilder, WorldError,
+    Emission, GroupId, Light, MaterialId, Shape, ShapeId, SpectralCurve, WorldBuilder, WorldCamera, WorldError,
     shape::{Quadric, placed_bounds},
     world::{NewLight, NewShape},
 };
@@ -350,7 +350,10 @@ impl WorldBuilder {
         for object in (0..picked.len() as u32).filter(|&object| picked[object as usize]) {
             let parent = self.objects.parent(object);
             let copy = match parent.and_then(|parent| copies.get(&parent).copied()) {
-                Some(parent) => self.objects.add(&self.objects.name(object).to_owned(), Some(parent)),
+                Some(parent) => {
+                    let name = self.objects.name(object).to_owned();
+                    self.objects.add(&name, Some(parent))
+                }
                 None => {
                     let copy = self.objects.add(to, parent);
                     names.push(self.objects.name(copy).to_owned());
@@ -394,6 +397,55 @@ impl WorldBuilder {
         let picked = self.picked(name)?;
         self.change_shapes(&picked, |shape| shape.material = material);
         Ok(())
+    }
+
+    /// Makes objects glow, in place of any glow of theirs.
+    ///
+    /// # Errors
+    /// When no object is called so, or none of them has a surface.
+    pub fn set_emission_of(&mut self, name: &str, emission: &Emission) -> Result<(), WorldError> {
+        let picked = self.picked(name)?;
+        let mut n = 0;
+        self.change_shapes(&picked, |shape| {
+            n += 1;
+            shape.emission = Some(emission.clone());
+        });
+        if n > 0 {
+            return Ok(());
+        }
+        let value = format!("'{name}'");
+        Err(WorldError::Setting { what: "the object to glow", value, expected: "one that has a surface" })
+    }
+
+    /// Returns the corners of an upright box around everything, m; none of a world without shapes.
+    pub fn bounds(&self) -> Option<[DVec3; 2]> {
+        self.bounds_of_picked(&vec![true; self.objects.len()])
+    }
+
+    /// Whether its frame is left-handed, as [`World::is_left_handed`](crate::World::is_left_handed).
+    pub fn is_left_handed(&self) -> bool {
+        self.convention().1
+    }
+
+    /// The names of the materials.
+    pub fn material_names(&self) -> impl ExactSizeIterator<Item = &str> {
+        self.surfaces.iter().map(|surface| surface.name.as_str())
+    }
+
+    /// The names of the cameras.
+    pub fn camera_names(&self) -> impl ExactSizeIterator<Item = &str> {
+        self.cameras.iter().map(|camera| camera.name.as_str())
+    }
+
+    /// Returns what of files wasn't understood, a sentence each, as [`World::notes`](crate::World::notes).
+    pub fn notes(&self) -> Vec<String> {
+        self.notes.clone().sentences()
+    }
+
+    /// Puts a camera before the others; what is up in the world stays.
+    pub fn put_camera_first(&mut self, camera: WorldCamera) {
+        self.hold_up();
+        self.cameras.insert(0, camera);
     }
 
     /// Makes the lights of objects, and what of them glows, so many times as bright.

@@ -16,6 +16,14 @@ pub enum WorldError {
         /// Why.
         reason: String,
     },
+    /// A file that cannot be written.
+    #[error("{}: cannot be written: {reason}", file.display())]
+    Unwritable {
+        /// The file.
+        file: PathBuf,
+        /// Why.
+        reason: String,
+    },
     /// A line of a text file that cannot be used.
     #[error("{}: line {line}: {reason}", file.display())]
     Line {

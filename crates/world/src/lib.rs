@@ -55,7 +55,7 @@ pub use camera::{CameraKind, WorldCamera};
 pub use curve::{Beyond, SpectralCurve};
 pub use edit::{LightLevel, ObjectInfo};
 pub use error::WorldError;
-pub use formats::{ReadOptions, open_world, read_obj, read_ply, read_stl, read_world};
+pub use formats::{ReadOptions, open_world, read_obj, read_ply, read_stl, read_world, write_world};
 pub use glam;
 pub use ids::{GroupId, InstanceId, LightId, MaterialId, ShapeId, TextureId};
 pub use image_texture::{Encoding, ImageTexture, Wrap};

@@ -5,7 +5,7 @@ use glam::{Affine3A, DAffine3, DMat3, DVec3};
 use crate::{
     Coordinates, GroupId, Material, MaterialId, Procedural, Relief, ShapeId, Texture, TextureId, UvMapping,
     WorldBuilder, WorldError,
-    world::{NewInstance, NewLight, NewShape},
+    world::{NewInstance, NewLight, NewShape, front_of},
 };
 
 impl WorldBuilder {
@@ -15,7 +15,7 @@ impl WorldBuilder {
     /// # Errors
     /// When the place flattens it.
     pub fn add_world(&mut self, other: Self, name: &str, place: DAffine3) -> Result<String, WorldError> {
-        let place = place * self.from_frame_of(&other);
+        let place = place * self.turn_from(&other);
         if !(place.is_finite() && place.matrix3.determinant().abs() > 0.0) {
             return Err(WorldError::Setting {
                 what: "the place of a part",
@@ -72,14 +72,35 @@ impl WorldBuilder {
     }
 
     /// Returns the transform from the frame of another world, by its up, its front and its hand.
-    fn from_frame_of(&self, other: &Self) -> DAffine3 {
-        let axes = |world: &Self| {
-            let (up, front) = world.up_and_front();
-            let right = if world.convention().1 { front.cross(up) } else { up.cross(front) };
+    fn turn_from(&self, other: &Self) -> DAffine3 {
+        let (up, is_left_handed) = self.convention();
+        other.to_frame(up, is_left_handed)
+    }
+
+    /// Returns the same world in a frame with this axis up and this hand.
+    pub(crate) fn in_frame(mut self, up: DVec3, is_left_handed: bool) -> Self {
+        let by = self.to_frame(up, is_left_handed);
+        if by == DAffine3::IDENTITY {
+            return self;
+        }
+        self.transform_picked(&vec![true; self.objects.len()], &by);
+        let own_from_world = by.inverse();
+        let numbers = Numbers { textures: 0, materials: 0, groups: 0, objects: 0, shapes: 0, own_from_world };
+        self.textures.iter_mut().for_each(|texture| numbers.texture(texture));
+        self.cameras.iter_mut().for_each(|camera| camera.world_from_camera = by * camera.world_from_camera);
+        self.set_up(up, is_left_handed);
+        self
+    }
+
+    /// Returns the transform into a frame with this axis up and this hand.
+    pub(crate) fn to_frame(&self, up: DVec3, is_left_handed: bool) -> DAffine3 {
+        let axes = |(up, is_left_handed): (DVec3, bool)| {
+            let front = front_of(up, is_left_handed);
+            let right = if is_left_handed { front.cross(up) } else { up.cross(front) };
             DMat3::from_cols(right, up, front)
         };
-        let turn = axes(self) * axes(other).transpose();
-        DAffine3::from_mat3(if turn.is_finite() { turn } else { DMat3::from_diagonal(DVec3::ONE) })
+        let turn = axes((up, is_left_handed)) * axes(self.convention()).transpose();
+        DAffine3::from_mat3(if turn.is_finite() { turn } else { DMat3::IDENTITY })
     }
 }
 

@@ -43,9 +43,10 @@ impl Objects {
         self.next = Some(name.to_owned());
     }
 
-    pub(crate) fn begin(&mut self, name: &str) {
+    pub(crate) fn begin(&mut self, name: &str) -> u32 {
         let object = self.add(name, self.open.last().copied());
         self.open.push(object);
+        object
     }
 
     pub(crate) fn end(&mut self) {

@@ -49,7 +49,7 @@ pub struct World {
     gain: f32,
 }
 
-fn front_of(up: DVec3, is_left_handed: bool) -> DVec3 {
+pub(crate) fn front_of(up: DVec3, is_left_handed: bool) -> DVec3 {
     match (up.z.abs() > 0.5, is_left_handed) {
         (true, _) => DVec3::NEG_Y,
         (false, false) => DVec3::Z,
@@ -718,9 +718,11 @@ impl WorldBuilder {
         self.objects.name_next(name);
     }
 
-    /// Begins an object, within the one that is open: what is added until it [ends](Self::end_object) is part of it.
-    pub fn begin_object(&mut self, name: &str) {
-        self.objects.begin(name);
+    /// Begins an object, within the one that is open: what is added until it [ends](Self::end_object) is part of it. Returns its name, which
+    /// has a number where it was taken.
+    pub fn begin_object(&mut self, name: &str) -> String {
+        let object = self.objects.begin(name);
+        self.objects.name(object).to_owned()
     }
 
     /// Ends the object that was begun last.
@@ -771,7 +773,9 @@ impl WorldBuilder {
         // The axis that is nearest.
         let largest = y.abs().max_element();
         let nearest = DVec3::from_array(y.to_array().map(|v| if v.abs() == largest { v.signum() } else { 0.0 }));
-        (nearest.normalize_or(self.up), m.determinant() > 0.0)
+        // A camera that looks far down or up doesn't tell.
+        let up = if largest > 0.8 { nearest.normalize_or(self.up) } else { self.up };
+        (up, m.determinant() > 0.0)
     }
 
     /// Returns which way is up in the world, and what faces the viewer, as [`World::up`] and [`World::front`].

@@ -6,13 +6,14 @@ mod obj;
 mod pbrt;
 mod ply;
 mod stl;
+mod write;
 
 use std::path::Path;
 
 use dioptric_spectrum::Cancel;
 use glam::{DAffine3, DVec3};
 
-pub use self::{obj::read_obj, ply::read_ply, stl::read_stl};
+pub use self::{obj::read_obj, ply::read_ply, stl::read_stl, write::write_world};
 use crate::{
     Encoding, Material, MaterialId, Shape, SpectralCurve, Texture, TriangleMesh, UvMapping, World, WorldBuilder,
     WorldError,

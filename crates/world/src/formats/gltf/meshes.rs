@@ -8,6 +8,7 @@ use super::{
     accessors::Rows,
     json::{index, list},
     numbers_of,
+    own::OwnPrimitive,
 };
 use crate::{GroupId, Shape, TriangleMesh, WorldError};
 
@@ -84,6 +85,14 @@ impl Reader<'_> {
             self.builder.note("points and lines, which have no area: left out");
             return Ok(());
         }
+        let own = self.own_primitive(primitive)?;
+        if let Some(OwnPrimitive { material, emission, shape: Some((shape, own_place, is_reversed)) }) = own {
+            let id = self.builder.add_shape_to(group, shape, place * own_place, material, emission);
+            if is_reversed {
+                self.builder.reverse(id);
+            }
+            return Ok(());
+        }
         let is_compressed = super::OF_GEOMETRY.iter().any(|name| super::extension(primitive, name).is_some());
         let Some(vertices) = self.vertices(primitive, morphs)? else { return Ok(()) };
         if is_compressed && vertices.mesh.positions.iter().all(|p| *p == Vec3::ZERO) {
@@ -113,7 +122,10 @@ impl Reader<'_> {
             self.builder.note("meshes that a node flattens, left out");
             return Ok(());
         }
-        let (material, glow) = self.material(index(primitive, "material"), !mesh.colors.is_empty())?;
+        let (material, glow) = match own {
+            Some(own) => (own.material, own.emission),
+            None => self.material(index(primitive, "material"), !mesh.colors.is_empty())?,
+        };
         self.builder.add_shape_to(group, Shape::Mesh(mesh), place, material, glow);
         Ok(())
     }

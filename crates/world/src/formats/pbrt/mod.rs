@@ -25,6 +25,7 @@ use std::{
 use dioptric_spectrum::Cancel;
 use glam::{DAffine3, DMat4, DVec3};
 
+pub(crate) use self::spectra::photopic_mean;
 use self::{
     camera::CameraWords,
     params::Params,
