@@ -1,12 +1,17 @@
 //! `dioptric world`: what the file of a world holds.
 
-use std::fmt::Write;
+use std::{fmt::Write, path::Path};
 
-use dioptric_pipeline::{Camera, KeptCamera, SceneSource, SceneSpec, Silent, WorldSpec, WorldSummary};
+use dioptric_pipeline::{
+    Camera, KeptCamera, SceneSource, SceneSpec, Silent, WorldReadOptions, WorldSpec, WorldSummary, open_world,
+    write_world,
+};
 use dioptric_spectrum::Cancel;
+use serde::Serialize;
 
 use crate::{
     args::Common,
+    lens::tell,
     render_args::WorldCommand,
     terminal::{print, print_json},
 };
@@ -15,7 +20,12 @@ use crate::{
 const MOST_NAMED: usize = 24;
 
 pub(crate) fn run(command: &WorldCommand, common: &Common) -> anyhow::Result<()> {
-    let WorldCommand::Info { world, unit_m } = command;
+    let (world, unit_m) = match command {
+        WorldCommand::Info { world, unit_m } => (world, unit_m),
+        WorldCommand::Convert { input, output, unit_m, strict } => {
+            return convert((input, output), *unit_m, *strict, common);
+        }
+    };
     let spec = WorldSpec { unit_m: *unit_m, ..WorldSpec::of_file(world.clone()) };
     let mut camera = Camera::demo()?;
     camera.scene = SceneSpec { source: SceneSource::World(spec.clone()), ..SceneSpec::of_file(world.clone()) };
@@ -25,6 +35,31 @@ pub(crate) fn run(command: &WorldCommand, common: &Common) -> anyhow::Result<()>
         return print_json(&summary);
     }
     print(&table(&summary)?)
+}
+
+/// What became of a world.
+#[derive(Serialize)]
+struct Converted<'a> {
+    input: &'a Path,
+    output: &'a Path,
+    notes: Vec<String>,
+    losses: Vec<String>,
+}
+
+fn convert((input, output): (&Path, &Path), unit_m: f64, is_strict: bool, common: &Common) -> anyhow::Result<()> {
+    let builder = open_world(input, &WorldReadOptions { metres_per_unit: unit_m }, &Cancel::new())?;
+    let notes = builder.notes();
+    if is_strict && !notes.is_empty() {
+        let notes = notes.join("; ");
+        anyhow::bail!("{}: not all that the file says is read, which --strict asks for: {notes}", input.display());
+    }
+    let losses = write_world(&builder, output, is_strict)?;
+    if common.json {
+        return print_json(&Converted { input, output, notes, losses });
+    }
+    tell(&notes, common);
+    tell(&losses.iter().map(|loss| format!("not held by the format: {loss}")).collect::<Vec<_>>(), common);
+    Ok(())
 }
 
 fn table(summary: &WorldSummary) -> Result<String, std::fmt::Error> {
@@ -41,10 +76,13 @@ fn table(summary: &WorldSummary) -> Result<String, std::fmt::Error> {
     writeln!(text, "unit       {} m; up is {}", summary.unit_m, point(summary.up))?;
     writeln!(text, "shapes     {} triangles and other primitives", summary.n_primitives)?;
     writeln!(text, "lights     {}", summary.n_lights)?;
-    let named: Vec<&str> = summary.materials.iter().take(MOST_NAMED).map(String::as_str).collect();
-    let more = summary.materials.len().saturating_sub(MOST_NAMED);
-    let more = if more > 0 { format!(" and {more} more") } else { String::new() };
-    writeln!(text, "materials  {}{more}", named.join(", "))?;
+    let named = |names: &[String]| {
+        let more = names.len().saturating_sub(MOST_NAMED);
+        let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+        format!("{}{more}", names.iter().take(MOST_NAMED).map(String::as_str).collect::<Vec<_>>().join(", "))
+    };
+    writeln!(text, "objects    {}", named(&summary.objects))?;
+    writeln!(text, "materials  {}", named(&summary.materials))?;
     if summary.cameras.is_empty() {
         writeln!(text, "cameras    none: the whole is seen, or what --eye and --look-at say")?;
     }

@@ -9,7 +9,7 @@ use dioptric_backward::{BandSampling, LightPaths};
 use dioptric_spectrum::WavelengthGrid;
 use serde::{Deserialize, Serialize};
 
-use super::check::Checker;
+use super::{check::Checker, world_change::WorldChange};
 use crate::{PipelineError, parse_numbers};
 
 /// A three-dimensional world before the camera, and how it is rendered.
@@ -20,11 +20,15 @@ use crate::{PipelineError, parse_numbers};
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct WorldSpec {
-    /// The file: `.pbrt`, `.gltf`, `.glb`, `.obj`, `.ply` or `.stl`; or `still-life`, the built-in scene of the demo.
+    /// The file: `.pbrt`, `.gltf`, `.glb`, `.obj`, `.ply` or `.stl`; `still-life`, the built-in scene of the demo;
+    /// or `empty`, a world of nothing, to which `changes` add.
     pub file: PathBuf,
     /// How long the file's unit of length is, m.
     #[serde(default = "one_meter")]
     pub unit_m: f64,
+    /// What is changed in it, one after the other.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub changes: Vec<WorldChange>,
     /// From where it is seen.
     #[serde(default)]
     pub view: WorldView,
@@ -213,6 +217,7 @@ impl WorldSpec {
         Self {
             file,
             unit_m: one_meter(),
+            changes: Vec::new(),
             view: WorldView::default(),
             sky: None,
             lamps: Vec::new(),
@@ -237,6 +242,20 @@ impl WorldSpec {
     /// The built-in still life in a view of so many columns and rows, with the defaults for all else.
     pub fn still_life(size: (usize, usize)) -> Self {
         Self { size: Some(size), ..Self::of_file(PathBuf::from(Self::STILL_LIFE)) }
+    }
+
+    /// The name of a world of nothing, in place of a file; its frame is that of glTF.
+    pub const EMPTY: &str = "empty";
+
+    /// Whether it is read from a file, and not built in.
+    pub fn is_file(&self) -> bool {
+        !self.is_still_life() && self.file.as_os_str() != Self::EMPTY
+    }
+
+    /// Returns all files that it names.
+    pub(crate) fn files(&self) -> impl Iterator<Item = PathBuf> {
+        let own = self.is_file().then(|| self.file.clone());
+        own.into_iter().chain(self.changes.iter().flat_map(WorldChange::files))
     }
 
     /// Whether it is the built-in still life and no file.
@@ -304,9 +323,10 @@ impl WorldSpec {
             if self.unit_m != one_meter() {
                 checker.wrong("unit_m", &self.unit_m.to_string(), "1, the unit of the still life")?;
             }
-            if self.view != WorldView::OfFile || self.sky.is_some() || !self.lamps.is_empty() {
+            let has_more = self.sky.is_some() || !self.lamps.is_empty() || !self.changes.is_empty();
+            if self.view != WorldView::OfFile || has_more {
                 let expected = "none: the still life has a view and light of its own";
-                checker.wrong("view, sky or lamps", "given", expected)?;
+                checker.wrong("view, sky, lamps or changes", "given", expected)?;
             }
         }
         match self.effort {
