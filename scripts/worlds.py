@@ -1,21 +1,24 @@
 #!/usr/bin/env python3
 """Renders every world under some folders small, and makes one sheet of them: how files as people have them come out.
 
-    scripts/worlds.py PROGRAM OUT FOLDER... [--truth truth.csv]
+    scripts/worlds.py PROGRAM OUT FOLDER... [--truth truth.csv] [--without FOLDER...]
 
 Each file is read by `PROGRAM world info --json` and rendered by `PROGRAM render --frame --sky day`. OUT gets `sheet.png`,
 `list.csv` (file, verdict, what was said) and, with `--truth`, `differences.csv`: files whose extent differs from that of an
-independent reader (columns file, read_by_trimesh, triangles, area, min_x … max_z).
+independent reader (columns file, read_by_trimesh, triangles, area, min_x … max_z). Files that are in a folder of `--without`
+too, by their bytes, and second copies are passed over.
 
 Nothing but Python's own library is needed. To get files, any packages that bring some do, for instance:
 
+    apt-get download assimp-testmodels                   # 95: glTF, OBJ, PLY, STL (dpkg-deb -x)
+    npm pack @webxr-input-profiles/assets                # 82: GLB
+    pip download --no-deps compas dm_control pyvista     # 214: OBJ, PLY, STL (python -m zipfile -e)
     pip download --no-deps --no-binary :all: trimesh     # models/
-    npm pack three                                       # examples/models of its repository
-    apt-get source assimp                                # test/models
 """
 
 import argparse
 import csv
+import hashlib
 import json
 import pathlib
 import struct
@@ -94,9 +97,16 @@ def main():
     parser.add_argument("out", type=pathlib.Path)
     parser.add_argument("folders", nargs="+", type=pathlib.Path)
     parser.add_argument("--truth", type=pathlib.Path)
+    parser.add_argument("--without", nargs="+", type=pathlib.Path, default=[])
     words = parser.parse_args()
     words.out.mkdir(parents=True, exist_ok=True)
-    files = sorted(path for folder in words.folders for path in folder.rglob("*") if path.suffix.lower() in KINDS)
+
+    def worlds(folders):
+        found = sorted(path for folder in folders for path in folder.rglob("*") if path.suffix.lower() in KINDS)
+        return {hashlib.sha256(path.read_bytes()).digest(): path for path in reversed(found)}
+
+    held = worlds(words.without)
+    files = sorted(path for digest, path in worlds(words.folders).items() if digest not in held)
     truth = {}
     if words.truth:
         truth = {row["file"]: row for row in csv.DictReader(words.truth.open())}

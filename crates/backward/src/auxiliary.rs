@@ -8,7 +8,7 @@ use dioptric_world::{
 use ndarray::Array2;
 use rayon::prelude::*;
 
-use crate::{BackwardError, Camera, Panorama, Parallel, Pinhole, Placement, peeling::Surfaces};
+use crate::{BackwardError, Camera, FilmLine, LensCamera, Panorama, Parallel, Pinhole, Placement, peeling::Surfaces};
 
 /// Pictures of what each pixel's middle sees through the middle of the pupil.
 #[derive(Clone, Debug)]
@@ -83,6 +83,34 @@ pub fn auxiliary(
         albedo: SpectralImage::new(Quantity::Reflectance, grid.clone(), albedo)?,
     })
 }
+
+/// Returns the depth along the axis from the center of the entrance pupil, m, of what is met along each line from the film through
+/// the array before it; infinite where nothing is met, NaN where the lens lets no ray through.
+///
+/// # Errors
+/// When it was cancelled.
+pub fn depth_along(
+    world: &World,
+    camera: &LensCamera,
+    lines_mm: &[FilmLine],
+    cancel: &Cancel,
+) -> Result<Vec<f32>, BackwardError> {
+    let (center_m, axis) = camera.projection_center();
+    let of_chunk = |lines_mm: &[FilmLine]| {
+        cancel.check()?;
+        let depth_m = |ray: Option<Ray>| {
+            let Some(ray) = ray else { return f32::NAN };
+            let hit = world.intersect(&ray, f32::INFINITY);
+            hit.map_or(f32::INFINITY, |hit| (hit.point.as_dvec3() - center_m).dot(axis) as f32)
+        };
+        Ok(camera.rays_along(lines_mm).into_iter().map(depth_m).collect())
+    };
+    let chunks: Vec<Vec<f32>> = lines_mm.par_chunks(LINES).map(of_chunk).collect::<Result<_, BackwardError>>()?;
+    Ok(chunks.into_iter().flatten().collect())
+}
+
+/// Lines that are traced together.
+const LINES: usize = 1024;
 
 /// Returns the depth along the axis, m, of the first surfaces that a pinhole sees through the middle of each pixel, one
 /// after another: the first map what is seen, the second what that hides, and so on; infinite where there is no more.

@@ -290,6 +290,41 @@ impl LensCamera {
     }
 }
 
+impl LensCamera {
+    /// Returns the ray into the world along each line from a place of the film through one of the array before it, mm to the
+    /// right and upwards in the picture; none without an array, or where the lens lets none through. Rims cut nothing off.
+    ///
+    /// At the middle one of the wavelengths. An element bends no light that crosses its center, so that such a line is the middle
+    /// of what a pixel sees through it.
+    pub(crate) fn rays_along(&self, lines_mm: &[FilmLine]) -> Vec<Option<Ray>> {
+        let Some(array) = &self.settings.micro_array else { return vec![None; lines_mm.len()] };
+        let lens = &self.lenses[self.lenses.len() / 2];
+        let (plane, film) = (self.bounds.plane(), lens.forward().film_placement(self.settings.film_distance_mm));
+        let mut rays = RayBatch::with_capacity(lines_mm.len());
+        for FilmLine { film_mm, array_mm } in lines_mm {
+            // The lens turns the picture.
+            let from_mm = film.lens_from_surface((-*film_mm).extend(0.0));
+            let through_mm = film.lens_from_surface((-*array_mm).extend(-array.gap_mm));
+            let direction = (through_mm - from_mm).normalize();
+            let along_mm =
+                (plane.vertex_mm - through_mm).dot(plane.rotation.z_axis) / direction.dot(plane.rotation.z_axis);
+            rays.push(through_mm + along_mm * direction, direction, 0.0);
+        }
+        lens.trace(&mut rays, Vignetting::Off);
+        let seen = |i: usize| rays.fate[i].is_in_flight().then(|| self.in_world(rays.point_mm(i), rays.direction(i)));
+        (0..rays.len()).map(seen).collect()
+    }
+}
+
+/// A line from a place of a film through one of the array before it, mm to the right of the axis and above it in the picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FilmLine {
+    /// On the film.
+    pub film_mm: DVec2,
+    /// On the array.
+    pub array_mm: DVec2,
+}
+
 /// A ray that has left the film, on the last vertex plane, and what its radiance counts.
 struct Aimed {
     point_mm: DVec3,

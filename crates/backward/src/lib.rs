@@ -34,12 +34,12 @@ mod world_camera;
 /// Planes and cubes of this crate are arrays of it.
 pub use ndarray;
 
-pub use auxiliary::{Auxiliary, auxiliary, layered_depth};
+pub use auxiliary::{Auxiliary, auxiliary, depth_along, layered_depth};
 pub use camera::{Camera, Panorama, Parallel, Pinhole, ThinLens};
 pub use error::BackwardError;
 pub use gathered::{GatheredView, ViewDetail, gathered_view};
 pub use integrator::LightPaths;
-pub use lens_camera::{LensCamera, LensCameraSettings, LensOrigin};
+pub use lens_camera::{FilmLine, LensCamera, LensCameraSettings, LensOrigin};
 pub use micro_array::{MicroArray, MicroElements, MicroLayout};
 pub use output::{write_auxiliary_exr, write_rendering_exr};
 pub use packets::BandSampling;

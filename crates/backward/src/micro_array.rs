@@ -37,6 +37,9 @@ pub struct MicroArray {
     /// How far the center of one of them lies from the axis, mm to the right and upwards in the picture.
     #[serde(default)]
     pub offset_mm: (f64, f64),
+    /// How far the array is turned about that center, degrees counterclockwise in the picture.
+    #[serde(default)]
+    pub turned_deg: f64,
 }
 
 /// What an array is made of.
@@ -52,12 +55,24 @@ pub enum MicroElements {
         #[serde(default)]
         diameter_mm: Option<f64>,
     },
+    /// Such lenses of three focal lengths in turn, so that neighbors of a hexagonal array differ: each kind has its own depth in
+    /// focus (Perwass and Wietzke 2012).
+    MultiFocus {
+        /// Focal lengths, mm.
+        focal_lengths_mm: [f64; N_KINDS],
+        /// The diameter of their round rims, mm; light between these is lost. Left out, each fills its cell.
+        #[serde(default)]
+        diameter_mm: Option<f64>,
+    },
     /// Round holes, without diffraction.
     Holes {
         /// Diameter, mm.
         diameter_mm: f64,
     },
 }
+
+/// The focal lengths of a multi-focus array.
+const N_KINDS: usize = 3;
 
 /// How the elements of an array are laid out.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -95,6 +110,10 @@ impl MicroArray {
                 lengths.push(("the focal length of its lenses in mm", focal_length_mm));
                 lengths.extend(diameter_mm.map(|d| ("the diameter of its lenses in mm", d)));
             }
+            MicroElements::MultiFocus { focal_lengths_mm, diameter_mm } => {
+                lengths.extend(focal_lengths_mm.map(|f| ("a focal length of its lenses in mm", f)));
+                lengths.extend(diameter_mm.map(|d| ("the diameter of its lenses in mm", d)));
+            }
             MicroElements::Holes { diameter_mm } => lengths.push(("the diameter of its holes in mm", diameter_mm)),
         }
         if let Some(&(what, found)) = lengths.iter().find(|(_, mm)| !(*mm > 0.0 && mm.is_finite())) {
@@ -105,9 +124,12 @@ impl MicroArray {
             return Err(BackwardError::setting("the diameter of its elements in mm", found, "at most their pitch"));
         }
         let (x, y) = self.offset_mm;
-        match x.is_finite() && y.is_finite() {
+        if !(x.is_finite() && y.is_finite()) {
+            return Err(BackwardError::setting("its offset in mm", format!("{x}, {y}"), "finite lengths"));
+        }
+        match self.turned_deg.is_finite() {
             true => Ok(()),
-            false => Err(BackwardError::setting("its offset in mm", format!("{x}, {y}"), "finite lengths")),
+            false => Err(BackwardError::setting("its turn in degrees", self.turned_deg, "a finite angle")),
         }
     }
 
@@ -128,30 +150,43 @@ impl MicroArray {
     /// The diameter of round elements, mm; none where they fill their cells.
     fn diameter_mm(&self) -> Option<f64> {
         match self.elements {
-            MicroElements::Lenses { diameter_mm, .. } => diameter_mm,
+            MicroElements::Lenses { diameter_mm, .. } | MicroElements::MultiFocus { diameter_mm, .. } => diameter_mm,
             MicroElements::Holes { diameter_mm } => Some(diameter_mm),
         }
     }
 
-    /// One over the focal length, 1/mm; 0 for holes.
-    fn power_per_mm(&self) -> f64 {
+    /// One over the focal length of each kind of element in turn, 1/mm; 0 for holes.
+    fn powers_per_mm(&self) -> [f64; N_KINDS] {
         match self.elements {
-            MicroElements::Lenses { focal_length_mm, .. } => 1.0 / focal_length_mm,
-            MicroElements::Holes { .. } => 0.0,
+            MicroElements::Lenses { focal_length_mm, .. } => [1.0 / focal_length_mm; N_KINDS],
+            MicroElements::MultiFocus { focal_lengths_mm, .. } => focal_lengths_mm.map(f64::recip),
+            MicroElements::Holes { .. } => [0.0; N_KINDS],
         }
     }
 
-    /// Returns the center of an element along the film's own axes, mm. The lens turns the picture, so that these point to
-    /// the left and down in it.
-    fn center_mm(&self, row: i64, column: i64) -> DVec2 {
-        let shift = if self.layout == MicroLayout::Hexagonal { 0.5 * row.rem_euclid(2) as f64 } else { 0.0 };
-        let on_lattice = DVec2::new(column as f64 + shift, row as f64 * self.layout.row_step());
-        self.pitch_mm * on_lattice - DVec2::from(self.offset_mm)
+    /// Along a row of elements.
+    fn along_rows(&self) -> DVec2 {
+        DVec2::from_angle(self.turned_deg.to_radians())
+    }
+
+    /// Returns an element, its center along the film's own axes, mm. The lens turns the picture, so that these point to the
+    /// left and down in it.
+    fn element(&self, row: i64, column: i64) -> Element {
+        let step = self.layout.row_step();
+        let (shift, number) = match self.layout {
+            MicroLayout::Square => (0.0, column + row),
+            // Counted along the rows and along a line of neighbors across them, so that all six neighbors are of other kinds.
+            MicroLayout::Hexagonal => (0.5 * row.rem_euclid(2) as f64, column - row.div_euclid(2) - row),
+        };
+        let on_lattice = DVec2::new(column as f64 + shift, row as f64 * step);
+        let center_mm = self.pitch_mm * self.along_rows().rotate(on_lattice) - DVec2::from(self.offset_mm);
+        Element { center_mm, kind: number.rem_euclid(N_KINDS as i64) as usize }
     }
 
     /// Calls `each` for every element whose center lies within a distance of a place, row by row.
-    fn within(&self, place_mm: DVec2, radius_mm: f64, mut each: impl FnMut(DVec2)) {
-        let on_lattice = (place_mm + DVec2::from(self.offset_mm)) / self.pitch_mm;
+    fn within(&self, place_mm: DVec2, radius_mm: f64, mut each: impl FnMut(Element)) {
+        let turned_back = DVec2::from_angle(-self.turned_deg.to_radians());
+        let on_lattice = turned_back.rotate(place_mm + DVec2::from(self.offset_mm)) / self.pitch_mm;
         let (radius, step) = (radius_mm / self.pitch_mm, self.layout.row_step());
         let first_row = ((on_lattice.y - radius) / step).ceil() as i64;
         let last_row = ((on_lattice.y + radius) / step).floor() as i64;
@@ -160,7 +195,7 @@ impl MicroArray {
             let x = on_lattice.x - shift;
             let half = (radius * radius - (row as f64 * step - on_lattice.y).powi(2)).max(0.0).sqrt();
             for column in (x - half).ceil() as i64..=(x + half).floor() as i64 {
-                each(self.center_mm(row, column));
+                each(self.element(row, column));
             }
         }
     }
@@ -185,7 +220,7 @@ impl MicroArray {
         if let Some(diameter_mm) = self.diameter_mm() {
             return 0.5 * diameter_mm * on_disc(u, v);
         }
-        match self.layout {
+        self.along_rows().rotate(match self.layout {
             MicroLayout::Square => self.pitch_mm * DVec2::new(u - 0.5, v - 0.5),
             MicroLayout::Hexagonal => {
                 // Three rhombi about the center, each between two corners.
@@ -193,14 +228,23 @@ impl MicroArray {
                 let corner = |k: f64| DVec2::from_angle(TAU * (k / 3.0 + 0.25)) * (self.pitch_mm / 3.0_f64.sqrt());
                 u * corner(rhombus) + v * corner(rhombus + 1.0)
             }
-        }
+        })
     }
+}
+
+/// A lens or hole of an array.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Element {
+    center_mm: DVec2,
+    /// Which of the focal lengths it has.
+    kind: usize,
 }
 
 /// An array before a film, and where the exit pupil is seen from its places.
 #[derive(Clone, Debug)]
 pub(crate) struct PlacedMicroArray {
     array: MicroArray,
+    powers_per_mm: [f64; N_KINDS],
     /// The film's own frame; the array lies in its plane z = −gap.
     film: Placement,
     pupils: PupilTable,
@@ -229,7 +273,7 @@ impl PlacedMicroArray {
     ) -> Result<Self, BackwardError> {
         array.check()?;
         let pupils = PupilTable::new(bounds, &film, film_half_mm);
-        let placed = Self { array, film, pupils };
+        let placed = Self { array, powers_per_mm: array.powers_per_mm(), film, pupils };
         let seen_across = |disc: &PupilDisc| placed.reach_mm(disc) / array.pitch_mm;
         let widest = placed.pupils.discs.iter().flatten().map(seen_across).fold(0.0, f64::max);
         match widest <= MOST_PITCHES {
@@ -245,8 +289,9 @@ impl PlacedMicroArray {
     /// How far the elements that light may come through lie from the middle one, mm: the right side of (1).
     fn reach_mm(&self, disc: &PupilDisc) -> f64 {
         let z_per_gap = (-disc.center_mm.z - self.array.gap_mm) / self.array.gap_mm;
-        let z_per_focal = z_per_gap * self.array.gap_mm * self.array.power_per_mm();
-        (disc.radius_mm + self.array.reach_mm() * (1.0 + z_per_gap - z_per_focal).abs()) / (1.0 + z_per_gap)
+        let spread = |power: f64| (1.0 + z_per_gap - z_per_gap * self.array.gap_mm * power).abs();
+        let widest = self.powers_per_mm.into_iter().map(spread).fold(0.0, f64::max);
+        (disc.radius_mm + self.array.reach_mm() * widest) / (1.0 + z_per_gap)
     }
 
     /// The middle of the elements that a film place (own axes, mm) sees the exit pupil through, and how far they reach.
@@ -276,17 +321,17 @@ impl PlacedMicroArray {
         self.array.within(middle_mm, reach_mm, |_| n_seen += 1);
         let mut left = (choice * f64::from(n_seen)) as u32;
         let mut chosen = None;
-        self.array.within(middle_mm, reach_mm, |center_mm| {
+        self.array.within(middle_mm, reach_mm, |element| {
             if left == 0 && chosen.is_none() {
-                chosen = Some(center_mm);
+                chosen = Some(element);
             }
             left = left.saturating_sub(1);
         });
-        let center_mm = chosen?;
+        let Element { center_mm, kind } = chosen?;
         let crossing_mm = center_mm + self.array.sample_mm(u, v);
         let to_array_mm = self.array.gap_mm + own_mm.z;
         let slope = (crossing_mm - own_mm.truncate()) / to_array_mm;
-        let bent = slope - (crossing_mm - center_mm) * self.array.power_per_mm();
+        let bent = slope - (crossing_mm - center_mm) * self.powers_per_mm[kind];
         let in_lens = |slope: DVec2| self.film.rotation * slope.extend(-1.0).normalize();
         Some(MicroRay {
             point_mm: self.film.lens_from_surface(crossing_mm.extend(-self.array.gap_mm)),
@@ -302,7 +347,7 @@ impl PlacedMicroArray {
         let own_mm = self.film.surface_from_lens(from_mm);
         let (middle_mm, _) = self.seen_from(own_mm.truncate())?;
         let mut nearest = (f64::INFINITY, None);
-        self.array.within(middle_mm, self.array.pitch_mm, |center_mm| {
+        self.array.within(middle_mm, self.array.pitch_mm, |Element { center_mm, .. }| {
             let distance = center_mm.distance_squared(middle_mm);
             if distance < nearest.0 {
                 nearest = (distance, Some(center_mm));
@@ -390,7 +435,7 @@ mod tests {
 
     fn array(layout: MicroLayout) -> MicroArray {
         let elements = MicroElements::Lenses { focal_length_mm: 0.4, diameter_mm: None };
-        MicroArray { elements, pitch_mm: 0.1, gap_mm: 0.4, layout, offset_mm: (0.02, -0.03) }
+        MicroArray { elements, pitch_mm: 0.1, gap_mm: 0.4, layout, offset_mm: (0.02, -0.03), turned_deg: 17.0 }
     }
 
     #[test]
@@ -399,9 +444,9 @@ mod tests {
             let array = array(layout);
             let place_mm = DVec2::new(0.137, -0.271);
             let mut found = Vec::new();
-            array.within(place_mm, 0.23, |center_mm| found.push(center_mm));
+            array.within(place_mm, 0.23, |element| found.push(element.center_mm));
             let all = (-20..20).flat_map(|row| (-20..20).map(move |column| (row, column)));
-            let near = all.map(|(row, column)| array.center_mm(row, column));
+            let near = all.map(|(row, column)| array.element(row, column).center_mm);
             let near: Vec<DVec2> = near.filter(|center_mm| center_mm.distance(place_mm) <= 0.23).collect();
             assert_eq!(found, near);
             // As many as elements fit on the disc, give or take its border.
@@ -415,20 +460,41 @@ mod tests {
     fn points_fill_their_cell() {
         for layout in [MicroLayout::Square, MicroLayout::Hexagonal] {
             let array = array(layout);
-            let (own_mm, n) = (array.center_mm(1, 2), 60);
+            let (own_mm, n) = (array.element(1, 2).center_mm, 60);
             let mut second = DVec2::ZERO;
             for i in 0..n * n {
                 let share = |i: usize| (i as f64 + 0.5) / n as f64;
                 let from_center_mm = array.sample_mm(share(i % n), share(i / n));
                 second += from_center_mm * from_center_mm / (n * n) as f64;
                 assert!(from_center_mm.length() <= array.reach_mm() + 1e-12);
-                array.within(own_mm, 0.15, |other_mm| {
-                    assert!(from_center_mm.length() <= (own_mm + from_center_mm).distance(other_mm) + 1e-9);
+                array.within(own_mm, 0.15, |other| {
+                    let from_other_mm = (own_mm + from_center_mm).distance(other.center_mm);
+                    assert!(from_center_mm.length() <= from_other_mm + 1e-9);
                 });
             }
             let expected = 0.25 * array.gap_mm * array.gap_mm * array.crossing_share();
             assert!((second / expected - DVec2::ONE).abs().max_element() < 2e-3, "{second} {expected}");
         }
+    }
+
+    /// The kinds of a hexagonal array differ between all neighbors, and are equally many.
+    #[test]
+    fn neighbors_have_other_focal_lengths() {
+        let array = array(MicroLayout::Hexagonal);
+        let mut n_of = [0; N_KINDS];
+        for (row, column) in (-9..9).flat_map(|row| (-9..9).map(move |column| (row, column))) {
+            let own = array.element(row, column);
+            n_of[own.kind] += 1;
+            let mut n_neighbors = 0;
+            array.within(own.center_mm, 1.01 * array.pitch_mm, |other| {
+                if other.center_mm.distance(own.center_mm) > 1e-9 {
+                    n_neighbors += 1;
+                    assert_ne!(other.kind, own.kind, "{row} {column}");
+                }
+            });
+            assert_eq!(n_neighbors, 6);
+        }
+        assert_eq!(n_of, [108; N_KINDS]);
     }
 
     #[test]
@@ -441,6 +507,7 @@ mod tests {
             (MicroArray { gap_mm: f64::NAN, ..good }, "its gap in mm is NaN"),
             (MicroArray { elements: holes, ..good }, "expected at most their pitch"),
             (MicroArray { offset_mm: (f64::INFINITY, 0.0), ..good }, "its offset in mm"),
+            (MicroArray { turned_deg: f64::NAN, ..good }, "its turn in degrees is NaN"),
         ] {
             let message = array.check().unwrap_err().to_string();
             assert!(message.contains(words), "{message}");

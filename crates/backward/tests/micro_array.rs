@@ -21,7 +21,7 @@ const PITCH_MM: f64 = 0.1;
 
 fn lenses(diameter_mm: Option<f64>, layout: MicroLayout) -> MicroArray {
     let elements = MicroElements::Lenses { focal_length_mm: GAP_MM, diameter_mm };
-    MicroArray { elements, pitch_mm: PITCH_MM, gap_mm: GAP_MM, layout, offset_mm: (0.0, 0.0) }
+    MicroArray { elements, pitch_mm: PITCH_MM, gap_mm: GAP_MM, layout, offset_mm: (0.0, 0.0), turned_deg: 0.0 }
 }
 
 fn bands() -> Bands {

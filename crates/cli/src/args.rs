@@ -332,6 +332,9 @@ pub(crate) struct FrameArgs {
     /// Takes exposures that differ by powers of two and merges them, e.g. -4,-2,0
     #[arg(long, value_name = "LIST", help_heading = heading::EXPOSURE)]
     pub(crate) bracket_stops: Option<String>,
+    /// Reads each pixel of the frame with both gains of a dual-gain sensor, or of one with an overflow capacitor (LOFIC), and merges them
+    #[arg(long, conflicts_with_all = ["burst", "bracket_stops", "interleaved_ratio", "interleaved_gain_ratio", "interleaved_rows"], help_heading = heading::EXPOSURE)]
+    pub(crate) both_gains: bool,
     /// Exposes rows for the chosen time and for one so many times shorter in turn, and merges them
     #[arg(long, value_name = "R", conflicts_with_all = ["burst", "bracket_stops"], help_heading = heading::EXPOSURE)]
     pub(crate) interleaved_ratio: Option<f64>,

@@ -1,10 +1,10 @@
 //! `dioptric lightfield`: views, refocused pictures and depth of a light-field camera.
 
 use dioptric_pipeline::{
-    Camera, DepthSearch, ExrSamples, IRRADIANCE_FILE, Irradiance, KeptCamera, LightField, RenderEffort, SceneSource,
-    Staged,
+    ArrayFrame, Camera, DepthSearch, ExrSamples, IRRADIANCE_FILE, Irradiance, KeptCamera, LightField, MicroArray,
+    RenderEffort, SceneSource, Staged,
 };
-use dioptric_report::{LightFieldReport, write_light_field};
+use dioptric_report::{LightFieldReport, ViewFiles, write_light_field};
 use dioptric_spectrum::Cancel;
 
 use crate::{
@@ -31,20 +31,37 @@ pub(crate) fn run(arguments: &LightFieldArgs, common: &Common) -> anyhow::Result
     let staged = Staged::folder(&arguments.out)?;
     let (clock, cancel) = (Clock::new(common.quiet), Cancel::new());
     let n_views = arguments.views.map(usize::from);
-    let field = match &arguments.irradiance {
-        Some(path) => {
+    let field = match (&arguments.frame, &arguments.irradiance) {
+        (Some(path), _) => {
+            let frame = ArrayFrame::read(path, arguments.white.as_deref())?;
+            frame.notes().iter().for_each(|note| remark(common.quiet, note));
+            let (field, array) = kept.decoded_frame(&frame, n_views, &clock, &cancel)?;
+            if arguments.white.is_some() {
+                let MicroArray { pitch_mm, turned_deg, offset_mm: (right_mm, up_mm), .. } = array;
+                let (pitch_um, right_um, up_um) = (1e3 * pitch_mm, 1e3 * right_mm, 1e3 * up_mm);
+                remark(
+                    common.quiet,
+                    &format!(
+                        "the white picture shows an array of a pitch of {pitch_um:.3} µm, turned by {turned_deg:.3}°, {right_um:.2} µm to the right and {up_um:.2} µm up"
+                    ),
+                );
+            }
+            field
+        }
+        (None, Some(path)) => {
             let mut notes = vec![];
             let irradiance = Irradiance::read_exr(path, None)?.told_in(&mut notes);
             notes.iter().for_each(|note| remark(common.quiet, note));
             kept.decoded(&irradiance, n_views, &clock, &cancel)?
         }
-        None => kept.light_field(n_views, &clock, &cancel)?,
+        (None, None) => kept.light_field(n_views, &clock, &cancel)?,
     };
     let search = search(arguments, &kept, (&clock, &cancel))?;
     let estimate = field.depth(&search, &cancel)?;
     let depths_m = if arguments.refocus_m.is_empty() { series(&field, &search) } else { arguments.refocus_m.clone() };
-    let report = write_light_field(&field, &estimate, &depths_m, staged.path())?;
-    if arguments.irradiance.is_none() && camera_has_array(&kept) {
+    let also = ViewFiles { exr: arguments.exr, hci: arguments.hci };
+    let report = write_light_field(&field, &estimate, &depths_m, also, staged.path())?;
+    if arguments.irradiance.is_none() && arguments.frame.is_none() && camera_has_array(&kept) {
         let white = kept.white_of(&clock, &cancel)?;
         let irradiance = kept.irradiance(&clock, &cancel)?;
         irradiance.write_exr_under(&white, &staged.path().join(IRRADIANCE_FILE), ExrSamples::Single)?;
@@ -96,6 +113,13 @@ fn summary(report: &LightFieldReport) -> String {
         let share = 100.0 * report.confident_share;
         text +=
             &format!("depth {near_m:.3} to {far_m:.3} m, median {middle_m:.3} m, over {share:.0} % of the samples\n");
+    }
+    if let Some(error) = &report.depth_error {
+        text += &format!(
+            "against the scene: median error {:.2} %, {:.0} % within 1 %\n",
+            100.0 * error.median,
+            100.0 * error.share_within_1_percent
+        );
     }
     text
 }

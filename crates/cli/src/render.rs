@@ -148,9 +148,8 @@ fn cropped(render: WorldRender, arguments: &RenderArgs) -> anyhow::Result<WorldR
 fn camera_of(arguments: &RenderArgs, common: &Common) -> anyhow::Result<Camera> {
     let mut camera = arguments.camera_file().map_or_else(Camera::demo, Camera::read)?;
     let size = arguments.pixels.as_deref().map(parse_size).transpose()?;
-    let of_file = WorldSpec::of_file(arguments.world.clone());
+    let of_file = arguments.reading.spec_of(&arguments.world);
     let spec = WorldSpec {
-        unit_m: arguments.unit_m,
         view: arguments.view.view(arguments.camera_of_world()),
         sky: arguments.view.sky.clone(),
         lamps: arguments.view.light.clone(),

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand, ValueEnum};
 use dioptric_pipeline::{
-    Crop, Diffraction, LensReflections, PipelineError, WorldLamp, WorldSky, WorldView, parse_numbers,
+    Crop, Diffraction, LensReflections, PipelineError, WorldLamp, WorldSky, WorldSpec, WorldView, parse_numbers,
 };
 
 use crate::lens_args::{BandArgs, FilmArgs, LensStateArgs};
@@ -87,9 +87,8 @@ pub(crate) struct RenderArgs {
     /// Scales all lights so that the mean illuminance of the film is this, lux
     #[arg(long, value_name = "LUX", conflicts_with = "mean_luminance_cd_m2", help_heading = "World")]
     pub(crate) mean_lux: Option<f64>,
-    /// Length of the file's unit, m
-    #[arg(long, value_name = "M", default_value_t = 1.0, help_heading = "World")]
-    pub(crate) unit_m: f64,
+    #[command(flatten)]
+    pub(crate) reading: WorldReadArgs,
     /// Follows light over at most so many scatterings: 0 shows what glows, 1 direct light [default: all]
     #[arg(long, value_name = "N", help_heading = "Simulation")]
     pub(crate) bounces: Option<u32>,
@@ -113,6 +112,39 @@ pub(crate) struct RenderArgs {
     /// Folder for the results
     #[arg(long, short, value_name = "DIR", default_value = "dioptric-render", help_heading = "Results")]
     pub(crate) out: PathBuf,
+}
+
+/// How the file of a world is read.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "World")]
+pub(crate) struct WorldReadArgs {
+    /// Length of the file's unit, m
+    #[arg(long, value_name = "M", default_value_t = 1.0)]
+    unit_m: f64,
+    /// How far the animations of a glTF file have come, s [default: everything stands as it is written]
+    #[arg(long = "time", value_name = "S")]
+    time_s: Option<f64>,
+    /// Which animation moves it, by its name or its number from 1; without --time from its beginning on [default: the first, and others
+    /// that move what none before them does]
+    #[arg(long, value_name = "NAME|N")]
+    animation: Option<String>,
+    /// Which of the variants of its materials a glTF file shows [default: the file's own materials]
+    #[arg(long, value_name = "NAME")]
+    variant: Option<String>,
+}
+
+impl WorldReadArgs {
+    /// Returns a world that is read so.
+    pub(crate) fn spec_of(&self, file: &Path) -> WorldSpec {
+        let Self { unit_m, time_s, animation, variant } = self;
+        WorldSpec {
+            unit_m: *unit_m,
+            time_s: *time_s,
+            animation: animation.clone(),
+            variant: variant.clone(),
+            ..WorldSpec::of_file(file.to_owned())
+        }
+    }
 }
 
 /// From where a world is seen, and what lights it besides its own lights.
@@ -194,9 +226,8 @@ pub(crate) enum WorldCommand {
     Info {
         /// World: .pbrt, .gltf, .glb, .obj, .ply or .stl
         world: PathBuf,
-        /// Length of the file's unit, m
-        #[arg(long, value_name = "M", default_value_t = 1.0)]
-        unit_m: f64,
+        #[command(flatten)]
+        reading: WorldReadArgs,
     },
     /// Writes a world as another format; what that doesn't hold is told
     Convert {
@@ -204,9 +235,8 @@ pub(crate) enum WorldCommand {
         input: PathBuf,
         /// File to write: .glb or .gltf, or .pbrt (version 4) with its pictures and large meshes in a folder beside it
         output: PathBuf,
-        /// Length of the file's unit, m
-        #[arg(long, value_name = "M", default_value_t = 1.0)]
-        unit_m: f64,
+        #[command(flatten)]
+        reading: WorldReadArgs,
         /// Refuses to write where not all of the world was read, or the format does not hold all of it
         #[arg(long)]
         strict: bool,
@@ -234,6 +264,12 @@ pub(crate) struct LightFieldArgs {
     /// Irradiance that was rendered with this camera, as `irradiance.exr` of `run` or `render` [default: rendered now]
     #[arg(long, value_name = "FILE.exr")]
     pub(crate) irradiance: Option<PathBuf>,
+    /// Frame that was taken behind the array, a DNG file as it left the sensor, or linear light
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["irradiance", "samples"])]
+    pub(crate) frame: Option<PathBuf>,
+    /// Frame of an even white that evens out the other, and in which the array's pitch, turn and offset are found
+    #[arg(long, value_name = "FILE", requires = "frame")]
+    pub(crate) white: Option<PathBuf>,
     /// Samples a pixel, where it is rendered now [default: those of the camera file]
     #[arg(long, value_name = "N")]
     pub(crate) samples: Option<u32>,
@@ -252,6 +288,12 @@ pub(crate) struct LightFieldArgs {
     /// Samples each way that depth is sought over: more for noise, fewer for small objects
     #[arg(long, value_name = "N", default_value_t = 3)]
     pub(crate) radius_px: usize,
+    /// Writes each view as linear light too, with the true depth and disparity of each sample
+    #[arg(long)]
+    pub(crate) exr: bool,
+    /// Writes views and true disparity as the 4D Light Field Benchmark (HCI) lays them out, too
+    #[arg(long)]
+    pub(crate) hci: bool,
     /// Folder for the results
     #[arg(long, short, value_name = "DIR", default_value = "dioptric-lightfield")]
     pub(crate) out: PathBuf,

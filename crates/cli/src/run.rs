@@ -335,6 +335,7 @@ pub(crate) fn frames_of(arguments: &FrameArgs) -> anyhow::Result<Option<FramesSp
             None => FramesSpec::Burst(frames),
         }),
         (None, Some(list)) => Some(FramesSpec::BracketStops(parse_numbers("--bracket-stops", list)?)),
+        (None, None) if arguments.both_gains => Some(FramesSpec::BothGains),
         (None, None) => {
             match (arguments.interleaved_ratio, arguments.interleaved_gain_ratio, arguments.interleaved_rows) {
                 (None, None, None) => None,

@@ -3,8 +3,7 @@
 use std::{fmt::Write, path::Path};
 
 use dioptric_pipeline::{
-    Camera, KeptCamera, SceneSource, SceneSpec, Silent, WorldReadOptions, WorldSpec, WorldSummary, open_world,
-    write_world,
+    Camera, KeptCamera, SceneSource, SceneSpec, Silent, WorldSpec, WorldSummary, open_world, write_world,
 };
 use dioptric_spectrum::Cancel;
 use serde::Serialize;
@@ -20,13 +19,13 @@ use crate::{
 const MOST_NAMED: usize = 24;
 
 pub(crate) fn run(command: &WorldCommand, common: &Common) -> anyhow::Result<()> {
-    let (world, unit_m) = match command {
-        WorldCommand::Info { world, unit_m } => (world, unit_m),
-        WorldCommand::Convert { input, output, unit_m, strict } => {
-            return convert((input, output), *unit_m, *strict, common);
+    let (world, reading) = match command {
+        WorldCommand::Info { world, reading } => (world, reading),
+        WorldCommand::Convert { input, output, reading, strict } => {
+            return convert((output, *strict), &reading.spec_of(input), common);
         }
     };
-    let spec = WorldSpec { unit_m: *unit_m, ..WorldSpec::of_file(world.clone()) };
+    let spec = reading.spec_of(world);
     let mut camera = Camera::demo()?;
     camera.scene = SceneSpec { source: SceneSource::World(spec.clone()), ..SceneSpec::of_file(world.clone()) };
     let read = KeptCamera::new(camera).world(&Silent, &Cancel::new())?;
@@ -46,8 +45,9 @@ struct Converted<'a> {
     losses: Vec<String>,
 }
 
-fn convert((input, output): (&Path, &Path), unit_m: f64, is_strict: bool, common: &Common) -> anyhow::Result<()> {
-    let builder = open_world(input, &WorldReadOptions { metres_per_unit: unit_m }, &Cancel::new())?;
+fn convert((output, is_strict): (&Path, bool), spec: &WorldSpec, common: &Common) -> anyhow::Result<()> {
+    let input = &*spec.file;
+    let builder = open_world(input, &spec.reading(), &Cancel::new())?;
     let notes = builder.notes();
     if is_strict && !notes.is_empty() {
         let notes = notes.join("; ");
@@ -99,6 +99,12 @@ fn table(summary: &WorldSummary) -> Result<String, std::fmt::Error> {
             point(camera.eye_m),
             point(camera.forward)
         )?;
+    }
+    for (index, animation) in summary.animations.iter().enumerate() {
+        writeln!(text, "moves {:<4} '{}': for {:.3} s", index + 1, animation.name, animation.end_s)?;
+    }
+    if !summary.variants.is_empty() {
+        writeln!(text, "variants   {}", summary.variants.join(", "))?;
     }
     writeln!(text, "files      {}", summary.sources.len())?;
     for note in &summary.notes {

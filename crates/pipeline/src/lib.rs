@@ -47,7 +47,7 @@ pub use dioptric_scene::{
     may_be_read_with as may_be_read_with_scene,
 };
 pub use dioptric_sensor::{Binning, DngBlack, DngOpcodes, DngReading, DngRendering, ProfileFile};
-pub use dioptric_world::{ObjectInfo, ReadOptions as WorldReadOptions, WorldBuilder, open_world, write_world};
+pub use dioptric_world::{ObjectInfo, WorldBuilder, open_world, write_world};
 
 pub use camera::{
     BlurSpec, BorderSpec, CAMERA_SCHEMA, Camera, CameraTurn, CoatingSpec, Crop, DrawnEye, DualPixelSpec, Exposed,
@@ -65,7 +65,7 @@ pub use film_files::convert_irradiance;
 pub use frame_files::{FrameFile, Frames, LensFacts, Outputs, picture_png, write_frames};
 pub use json::{write_file, write_json};
 pub use keys::{Key, PICTURE, PictureOptions, light_word, white_word};
-pub use light_field::{DepthEstimate, DepthSearch, LightField, ViewGeometry};
+pub use light_field::{ArrayFrame, DepthEstimate, DepthSearch, LightField, ParallelCameras, ViewGeometry};
 pub use lights::{parse_illuminant, parse_white};
 pub use numbers::{number, parse_bytes, parse_directions, parse_numbers, parse_pairs};
 pub use paintings::{PaintingFolder, program_build};
@@ -80,10 +80,11 @@ pub use schema::{CAMERA_TEMPLATE, SENSOR_SCHEMA};
 pub use sense::{SenseRequest, Sensed};
 pub use shown::{ShowRequest, ShownPicture, open_display};
 pub use stages::{
-    AberrationSummary, CameraSummary, Capture, FilmPart, FilmPlace, FrameSet, Given, GivenParts, IRRADIANCE_FILE,
-    Imaged, Irradiance, IrradianceSummary, KeptCamera, LensAberrations, NarrowSurfaces, PaintReach, RESUME_FILE,
-    RenderingSummary, ResolvedLens, ResolvedScene, Resumed, SceneSummary, StageCounts, UnseenPoints, Video, VideoFrame,
-    VideoFrameFacts, WhiteOf, WorldRender, WorldSummary, change_world, has_kept_bands, world_camera, write_seen_png,
+    AberrationSummary, AnimationSummary, CameraSummary, Capture, FilmPart, FilmPlace, FrameSet, Given, GivenParts,
+    IRRADIANCE_FILE, Imaged, Irradiance, IrradianceSummary, KeptCamera, LensAberrations, NarrowSurfaces, PaintReach,
+    RESUME_FILE, RenderingSummary, ResolvedLens, ResolvedScene, Resumed, SceneSummary, StageCounts, UnseenPoints,
+    Video, VideoFrame, VideoFrameFacts, WhiteOf, WorldRender, WorldSummary, change_world, has_kept_bands, world_camera,
+    write_seen_png,
 };
 pub use video_files::{VideoFacts, write_video_frame};
 pub use words::{with_analog_gain, with_auto_exposure, with_exposure_s};

@@ -113,8 +113,12 @@ fn edges_are_those_of_a_traced_picture() {
     let folder = dioptric_golden::shared("reference/render/depth_edge").unwrap();
     let truth = read_spectral_exr(&folder.join("dgauss.exr")).unwrap().of_own_file().image;
     let grid = truth.grid().clone();
-    let world =
-        read_world(&folder.join("pinhole.pbrt"), &ReadOptions { metres_per_unit: 1.0 }, &Cancel::new()).unwrap();
+    let world = read_world(
+        &folder.join("pinhole.pbrt"),
+        &ReadOptions { metres_per_unit: 1.0, ..ReadOptions::default() },
+        &Cancel::new(),
+    )
+    .unwrap();
     let lens = lens(&folder);
     let scene = seen(&world, &lens, &grid);
     let film = Film::centered(256, 256, 62.5);

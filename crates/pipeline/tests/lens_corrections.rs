@@ -292,6 +292,7 @@ fn a_light_field_is_refused() {
         gap_mm: 0.5,
         layout: MicroLayout::default(),
         offset_mm: (0.0, 0.0),
+        turned_deg: 0.0,
     }));
     let message = KeptCamera::new(camera).capture(&Silent, &Cancel::new()).unwrap_err().to_string();
     assert!(message.contains("lens_corrections"), "{message}");

@@ -3,7 +3,10 @@
 
 use std::{fmt::Write, fs, ops::Range, sync::OnceLock};
 
-use dioptric_pipeline::{Camera, DepthSearch, FilmSpec, KeptCamera, LightField, LightFieldSpec, Movements, Silent};
+use dioptric_pipeline::{
+    ArrayFrame, Camera, DepthSearch, FilmSpec, FrameFile, KeptCamera, LightField, LightFieldSpec, Movements, Silent,
+    write_capture,
+};
 use dioptric_spectrum::Cancel;
 use ndarray::Array2;
 
@@ -225,6 +228,108 @@ fn depth_is_that_of_the_planes() {
     let wrong = DepthSearch { near_m: 2.0, ..search };
     let message = field.depth(&wrong, &Cancel::new()).unwrap_err().to_string();
     assert!(message.contains("the range of depths") && message.contains("2 to 1.1 m"), "{message}");
+}
+
+/// The truth of each sample is the plane that its line meets, in every view; estimates are held against it.
+#[test]
+fn true_depth_is_that_of_the_planes() {
+    let field = field();
+    let (rows, columns) = field.n_views();
+    for (row, column) in (0..rows).flat_map(|row| (0..columns).map(move |column| (row, column))) {
+        let depth_m = field.true_depth_m(row, column).unwrap();
+        assert_eq!(depth_m.dim(), field.size());
+        for &found in depth_m {
+            let is_plane = |z_m: f64| (f64::from(found) / z_m - 1.0).abs() < 3e-4;
+            assert!(is_plane(NEAR_M) || is_plane(FAR_M), "{found}");
+        }
+        // The border between them is at x = 0: it moves by the disparity of the near plane, and is where a line through the pupil puts it.
+        let right = column as f64 - 0.5 * (columns as f64 - 1.0);
+        let border = 0.5 * (field.size().1 as f64 - 1.0) - field.geometry().disparity_px(NEAR_M) * right;
+        let n_near = depth_m.row(field.size().0 / 2).iter().filter(|z| f64::from(**z) < 0.6).count();
+        assert!((n_near as f64 - 0.5 - border).abs() <= 1.0, "{row} {column}: {n_near} {border}");
+    }
+}
+
+/// An array of three focal lengths that is hexagonal and turned gives upright views of the same geometry.
+#[test]
+fn turned_multi_focus_array_has_upright_views() {
+    let (_folder, kept) = kept(
+        "Array((elements: MultiFocus(focal_lengths_mm: (0.19, 0.2, 0.21)), pitch_mm: 0.1, gap_mm: 0.2, layout: Hexagonal, turned_deg: 7.0))",
+        25.0,
+        "Pixels(columns: 720, rows: 480, pitch_um: 10.0)",
+    );
+    let field = kept.light_field(None, &Silent, &Cancel::new()).unwrap();
+    assert_eq!(field.n_views(), (9, 9));
+    for (depth_m, part) in parts(&field) {
+        let expected = field.geometry().disparity_px(depth_m);
+        let view = |column: usize| field.view(4, column).unwrap()[1].clone();
+        let range = if expected > 0.0 { 2.0..8.0 } else { -8.0..-2.0 };
+        let found = moved_left_px(&view(1), &view(7), &part, range) / 6.0;
+        // Samples between elements are a mean of those about them, in each view of others.
+        assert!((found / expected - 1.0).abs() < 0.02, "{depth_m} m: {found} {expected}");
+        let truth = field.true_depth_m(4, 4).unwrap();
+        let inner = truth.slice(ndarray::s![part.0.clone(), part.1.clone()]);
+        assert!(inner.iter().all(|z| (f64::from(*z) / depth_m - 1.0).abs() < 3e-4), "{depth_m}");
+    }
+}
+
+/// A frame of the sensor and a white one, behind an array that is not quite where the camera file says: it is found, and the light
+/// field is that of the irradiance.
+#[test]
+fn array_is_found_in_a_white_frame() {
+    let true_array = "Array((elements: Lenses(focal_length_mm: 0.2), pitch_mm: 0.1003, gap_mm: 0.2, layout: Hexagonal, \
+                      offset_mm: (0.012, -0.021), turned_deg: 0.8))";
+    let (folder, own) = kept(true_array, 25.0, "Pixels(columns: 480, rows: 320, pitch_um: 10.0)");
+    let white = "Film \"rgb\" \"integer xresolution\" 24 \"integer yresolution\" 16\nLookAt 0 0 0  0 0 1  0 1 0\n\
+                 Camera \"perspective\" \"float fov\" 5\nWorldBegin\nAttributeBegin AreaLightSource \"diffuse\" \"spectrum L\" [ 300 1 900 1 ] \
+                 \"bool twosided\" true Shape \"trianglemesh\" \"integer indices\" [ 0 1 2 0 2 3 ] \
+                 \"point3 P\" [ -1 -1 0.6 -1 1 0.6 1 1 0.6 1 -1 0.6 ] AttributeEnd\n";
+    fs::write(folder.path().join("white.pbrt"), white).unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let irradiance = own.irradiance(&Silent, &Cancel::new()).unwrap();
+    let save = |kept: &KeptCamera, name: &str| {
+        let kept = kept.with(|camera| camera.outputs.also = vec![FrameFile::RawDng]);
+        let capture = kept.capture(&Silent, &Cancel::new()).unwrap();
+        let own = path(name);
+        fs::create_dir(&own).unwrap();
+        write_capture(&capture, None, &own).unwrap();
+        for (file, kind) in [("irradiance.exr", "exr"), ("raw.dng", "dng")] {
+            fs::rename(own.join(file), path(&format!("{name}.{kind}"))).unwrap();
+        }
+    };
+    save(&own, "frame");
+    let text = own.camera().to_ron().replace("planes.pbrt", "white.pbrt");
+    save(&KeptCamera::new(Camera::parse(&text, &path("camera.ron")).unwrap()), "white");
+    let expected = own.decoded(&irradiance, None, &Silent, &Cancel::new()).unwrap();
+    // As its maker states it.
+    let nominal = own.with(|camera| {
+        let Some(LightFieldSpec::Array(array)) = &mut camera.light_field else { panic!("an array") };
+        (array.pitch_mm, array.turned_deg, array.offset_mm) = (0.1, 0.0, (0.0, 0.0));
+    });
+    for kind in ["exr", "dng"] {
+        let [frame, white] = ["frame", "white"].map(|name| path(&format!("{name}.{kind}")));
+        let frame = ArrayFrame::read(&frame, Some(&white)).unwrap();
+        let (field, array) = nominal.decoded_frame(&frame, None, &Silent, &Cancel::new()).unwrap();
+        assert!((array.pitch_mm / 0.1003 - 1.0).abs() < 2e-4, "{kind}: {}", array.pitch_mm);
+        assert!((array.turned_deg - 0.8).abs() < 0.02, "{kind}: {}", array.turned_deg);
+        let off_mm = (array.offset_mm.0 - 0.012).hypot(array.offset_mm.1 + 0.021);
+        assert!(off_mm < 5e-4, "{kind}: {off_mm}");
+        assert_eq!((field.n_views(), field.size()), (expected.n_views(), expected.size()));
+        // The same picture but for its level and what the white frame evens out.
+        let [found, wanted] = [&field, &expected].map(|field| field.view(4, 4).unwrap().last().unwrap().clone());
+        let scale = wanted.sum() / found.sum();
+        let off = (&found * scale - &wanted).mapv(|v| v * v).mean().unwrap().sqrt() / wanted.mean().unwrap();
+        assert!(off < if kind == "exr" { 0.03 } else { 0.08 }, "{kind}: {off}");
+    }
+    let plain = ArrayFrame::read(&path("frame.exr"), Some(&path("frame.dng"))).unwrap_err().to_string();
+    assert!(plain.contains("is of another kind than"), "{plain}");
+    let wrong = nominal.with(|camera| {
+        let Some(LightFieldSpec::Array(array)) = &mut camera.light_field else { panic!("an array") };
+        array.turned_deg = 15.0;
+    });
+    let frame = ArrayFrame::read(&path("frame.exr"), Some(&path("white.exr"))).unwrap();
+    let message = wrong.decoded_frame(&frame, None, &Silent, &Cancel::new()).unwrap_err().to_string();
+    assert!(message.contains("the white picture: shows no array of a pitch of 100 µm, turned by 15°"), "{message}");
 }
 
 /// The axis of a moved lens crosses the film beside its middle, and the image of the pupil lies behind an element accordingly. About

@@ -3,7 +3,9 @@
 use std::{path::PathBuf, sync::Arc};
 
 use dioptric_analysis::MethodComparison;
-use dioptric_pipeline::{Camera as CameraFile, Given, KeptCamera, RenderEffort, SceneSource, StopSpec, parse_bytes};
+use dioptric_pipeline::{
+    ArrayFrame, Camera as CameraFile, Given, KeptCamera, RenderEffort, SceneSource, StopSpec, parse_bytes,
+};
 use ndarray::Array3;
 use pyo3::{
     IntoPyObjectExt,
@@ -174,6 +176,8 @@ impl Camera {
     /// burst : int
     /// bracket_stops : list of float
     ///     Several frames, merged.
+    /// both_gains : bool
+    ///     Whether each pixel is read with both gains of a dual-gain sensor, merged.
     /// interleaved_ratio : float
     ///     Pairs of rows exposed for the chosen time and for one so many times shorter in turn, merged.
     /// interleaved_gain_ratio : float
@@ -204,7 +208,7 @@ scene=None, fov_deg=None, depth_m=None, width_mm=None, distance_mm=None, fill_de
 white_level=None, quantity=None, unit=None, scale=None, scene_wavelengths_nm=None, variable=None, axes=None, \
 no_data=None, depth=None, depth_unit=None, depth_kind=None, depth_variable=None, view=None, panorama=None, illuminant=None, \
 illuminance_lux=None, scene_light=None, mean_luminance_cd_m2=None, mean_lux=None, wavelengths_nm=None, \
-exposure_s=None, analog_gain=None, gain_mode=None, binning=None, temperature_c=None, metering=None, chip_seed=None, noise=None, burst=None, bracket_stops=None, interleaved_ratio=None, \
+exposure_s=None, analog_gain=None, gain_mode=None, binning=None, temperature_c=None, metering=None, chip_seed=None, noise=None, burst=None, bracket_stops=None, both_gains=None, interleaved_ratio=None, \
 interleaved_gain_ratio=None, seed=None, white=None, demosaic=None, denoise=None, highlights=None, \
 lens_corrections=None, color=None, sharpen_px=None, local_tone=None, perspective=None, brightness=None, curve=None, \
 space=None, defect_threshold=None)")]
@@ -319,22 +323,35 @@ space=None, defect_threshold=None)")]
     /// ----------
     /// views : int, optional
     ///     Along each side of the pupil behind an array; one a pixel across its image without it.
+    /// frame : path, optional
+    ///     A frame that was taken behind the array, a DNG file or an EXR file of linear light; rendered now without it.
+    /// white : path, optional
+    ///     A frame of an even white, which evens out the other and shows where the array is.
     /// progress : bool or callable
     ///     As of `render`.
     ///
     /// Returns
     /// -------
     /// LightField
-    #[pyo3(signature = (*, views=None, progress=None))]
+    #[pyo3(signature = (*, views=None, frame=None, white=None, progress=None))]
     fn light_field(
         &self,
         py: Python<'_>,
         views: Option<&Bound<'_, PyAny>>,
+        frame: Option<PathBuf>,
+        white: Option<PathBuf>,
         progress: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<LightField> {
         let n_views = views.map(|value| count("views", value)).transpose()?;
+        if white.is_some() && frame.is_none() {
+            return Err(wrong("white", "given", "none without a frame"));
+        }
         run(py, &Follower::of(progress)?, |progress, cancel| {
-            Ok(LightField::new(self.kept.light_field(n_views, progress, cancel)?))
+            let Some(frame) = &frame else {
+                return Ok(LightField::new(self.kept.light_field(n_views, progress, cancel)?));
+            };
+            let frame = ArrayFrame::read(frame, white.as_deref())?;
+            Ok(LightField::new(self.kept.decoded_frame(&frame, n_views, progress, cancel)?.0))
         })
     }
 

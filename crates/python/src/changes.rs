@@ -35,6 +35,7 @@ const OF_EXPOSURE: &[&str] = &[
     "noise",
     "burst",
     "bracket_stops",
+    "both_gains",
     "interleaved_ratio",
     "interleaved_gain_ratio",
 ];
@@ -107,6 +108,7 @@ const ALL: &[&str] = &[
     "noise",
     "burst",
     "bracket_stops",
+    "both_gains",
     "interleaved_ratio",
     "interleaved_gain_ratio",
     "seed",
@@ -379,6 +381,12 @@ fn set_frames(camera: &mut Camera, key: &str, value: &Bound<'_, PyAny>) -> PyRes
         "exposure_s" => camera.exposure = with_exposure_s(camera.exposure, number(key, value)?),
         "burst" => camera.frames = FramesSpec::Burst(count(key, value)?),
         "bracket_stops" => camera.frames = FramesSpec::BracketStops(numbers(key, value)?),
+        "both_gains" => match value.extract::<bool>() {
+            Ok(true) => camera.frames = FramesSpec::BothGains,
+            Ok(false) if camera.frames == FramesSpec::BothGains => camera.frames = FramesSpec::Single,
+            Ok(false) => {}
+            Err(_) => return Err(wrong(key, value, "True or False")),
+        },
         "interleaved_ratio" => {
             camera.frames = FramesSpec::Interleaved { ratio: number(key, value)?, period_rows: 2, gain_ratio: 1.0 };
         }

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use dioptric_pipeline::{DepthSearch, LightField as ViewField};
-use ndarray::{Array2, Array3, Array5};
+use ndarray::{Array2, Array3, Array4, Array5};
 use pyo3::{prelude::*, types::PyDict};
 
 use crate::{errors::wrong, options::count, view::view, worker::run_apart};
@@ -49,6 +49,18 @@ impl LightField {
     fn whole<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let whole = Array2::from_shape_fn(self.field.n_views(), |(row, column)| self.field.is_whole(row, column));
         view(py, &Arc::new(whole), |whole| whole.view())
+    }
+
+    /// The true depth of what each sample sees, m from the center of the entrance pupil, put together anew at each access; (view rows, view
+    /// columns, rows, columns) float32, inf where there is nothing, nan where no light comes.
+    #[getter]
+    fn true_depth_m<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let (rows, columns, height, width, _) = self.shape();
+        let field = &self.field;
+        let depth_m = Array4::from_shape_fn((rows, columns, height, width), |(row, column, y, x)| {
+            field.true_depth_m(row, column).map_or(f32::NAN, |plane| plane[(y, x)])
+        });
+        view(py, &Arc::new(depth_m), |depth_m| depth_m.view())
     }
 
     /// Returns how far apart neighboring views show a point at a depth from the entrance pupil, pixels.

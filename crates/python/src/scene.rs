@@ -257,6 +257,12 @@ illuminant=None, illuminance_lux=None, light=None, mean_luminance_cd_m2=None)")]
     ///     In place of them a camera of the file, by its name or its number from 1; ``"whole"`` to see all of it.
     /// unit_m : float
     ///     Length of the file's unit, m.
+    /// time_s : float, optional
+    ///     How far the animations of a glTF file have come; without it everything stands as it is written.
+    /// animation : str, optional
+    ///     Which one moves it, by its name or its number from 1; the first, and others that move what none before them does.
+    /// variant : str, optional
+    ///     Which of the variants of its materials a glTF file shows; the file's own.
     /// sky : str, optional
     ///     Light from beyond: "even:RADIANCE" (W m⁻² sr⁻¹ nm⁻¹), "day:ELEVATION,AZIMUTH,TURBIDITY", or the path of a picture of all
     ///     directions; of a world without light an even sky.
@@ -276,8 +282,8 @@ illuminant=None, illuminance_lux=None, light=None, mean_luminance_cd_m2=None)")]
     /// fov_deg, illuminant, ... :
     ///     As of `Scene.read`.
     #[staticmethod]
-    #[pyo3(signature = (path, *, eye=None, look_at=None, up=None, camera=None, unit_m=1.0, sky=None, lamps=None, method="backward",
-        samples=None, noise=None, bounces=None, size=None, seed=None, **options), text_signature = "(path, *, eye=None, look_at=None, up=None, camera=None, unit_m=1.0, sky=None, lamps=None, method='backward', \
+    #[pyo3(signature = (path, *, eye=None, look_at=None, up=None, camera=None, unit_m=1.0, time_s=None, animation=None, variant=None, sky=None, lamps=None, method="backward",
+        samples=None, noise=None, bounces=None, size=None, seed=None, **options), text_signature = "(path, *, eye=None, look_at=None, up=None, camera=None, unit_m=1.0, time_s=None, animation=None, variant=None, sky=None, lamps=None, method='backward', \
 samples=None, noise=None, bounces=None, size=None, seed=None, fov_deg=None, depth_m=None, width_mm=None, \
 distance_mm=None, fill_depth=None, hidden=None, points=None, white_level=None, quantity=None, unit=None, \
 scale=None, scene_wavelengths_nm=None, variable=None, axes=None, no_data=None, depth=None, depth_unit=None, \
@@ -291,6 +297,9 @@ mean_luminance_cd_m2=None)")]
         up: Option<(f64, f64, f64)>,
         camera: Option<&str>,
         unit_m: f64,
+        time_s: Option<f64>,
+        animation: Option<String>,
+        variant: Option<String>,
         sky: Option<&str>,
         lamps: Option<Vec<(f64, f64, f64, f64)>>,
         method: &str,
@@ -323,6 +332,8 @@ mean_luminance_cd_m2=None)")]
             (None, Some(camera)) => WorldView::Camera(camera.to_owned()),
             (None, None) => WorldView::OfFile,
         };
+        (world.time_s, world.animation, world.variant) =
+            (time_s.or(world.time_s), animation.or(world.animation), variant.or(world.variant));
         world.sky = sky.map(str::parse).transpose().map_err(|error: PipelineError| exception(error))?;
         let lamp = |(x, y, z, lumens)| WorldLamp { at_m: (x, y, z), lumens };
         world.lamps = lamps.unwrap_or_default().into_iter().map(lamp).collect();

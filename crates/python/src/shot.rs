@@ -262,7 +262,7 @@ impl Shot {
     /// -------
     /// Shot
     #[pyo3(signature = (**changes), text_signature = "($self, *, seed=None, exposure_s=None, analog_gain=None, gain_mode=None, binning=None, temperature_c=None, metering=None, chip_seed=None, noise=None, burst=None, bracket_stops=None, \
-interleaved_ratio=None, interleaved_gain_ratio=None, white=None, demosaic=None, denoise=None, highlights=None, \
+both_gains=None, interleaved_ratio=None, interleaved_gain_ratio=None, white=None, demosaic=None, denoise=None, highlights=None, \
 lens_corrections=None, color=None, sharpen_px=None, local_tone=None, perspective=None, brightness=None, curve=None, \
 space=None, defect_threshold=None)")]
     fn expose(&self, py: Python<'_>, changes: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {

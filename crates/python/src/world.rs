@@ -6,11 +6,9 @@ use std::{
 };
 
 use dioptric_pipeline::{
-    PipelineError, WorldBuilder, WorldChange, WorldReadOptions, WorldSky, WorldSpec, change_world, open_world,
-    parse_illuminant,
+    PipelineError, WorldBuilder, WorldChange, WorldSky, WorldSpec, change_world, open_world, parse_illuminant,
 };
 use pyo3::{
-    IntoPyObjectExt,
     prelude::*,
     types::{PyDict, PyTuple},
 };
@@ -28,9 +26,7 @@ pub(crate) struct _World(Mutex<Changed>);
 
 #[derive(Clone)]
 struct Changed {
-    file: PathBuf,
-    unit_m: f64,
-    changes: Vec<WorldChange>,
+    spec: WorldSpec,
     builder: WorldBuilder,
 }
 
@@ -42,8 +38,22 @@ impl _World {
 
     /// Returns the part of a camera file that says this world.
     pub(crate) fn spec(&self) -> WorldSpec {
-        let Changed { file, unit_m, changes, .. } = &*self.held();
-        WorldSpec { unit_m: *unit_m, changes: changes.clone(), ..WorldSpec::of_file(file.clone()) }
+        self.held().spec.clone()
+    }
+}
+
+impl _World {
+    fn of_spec(py: Python<'_>, spec: WorldSpec) -> PyResult<Self> {
+        let of_work = spec.clone();
+        let builder = run_apart(py, move |cancel| {
+            let mut builder = match of_work.is_file() {
+                true => open_world(&of_work.file, &of_work.reading(), cancel)?,
+                false => WorldBuilder::new(),
+            };
+            of_work.changes.iter().try_for_each(|change| change_world(&mut builder, change, cancel))?;
+            Ok(builder)
+        })?;
+        Ok(Self(Mutex::new(Changed { spec, builder })))
     }
 }
 
@@ -51,16 +61,17 @@ impl _World {
 impl _World {
     /// Reads a file, or begins with nothing.
     #[new]
-    #[pyo3(signature = (path=None, unit_m=1.0))]
-    fn new(py: Python<'_>, path: Option<PathBuf>, unit_m: f64) -> PyResult<Self> {
-        let builder = match path.clone() {
-            None => WorldBuilder::new(),
-            Some(path) => run_apart(py, move |cancel| {
-                Ok(open_world(&path, &WorldReadOptions { metres_per_unit: unit_m }, cancel)?)
-            })?,
-        };
+    #[pyo3(signature = (path=None, unit_m=1.0, time_s=None, animation=None, variant=None))]
+    fn new(
+        py: Python<'_>,
+        path: Option<PathBuf>,
+        unit_m: f64,
+        time_s: Option<f64>,
+        animation: Option<String>,
+        variant: Option<String>,
+    ) -> PyResult<Self> {
         let file = path.unwrap_or_else(|| PathBuf::from(WorldSpec::EMPTY));
-        Ok(Self(Mutex::new(Changed { file, unit_m, changes: Vec::new(), builder })))
+        Self::of_spec(py, WorldSpec { unit_m, time_s, animation, variant, ..WorldSpec::of_file(file) })
     }
 
     /// Carries out a change, in the words of a camera file; one that cannot be leaves the world as it was.
@@ -70,7 +81,7 @@ impl _World {
         let builder = run_apart(py, move |cancel| change_world(&mut builder, &of_work, cancel).map(|()| builder))?;
         let mut held = self.held();
         held.builder = builder;
-        held.changes.push(change);
+        held.spec.changes.push(change);
         Ok(())
     }
 
@@ -142,41 +153,20 @@ impl _World {
         Self(Mutex::new(self.held().clone()))
     }
 
-    /// Returns the file, its unit and the changes.
-    fn parts<'py>(&self, py: Python<'py>) -> PyResult<(PathBuf, f64, Bound<'py, PyAny>)> {
-        let held = self.held();
-        Ok((held.file.clone(), held.unit_m, to_python(py, &held.changes)?))
+    /// Returns the part of a camera file that says it.
+    fn words<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        to_python(py, &self.spec())
     }
 
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
-        let (file, unit_m, changes) = self.parts(py)?;
-        let file = Some(file).filter(|file| file.as_os_str() != WorldSpec::EMPTY);
-        let arguments = [file.into_bound_py_any(py)?, unit_m.into_bound_py_any(py)?, changes];
-        Ok((restorer(py, "_restore_world")?, PyTuple::new(py, arguments)?))
+        Ok((restorer(py, "_restore_world")?, PyTuple::new(py, [self.words(py)?])?))
     }
 }
 
 /// Makes a world again; pickles call it.
 #[pyfunction]
-#[pyo3(signature = (path, unit_m, changes))]
-pub(crate) fn _restore_world(
-    py: Python<'_>,
-    path: Option<PathBuf>,
-    unit_m: f64,
-    changes: &Bound<'_, PyAny>,
-) -> PyResult<_World> {
-    let world = _World::new(py, path, unit_m)?;
-    let changes: Vec<WorldChange> = from_python("the world", changes)?;
-    let (mut builder, of_work) = (world.held().builder.clone(), changes.clone());
-    let builder = run_apart(py, move |cancel| {
-        of_work.iter().try_for_each(|change| change_world(&mut builder, change, cancel))?;
-        Ok(builder)
-    })?;
-    {
-        let mut held = world.held();
-        (held.builder, held.changes) = (builder, changes);
-    }
-    Ok(world)
+pub(crate) fn _restore_world(py: Python<'_>, spec: &Bound<'_, PyAny>) -> PyResult<_World> {
+    _World::of_spec(py, from_python("the world", spec)?)
 }
 
 fn point([x, y, z]: [f64; 3]) -> (f64, f64, f64) {

@@ -56,3 +56,18 @@ def test_depth_is_found_where_there_is_an_edge(field: dp.LightField) -> None:
 def test_camera_without_a_raster_has_none(tiny: dp.Camera) -> None:
     with pytest.raises(ValueError, match="light_field: the camera has none"):
         tiny.light_field()
+
+
+def test_truth_is_the_post_before_the_sky(field: dp.LightField) -> None:
+    truth = field.true_depth_m
+    assert truth.shape == field.shape[:4]
+    post = truth[:, :, 16][np.isfinite(truth[:, :, 16])]
+    assert post == pytest.approx(2.0, rel=1e-4) and np.isinf(truth[:, :, 16, 0]).all()
+    # It moves as the disparity says.
+    middles = [np.flatnonzero(np.isfinite(view[16])).mean() for view in truth[0]]
+    assert middles[0] - middles[2] == pytest.approx(2 * field.disparity_px(2.0), abs=1)
+
+
+def test_white_frame_needs_another(tiny: dp.Camera) -> None:
+    with pytest.raises(ValueError, match="white is given, expected none without a frame"):
+        tiny.light_field(white="white.dng")

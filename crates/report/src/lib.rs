@@ -25,7 +25,7 @@ mod svg_png;
 pub use drawing_file::{DRAWS_PNG, PNG_REMEDY, check_drawing_name, drawing_file, write_drawing};
 pub use figures::{Drawing, draw_all, draw_figure4};
 pub use lens::{AnalysisPlots, LensComparisonPage, LensDrawing, LensPage};
-pub use light_field::{LightFieldReport, write_light_field};
+pub use light_field::{CamerasAlike, DepthError, LightFieldReport, ViewFiles, write_light_field};
 pub use measurement::{MeasurementWords, write_measurement};
 pub use methods::{comparison_picture, write_comparison};
 pub use plots::chart_svg;

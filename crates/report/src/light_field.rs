@@ -1,8 +1,12 @@
 //! A light field in pictures: its views, a series of refocused ones, and its depth.
 
+mod hci;
+
 use std::path::Path;
 
-use dioptric_pipeline::{DepthEstimate, LightField, PipelineError, display::LinearRgb, write_file, write_json};
+use dioptric_pipeline::{
+    DepthEstimate, LightField, ParallelCameras, PipelineError, display::LinearRgb, write_file, write_json,
+};
 use dioptric_scene::{ExrSamples, write_planes_exr};
 use image::{Rgb, RgbImage, imageops};
 use ndarray::Array2;
@@ -23,6 +27,26 @@ const CONFIDENT: f32 = 0.3;
 const SCALE: [[f64; 3]; 5] =
     [[68.0, 1.0, 84.0], [59.0, 82.0, 139.0], [33.0, 145.0, 140.0], [94.0, 201.0, 98.0], [253.0, 231.0, 37.0]];
 
+/// How views are written besides as pictures.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ViewFiles {
+    /// As `view-ROW-COLUMN.exr`: linear light, with the true depth `Z` and `disparity` of each sample where the scene is known.
+    pub exr: bool,
+    /// As the folder `hci`, laid out as the 4D Light Field Benchmark is.
+    pub hci: bool,
+}
+
+/// How far an estimated depth is from the true one, over the samples that are certain.
+#[derive(Clone, Debug, Serialize)]
+pub struct DepthError {
+    /// The median of |estimate / truth − 1|.
+    pub median: f64,
+    /// The share of samples that are less than 1 % wrong.
+    pub share_within_1_percent: f64,
+    /// The share of samples whose disparity is less than 0.07 pixels wrong, as the benchmark counts.
+    pub share_within_0_07_px: f64,
+}
+
 /// What was written of a light field.
 #[derive(Clone, Debug, Serialize)]
 pub struct LightFieldReport {
@@ -38,19 +62,38 @@ pub struct LightFieldReport {
     pub depth_m: Option<[f32; 3]>,
     /// The share of such samples.
     pub confident_share: f64,
+    /// How wrong these are, where the scene is known and a view is in the middle.
+    pub depth_error: Option<DepthError>,
+    /// The parallel cameras that show the same disparities.
+    pub cameras_alike: CamerasAlike,
     /// The files.
     pub files: Vec<String>,
 }
 
+/// Parallel cameras that show points of each depth as far apart as views do.
+#[derive(Clone, Debug, Serialize)]
+pub struct CamerasAlike {
+    /// The image of a unit tangent, mm.
+    pub scale_mm: f64,
+    /// Between samples, mm.
+    pub pitch_mm: f64,
+    /// Between neighbors, mm.
+    pub baseline_mm: f64,
+    /// The depth that all show at the same place, m; none where that is infinite.
+    pub focus_m: Option<f64>,
+}
+
 /// Writes a light field into a folder: `views.png`, a `view-ROW-COLUMN.png` each, `refocus-NN.png` for each depth,
-/// `depth.exr` (`Z`, m; `disparity`, px; `confidence`), `depth.png` and `lightfield.json`.
+/// `depth.exr` (`Z`, m; `disparity`, px; `confidence`; where the scene is known `Z_true` and `disparity_true`), `depth.png` and
+/// `lightfield.json`; and the views in the other ways that are asked for.
 ///
 /// # Errors
-/// When a file cannot be written.
+/// When a file cannot be written, or the benchmark's layout is asked for and no view is in the middle.
 pub fn write_light_field(
     field: &LightField,
     estimate: &DepthEstimate,
     depths_m: &[f64],
+    also: ViewFiles,
     folder: &Path,
 ) -> Result<LightFieldReport, PipelineError> {
     let mut files = Vec::new();
@@ -79,10 +122,20 @@ pub fn write_light_field(
         refocused.push((depth_m, disparity_px));
     }
     put("depth.png".to_owned(), &depth_picture(estimate, field, factor))?;
-    let planes =
-        [("Z", &estimate.depth_m), ("disparity", &estimate.disparity_px), ("confidence", &estimate.confidence)];
+    let mut planes =
+        vec![("Z", &estimate.depth_m), ("disparity", &estimate.disparity_px), ("confidence", &estimate.confidence)];
+    let truth = middle_truth(field);
+    if let Some((depth_m, disparity_px)) = &truth {
+        planes.extend([("Z_true", depth_m), ("disparity_true", disparity_px)]);
+    }
     write_planes_exr(&folder.join("depth.exr"), &planes, ExrSamples::Single)?;
     files.push("depth.exr".to_owned());
+    if also.exr {
+        files.extend(write_views_exr(field, folder)?);
+    }
+    if also.hci {
+        files.extend(hci::write(field, white, folder)?);
+    }
     files.push("lightfield.json".to_owned());
     let told = estimate.depth_m.iter().zip(&estimate.confidence);
     let mut confident: Vec<f32> = told.filter(|(_, c)| **c >= CONFIDENT).map(|(depth_m, _)| *depth_m).collect();
@@ -95,10 +148,70 @@ pub fn write_light_field(
         refocused,
         depth_m: (n > 0).then(|| [confident[0], confident[n / 2], confident[n - 1]]),
         confident_share: n as f64 / estimate.depth_m.len() as f64,
+        depth_error: truth.and_then(|truth| DepthError::of(estimate, &truth)),
+        cameras_alike: CamerasAlike::of(field),
         files,
     };
     write_json(&folder.join("lightfield.json"), &report)?;
     Ok(report)
+}
+
+impl CamerasAlike {
+    fn of(field: &LightField) -> Self {
+        let ParallelCameras { scale_mm, pitch_mm, baseline_mm, focus_m } = field.geometry().cameras_alike();
+        Self { scale_mm, pitch_mm, baseline_mm, focus_m: focus_m.is_finite().then_some(focus_m) }
+    }
+}
+
+impl DepthError {
+    /// Returns the error of what is certain and has a finite true depth; `None` where there is no such sample.
+    fn of(estimate: &DepthEstimate, (depth_m, disparity_px): &(Array2<f32>, Array2<f32>)) -> Option<Self> {
+        let is_told = |place: &(usize, usize)| estimate.confidence[*place] >= CONFIDENT && depth_m[*place].is_finite();
+        let places: Vec<_> = ndarray::indices(depth_m.dim()).into_iter().filter(is_told).collect();
+        let of_depth = |place: &(usize, usize)| f64::from((estimate.depth_m[*place] / depth_m[*place] - 1.0).abs());
+        let of_disparity = |place: &(usize, usize)| (estimate.disparity_px[*place] - disparity_px[*place]).abs();
+        let mut errors: Vec<f64> = places.iter().map(of_depth).collect();
+        errors.sort_by(f64::total_cmp);
+        let share = |n: usize| n as f64 / places.len() as f64;
+        Some(Self {
+            median: *errors.get(errors.len() / 2)?,
+            share_within_1_percent: share(errors.partition_point(|error| *error < 0.01)),
+            share_within_0_07_px: share(places.iter().filter(|place| of_disparity(place) < 0.07).count()),
+        })
+    }
+}
+
+/// Returns the true depth and disparity of the view in the middle, where there is one and the scene is known.
+fn middle_truth(field: &LightField) -> Option<(Array2<f32>, Array2<f32>)> {
+    let (rows, columns) = field.n_views();
+    (rows % 2 == 1 && columns % 2 == 1).then(|| truth_of(field, rows / 2, columns / 2))?
+}
+
+/// Returns the true depth, m, and disparity, px, of the samples of a view, where the scene is known.
+fn truth_of(field: &LightField, row: usize, column: usize) -> Option<(Array2<f32>, Array2<f32>)> {
+    let depth_m = field.true_depth_m(row, column)?;
+    let disparity_px = depth_m.mapv(|depth_m| field.geometry().disparity_px(f64::from(depth_m)) as f32);
+    Some((depth_m.clone(), disparity_px))
+}
+
+fn write_views_exr(field: &LightField, folder: &Path) -> Result<Vec<String>, PipelineError> {
+    let (rows, columns) = field.n_views();
+    let places = (0..rows).flat_map(|row| (0..columns).map(move |column| (row, column)));
+    places
+        .map(|(row, column)| {
+            let name = format!("view-{}-{}.exr", row + 1, column + 1);
+            let truth = truth_of(field, row, column);
+            let names: &[&str] =
+                if field.view(row, column).is_some_and(|planes| planes.len() == 3) { &["R", "G", "B"] } else { &["Y"] };
+            let mut planes: Vec<(&str, &Array2<f32>)> =
+                names.iter().copied().zip(field.view(row, column).unwrap_or_default()).collect();
+            if let Some((depth_m, disparity_px)) = &truth {
+                planes.extend([("Z", depth_m), ("disparity", disparity_px)]);
+            }
+            write_planes_exr(&folder.join(&name), &planes, ExrSamples::Single)?;
+            Ok(name)
+        })
+        .collect()
 }
 
 fn of_planes(planes: &[Array2<f32>]) -> LinearRgb {

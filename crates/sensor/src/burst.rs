@@ -61,7 +61,7 @@ impl Sensor {
         let share = (frames.len() as f32).recip();
         sum.iter_mut().for_each(|plane| plane.par_mapv_inplace(|v| v * share));
         let planes = phases::join(sum, tile, first.size()).into_iter().map(RawPlane::Volts).collect();
-        let merged = frames.iter().map(|frame| sheet.source_of(frame)).collect();
+        let merged = frames.iter().enumerate().map(|(shot, frame)| sheet.source_of(frame, shot)).collect();
         Ok(Raw {
             planes,
             levels: sheet.unit_levels(sheet.saturation_e(&first.exposure), &first.exposure),

@@ -2,6 +2,7 @@
 
 mod directional;
 mod malvar;
+mod neighbors;
 mod padded;
 mod ratio;
 mod tent;
@@ -24,7 +25,7 @@ pub enum Demosaic {
     Malvar,
     /// Color differences along the edges, weighted by their gradients in four directions (after Pekkucuksen &
     /// Altunbasak, "Gradient based threshold free color filter array interpolation", ICIP 2010). Bayer-like mosaics;
-    /// others take the fine detail of each pixel over to all colors.
+    /// others take the fine detail of each pixel over to all colors, by the ratios of neighbors behind different filters.
     Directional,
     /// The same on a logarithmic scale of light, on which it is the ratios of colors that run on along edges: they do so at
     /// shadows and at edges of one material whatever the balance, which differences do only where white is neutral (Cok,
@@ -84,6 +85,6 @@ pub fn demosaic(
         (Demosaic::Malvar, Some(bayer)) => malvar::demosaic(values, bayer, n_channels),
         (Demosaic::Directional, Some(bayer)) => directional::demosaic(values, bayer, n_channels),
         (Demosaic::DirectionalRatio, Some(bayer)) => ratio::demosaic(values, bayer, n_channels),
-        (Demosaic::Directional | Demosaic::DirectionalRatio, None) => tent::with_detail(values, tile, n_channels),
+        (Demosaic::Directional | Demosaic::DirectionalRatio, None) => neighbors::demosaic(values, tile, n_channels),
     })
 }

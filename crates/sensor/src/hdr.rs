@@ -31,7 +31,7 @@ impl Sensor {
     pub fn merge(&self, frames: &[Raw]) -> Result<Raw, SensorError> {
         self.check_merge(frames)?;
         let sheet = self.as_read(&frames[0].exposure)?;
-        let sources = frames.iter().map(|frame| sheet.source_of(frame)).collect();
+        let sources = frames.iter().enumerate().map(|(shot, frame)| sheet.source_of(frame, shot)).collect();
         Ok(sheet.merge_as(frames, sources))
     }
 
@@ -92,12 +92,28 @@ impl Sensor {
         Ok(())
     }
 
+    /// Merges reads of the same electrons with both gains, a list of pairs: the high gain first, then the low one.
+    ///
+    /// As [`merge`](Self::merge), but that reads of one exposure have one shot noise: between them the weights are the inverse of the variance
+    /// that does not depend on the signal.
+    ///
+    /// # Errors
+    /// When the frames do not fit each other.
+    pub fn merge_gains(&self, pairs: &[[Raw; 2]]) -> Result<Raw, SensorError> {
+        let frames: Vec<Raw> = pairs.iter().flatten().cloned().collect();
+        self.check_merge(&frames)?;
+        let sheet = self.as_read(&frames[0].exposure)?;
+        let sources = frames.iter().enumerate().map(|(number, frame)| sheet.source_of(frame, number / 2)).collect();
+        Ok(sheet.merge_as(&frames, sources))
+    }
+
     /// Returns what a frame is in a merge.
-    pub(crate) fn source_of(&self, frame: &Raw) -> MergedFrame {
+    pub(crate) fn source_of(&self, frame: &Raw, shot: usize) -> MergedFrame {
         MergedFrame {
             time_s: frame.exposure.time_s,
             saturation_e: frame.levels.saturation_e(),
             floor_e: self.noise_floor_e(frame),
+            shot,
         }
     }
 
@@ -117,20 +133,59 @@ impl Sensor {
     }
 }
 
+/// What the reads of one exposure tell together.
+#[derive(Clone, Copy)]
+struct Shot {
+    time_s: f64,
+    /// Electrons, the mean of the reads.
+    electrons: f64,
+    /// The square of its noise that does not depend on the signal.
+    floor_e2: f64,
+}
+
+/// The exposures of reads, of which those of one exposure follow each other.
+struct Shots<I: Iterator> {
+    reads: std::iter::Peekable<I>,
+}
+
+impl<'a, I: Iterator<Item = (&'a MergedFrame, f64)>> Iterator for Shots<I> {
+    type Item = Shot;
+
+    fn next(&mut self) -> Option<Shot> {
+        let (first, electrons) = self.reads.next()?;
+        let weight = |read: &MergedFrame| (read.floor_e.powi(2) + 1.0).recip();
+        let (mut sum, mut weights) = (weight(first) * electrons, weight(first));
+        while let Some((read, electrons)) = self.reads.next_if(|(read, _)| read.shot == first.shot) {
+            sum += weight(read) * electrons;
+            weights += weight(read);
+        }
+        // One electron keeps a noiseless dark pixel's weight finite.
+        Some(Shot { time_s: first.time_s, electrons: sum / weights, floor_e2: weights.recip() })
+    }
+}
+
+impl Shot {
+    /// The inverse of the variance of the rate that it shows, where light is of a rate.
+    fn weight(&self, e_per_s: f64) -> f64 {
+        self.time_s.powi(2) / (e_per_s * self.time_s + self.floor_e2)
+    }
+}
+
 /// Returns the merged rate of one pixel, electrons a second, or `None` where every frame is saturated.
 fn merged_rate<'a, I: Iterator<Item = (&'a MergedFrame, f32)>>(samples: impl Fn() -> I) -> Option<f64> {
-    let usable = || samples().filter(|(_, sample)| *sample < USABLE_BELOW);
-    let (electrons, time_s) = usable().fold((0.0, 0.0), |(electrons, time_s), (source, sample)| {
-        (electrons + f64::from(sample) * source.saturation_e, time_s + source.time_s)
-    });
+    let shots = || {
+        let usable = samples().filter(|(_, sample)| *sample < USABLE_BELOW);
+        Shots { reads: usable.map(|(source, sample)| (source, f64::from(sample) * source.saturation_e)).peekable() }
+    };
+    let (electrons, time_s) =
+        shots().fold((0.0, 0.0), |(electrons, time_s), shot| (electrons + shot.electrons, time_s + shot.time_s));
     if time_s == 0.0 {
         return None;
     }
     let rough_e_per_s = (electrons / time_s).max(0.0);
-    let (sum, weights) = usable().fold((0.0, 0.0), |(sum, weights), (source, sample)| {
-        // One electron keeps a noiseless dark pixel's weight finite.
-        let weight = source.time_s.powi(2) / (rough_e_per_s * source.time_s + source.floor_e.powi(2) + 1.0);
-        (sum + weight * f64::from(sample) * source.saturation_e / source.time_s, weights + weight)
+    let (sum, weights) = shots().fold((0.0, 0.0), |(sum, weights), shot| {
+        let weight = shot.weight(rough_e_per_s);
+        (sum + weight * shot.electrons / shot.time_s, weights + weight)
     });
     Some(sum / weights)
 }
@@ -143,11 +198,13 @@ pub(crate) fn merged_noise(frames: &[MergedFrame]) -> SampleNoise {
     let deviation = |sample: f64| {
         let e_per_s = sample.max(0.0) * scale;
         let is_usable = |frame: &&MergedFrame| e_per_s < f64::from(USABLE_BELOW) * frame.saturation_e_per_s();
-        let weight =
-            |frame: &MergedFrame| frame.time_s.powi(2) / (e_per_s * frame.time_s + frame.floor_e.powi(2) + 1.0);
-        let weights: f64 = frames.iter().filter(is_usable).map(weight).sum();
+        let weight_of = |reads: &mut dyn Iterator<Item = &MergedFrame>| -> f64 {
+            let shots = Shots { reads: reads.map(|frame| (frame, 0.0)).peekable() };
+            shots.map(|shot| shot.weight(e_per_s)).sum()
+        };
+        let weights = weight_of(&mut frames.iter().filter(is_usable));
         let last = frames.iter().max_by(|a, b| a.saturation_e_per_s().total_cmp(&b.saturation_e_per_s()));
-        let weights = if weights > 0.0 { weights } else { last.map_or(1.0, weight) };
+        let weights = if weights > 0.0 { weights } else { weight_of(&mut last.into_iter()) };
         weights.sqrt().recip() / scale
     };
     SampleNoise::Table(NoiseTable::new(&deviation))

@@ -126,12 +126,13 @@ impl Sensor {
         }
         let exposure = rows.short(&raw.exposure);
         let short_levels = if rows.gain_ratio > 1.0 { Levels::new(self, &exposure) } else { raw.levels.clone() };
-        let source = |exposure: &Exposure, levels: &Levels| MergedFrame {
+        let source = |shot: usize, exposure: &Exposure, levels: &Levels| MergedFrame {
             time_s: exposure.time_s,
             saturation_e: levels.saturation_e(),
             floor_e: self.floor_e(levels, exposure),
+            shot,
         };
-        let (long, short) = (source(&raw.exposure, &raw.levels), source(&exposure, &short_levels));
+        let (long, short) = (source(0, &raw.exposure, &raw.levels), source(1, &exposure, &short_levels));
         let merge = RowMerge { rows, tile_rows, long, short };
         // Codes of short rows stand for more light where their gain is lower.
         let mut linear = raw.linear();

@@ -37,6 +37,8 @@ pub struct MergedFrame {
     pub saturation_e: f64,
     /// Noise that does not depend on the signal, rms electrons.
     pub floor_e: f64,
+    /// The exposure that its electrons are of: frames of one are reads of the same, next to each other in the list.
+    pub shot: usize,
 }
 
 /// The pixels of a frame that no light reaches, together with the others.

@@ -45,11 +45,14 @@ impl Sensor {
         self.check_merge(&frames)?;
         let sheet = self.as_read(&frames[0].exposure)?;
         let small_sheet = sheet.small_photodiode().expect("a sheet as read has the pixels of its sensor");
-        let of_small = |frame: &Raw| {
-            let source = small_sheet.source_of(frame);
+        let source = |(shot, frame): (usize, &Raw)| {
+            if shot < large.len() {
+                return sheet.source_of(frame, shot);
+            }
+            let source = small_sheet.source_of(frame, shot);
             MergedFrame { time_s: source.time_s / split.area_ratio, ..source }
         };
-        let sources = large.iter().map(|frame| sheet.source_of(frame)).chain(small.iter().map(of_small)).collect();
+        let sources = frames.iter().enumerate().map(source).collect();
         Ok(sheet.merge_as(&frames, sources))
     }
 }

@@ -4,7 +4,8 @@
 
 use approx::assert_relative_eq;
 use dioptric_sensor::{
-    Adc, Cfa, ElectronRate, Exposure, Filter, Illumination, Interleaved, Levels, Noise, Raw, Sensor, SplitPixel,
+    Adc, Cfa, ElectronRate, Exposure, Filter, GainMode, Illumination, Interleaved, Levels, Noise, Raw, Sensor,
+    SplitPixel,
 };
 use dioptric_spectrum::{Quantity, SpectralImage, WavelengthGrid};
 use ndarray::{Array2, s};
@@ -196,4 +197,42 @@ fn a_filter_exposed_for_a_quarter_of_the_time_collects_a_quarter() {
     assert_relative_eq!(electrons(&part) / electrons(&whole), 0.25, max_relative = 1e-6);
     let none = Sensor { filters: vec![Filter { exposure_fraction: 0.0, ..filter }], ..whole };
     assert!(none.check().unwrap_err().to_string().contains("exposure_fraction"));
+}
+
+/// Both reads see the same electrons: noise is that of the shot and of the better read, from the dark to the low gain's saturation, at no
+/// level more than a read with the low gain alone; means hold, also where the high gain is full.
+#[test]
+fn both_gains_have_the_noise_of_one_and_the_range_of_the_other() {
+    let sensor = Sensor { prnu_fraction: 0.0, dsnu_v: 0.0, ..Sensor::built_in("imx900").unwrap() };
+    let exposure = Exposure::seconds(0.01);
+    let rate = |e_per_s: f32| ElectronRate { planes_e_per_s: vec![Array2::from_elem((256, 256), e_per_s)] };
+    let dark_e = sensor.dark_current.at(exposure.temperature_c) * exposure.time_s;
+    // Rounding is part of either read's noise.
+    let floor_e = |mode: GainMode| {
+        let gain = sensor.conversion_gain_v_per_e(mode);
+        (sensor.read_noise_v(mode) / gain).hypot(2.505e-5 / 12_f64.sqrt() / gain)
+    };
+    let both_e = (floor_e(GainMode::High).powi(-2) + floor_e(GainMode::Low).powi(-2)).sqrt().recip();
+    for (electrons, expected_floor_e) in [(5.0, both_e), (300.0, both_e), (5000.0, floor_e(GainMode::Low))] {
+        let noise = Noise::all(3);
+        let taken = sensor.electrons(&rate(electrons as f32 / 0.01), &exposure, &noise).unwrap();
+        let [high, low] = sensor.read_both_gains(&taken, &exposure, &noise).unwrap();
+        let merged = sensor.merge_gains(&[[high.raw, low.raw]]).unwrap();
+        let found_e = rates(&merged) * 0.01;
+        let (mean_e, deviation_e) = (found_e.mean().unwrap(), found_e.std(1.0));
+        let expected_e = (electrons + dark_e + expected_floor_e.powi(2)).sqrt();
+        // 65,536 pixels: .28 % of the deviation at one standard error; the high read's codes are .6 electrons apart.
+        assert_relative_eq!(mean_e, electrons + dark_e, max_relative = 4e-3, epsilon = 0.05);
+        assert_relative_eq!(deviation_e, expected_e, max_relative = 0.012);
+    }
+    // The high gain is full at 2,183 electrons, the low one at 9,458.
+    let light = rate(3e6);
+    let taken = sensor.electrons(&light, &exposure, &Noise::none()).unwrap();
+    let [high, low] = sensor.read_both_gains(&taken, &exposure, &Noise::none()).unwrap();
+    let merged = sensor.merge_gains(&[[high.raw.clone(), low.raw.clone()]]).unwrap();
+    assert!(high.raw.saturated_fraction() > 0.99 && low.raw.saturated_fraction() > 0.99);
+    assert_relative_eq!(merged.linear()[0][(0, 0)], 1.0, max_relative = 1e-3);
+    let none = Sensor { high_gain: None, ..sensor };
+    let message = none.read_both_gains(&taken, &exposure, &Noise::none()).unwrap_err().to_string();
+    assert!(message.contains("needs high_gain"), "{message}");
 }

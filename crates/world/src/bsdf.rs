@@ -7,7 +7,7 @@ use glam::Vec3;
 use std::f32::consts::FRAC_1_PI;
 
 use crate::{
-    fresnel,
+    film, fresnel,
     microfacet::Ggx,
     sampling::{Frame, ONE_MINUS_EPSILON, cosine_hemisphere},
     velvet,
@@ -93,6 +93,15 @@ pub(crate) enum Lobe<const N: usize> {
         mirrored: [f32; N],
         edge: f32,
         lost: [f32; 2],
+        rough: Option<Ggx>,
+    },
+    /// A diffuse base below a film that is about as thin as a wavelength: `base` is the reflectance of what bears the film at right angles,
+    /// `waves` the way once there and back through the film in wavelengths.
+    Filmed {
+        diffuse: [f32; N],
+        base: [f32; N],
+        waves: [f32; N],
+        index: f32,
         rough: Option<Ggx>,
     },
     /// A diffuse base below a glossy coat, which gains what the base loses (Ashikhmin & Shirley 2000).
@@ -243,6 +252,7 @@ impl<const N: usize> Bsdf<N> {
             | Lobe::Velvet { .. }
             | Lobe::Coated { .. }
             | Lobe::Layered { .. }
+            | Lobe::Filmed { .. }
             | Lobe::Substrate { .. } => false,
             Lobe::Mirror { rough, .. }
             | Lobe::Glossy { rough, .. }
@@ -288,6 +298,7 @@ impl<const N: usize> Bsdf<N> {
             | Lobe::Metal { .. }
             | Lobe::Coated { .. }
             | Lobe::Layered { .. }
+            | Lobe::Filmed { .. }
             | Lobe::Substrate { .. } => true,
             Lobe::Dielectric { .. } | Lobe::Pane { .. } | Lobe::Open => false,
         };
@@ -357,6 +368,15 @@ impl<const N: usize> Lobe<N> {
                 let below = FRAC_1_PI * i.z.abs() * (1.0 - fresnel::between(lost[0], lost[1], tail));
                 lanes(|lane| diffuse[lane] * below + common * fresnel::between(mirrored[lane], *edge, tail))
             }
+            Self::Filmed { diffuse, rough, .. } if is_reflection => {
+                let (common, cos) = match rough {
+                    Some(ggx) => facet_reflection(ggx, o, i),
+                    None => (0.0, half_cosine(o, i)),
+                };
+                let mirrored = self.filmed(cos);
+                let below = FRAC_1_PI * i.z.abs();
+                lanes(|lane| diffuse[lane] * below * (1.0 - mirrored[lane]) + common * mirrored[lane])
+            }
             Self::Substrate { diffuse, mirrored, rough } if is_reflection => {
                 let base = substrate_base(o.z.abs(), i.z.abs()) * i.z.abs();
                 let (gloss, tail) = substrate_gloss(rough.as_ref(), o, i);
@@ -417,7 +437,10 @@ impl<const N: usize> Lobe<N> {
             Self::Dielectric { index, rough: Some(ggx), .. } => {
                 rough_dielectric(ggx, if o.z > 0.0 { index[0] } else { 1.0 / index[0] }, o, i).1
             }
-            Self::Coated { rough, .. } | Self::Layered { rough, .. } | Self::Substrate { rough, .. }
+            Self::Coated { rough, .. }
+            | Self::Layered { rough, .. }
+            | Self::Filmed { rough, .. }
+            | Self::Substrate { rough, .. }
                 if is_reflection =>
             {
                 let p = self.coat_probability(o);
@@ -437,9 +460,10 @@ impl<const N: usize> Lobe<N> {
             | Self::Metal { rough, .. }
             | Self::Dielectric { rough, .. }
             | Self::Pane { rough, .. } => rough.is_none(),
-            Self::Coated { rough, .. } | Self::Layered { rough, .. } | Self::Substrate { rough, .. } => {
-                rough.is_none() && u_lobe < self.coat_probability(o)
-            }
+            Self::Coated { rough, .. }
+            | Self::Layered { rough, .. }
+            | Self::Filmed { rough, .. }
+            | Self::Substrate { rough, .. } => rough.is_none() && u_lobe < self.coat_probability(o),
             Self::Open => true,
         }
     }
@@ -479,7 +503,10 @@ impl<const N: usize> Lobe<N> {
                     refract(o, m, eta).filter(|i| i.z * o.z < 0.0)
                 }
             }
-            Self::Coated { rough, .. } | Self::Layered { rough, .. } | Self::Substrate { rough, .. } => match rough {
+            Self::Coated { rough, .. }
+            | Self::Layered { rough, .. }
+            | Self::Filmed { rough, .. }
+            | Self::Substrate { rough, .. } => match rough {
                 Some(ggx) if u_lobe < self.coat_probability(o) => mirrored(ggx),
                 _ => Some(diffuse(side)),
             },
@@ -508,6 +535,10 @@ impl<const N: usize> Lobe<N> {
                 let tail = fresnel::schlick_tail(cos);
                 let value = lanes(|lane| fresnel::between(mirrored[lane], *edge, tail));
                 Some(Mirrored { incident: back, value, probability: self.coat_probability(o), is_dispersed: false })
+            }
+            Self::Filmed { .. } => {
+                let (value, probability) = (self.filmed(cos), self.coat_probability(o));
+                Some(Mirrored { incident: back, value, probability, is_dispersed: false })
             }
             Self::Substrate { mirrored, .. } => {
                 let tail = fresnel::schlick_tail(cos);
@@ -563,6 +594,10 @@ impl<const N: usize> Lobe<N> {
                 let below = 1.0 - fresnel::between(lost[0], lost[1], tail);
                 lanes(|lane| diffuse[lane] * below + fresnel::between(mirrored[lane], *edge, tail))
             }
+            Self::Filmed { diffuse, .. } => {
+                let mirrored = self.filmed(cos);
+                lanes(|lane| fresnel::between(diffuse[lane], 1.0, mirrored[lane]))
+            }
             // The integral of the base over all directions is 1 - (1 - cos o/2)^5 times its reflectance.
             Self::Substrate { diffuse, mirrored, .. } => {
                 let tail = fresnel::schlick_tail(cos);
@@ -584,6 +619,12 @@ impl<const N: usize> Lobe<N> {
                 })
             }
         }
+    }
+
+    /// What a film mirrors at this cosine; of others nothing.
+    fn filmed(&self, cos: f32) -> [f32; N] {
+        let Self::Filmed { base, waves, index, .. } = self else { return [0.0; N] };
+        lanes(|lane| film::reflectance(cos.abs(), *index, base[lane], waves[lane]))
     }
 
     fn diffuse_reflection_probability(&self) -> f32 {
@@ -611,6 +652,10 @@ impl<const N: usize> Lobe<N> {
                 let tail = fresnel::schlick_tail(cos);
                 let left = 1.0 - fresnel::between(lost[0], lost[1], tail);
                 (fresnel::between(mean(mirrored), *edge, tail), mean(diffuse) * left)
+            }
+            Self::Filmed { diffuse, .. } => {
+                let mirrored = mean(&self.filmed(cos));
+                (mirrored, mean(diffuse) * (1.0 - mirrored))
             }
             Self::Substrate { diffuse, mirrored, .. } => {
                 let tail = fresnel::schlick_tail(cos);
@@ -740,6 +785,8 @@ mod tests {
             Lobe::Pane { reflectance: [0.2], transmittance: [0.7], rough },
             Lobe::Layered { diffuse: [0.5], mirrored: [0.1], edge: 0.9, lost: [0.04, 1.0], rough },
             Lobe::Layered { diffuse: [0.5], mirrored: [0.1], edge: 0.9, lost: [0.04, 1.0], rough: None },
+            Lobe::Filmed { diffuse: [0.5], base: [0.1], waves: [1.2], index: 1.4, rough },
+            Lobe::Filmed { diffuse: [0.5], base: [0.1], waves: [1.2], index: 1.4, rough: None },
             Lobe::Substrate { diffuse: [0.5], mirrored: [0.1], rough },
             Lobe::Substrate { diffuse: [0.5], mirrored: [0.1], rough: None },
             glass(1.5, None),

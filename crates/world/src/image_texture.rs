@@ -135,15 +135,33 @@ impl ImageTexture {
 
     /// Reads a picture that is held within another file, of the kinds that [`read`](Self::read) takes.
     pub(crate) fn of_bytes(bytes: &[u8], encoding: Encoding, wrap: Wrap) -> Result<Self, String> {
+        #[cfg(feature = "gltf")]
+        if bytes.starts_with(b"\xabKTX 20\xbb") {
+            return Self::of_ktx2(bytes, encoding, wrap);
+        }
         let reader = image::ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| e.to_string())?;
         match reader.format() {
-            None => return Err("expected a PNG, JPEG, TGA, TIFF, WebP or EXR picture".to_owned()),
+            None => return Err("expected a PNG, JPEG, TGA, TIFF, WebP, KTX 2 or EXR picture".to_owned()),
             Some(image::ImageFormat::Jpeg) if cfg!(not(feature = "jpeg")) => {
                 return Err("this build cannot read JPEG, expected one with the feature 'jpeg'".to_owned());
             }
             Some(_) => {}
         }
         let picture = dioptric_pictures::decode_within(bytes, TEXEL_BYTES).map_err(|e| e.to_string())?;
+        Self::of_picture(&picture, encoding, wrap)
+    }
+
+    /// Reads a KTX 2 picture packed by Basis Universal.
+    #[cfg(feature = "gltf")]
+    fn of_ktx2(bytes: &[u8], encoding: Encoding, wrap: Wrap) -> Result<Self, String> {
+        use basisu::{DecodeFlags, TargetFormat::Rgba32, Transcoder};
+        let unread = "of KTX 2, expected one packed by Basis Universal as ETC1S or UASTC of 8 bits";
+        let (columns, rows) = ktx2_size(bytes).ok_or(unread)?;
+        let texture = Transcoder::new(bytes).ok().filter(|texture| texture.supports(Rgba32) && !texture.is_video());
+        let texture = texture.ok_or(unread)?;
+        let rgba = texture.transcode(0, Rgba32, DecodeFlags::NONE).map_err(|_| unread)?;
+        let rgba = image::DynamicImage::ImageRgba8(image::RgbaImage::from_raw(columns, rows, rgba).ok_or(unread)?);
+        let picture = if texture.has_alpha() { rgba } else { rgba.to_rgb8().into() };
         Self::of_picture(&picture, encoding, wrap)
     }
 
@@ -373,6 +391,36 @@ impl Encoding {
     }
 }
 
+/// Returns the size of a KTX 2 picture whose parts lie within it and are no larger than that size needs, which the transcoder
+/// takes for granted; none of other models than ETC1S and UASTC, and of other supercompressions than BasisLZ and Zstandard.
+#[cfg(feature = "gltf")]
+fn ktx2_size(bytes: &[u8]) -> Option<(u32, u32)> {
+    let word = |at: usize| Some(u32::from_le_bytes(bytes.get(at..at.checked_add(4)?)?.try_into().ok()?));
+    let long = |at: usize| Some(u64::from_le_bytes(bytes.get(at..at.checked_add(8)?)?.try_into().ok()?));
+    let is_within = |at: u64, length: u64| at.checked_add(length).is_some_and(|end| end <= bytes.len() as u64);
+    let (columns, rows, n_levels) = (word(20)?, word(24)?, word(40)?);
+    let n_samples = u64::from(columns) * u64::from(rows);
+    let is_flat = word(28)? == 0 && word(32)? <= 1 && word(36)? == 1 && (1..=16).contains(&n_levels);
+    let (scheme, descriptor) = (word(44)?, word(48)?);
+    let model = word(usize::try_from(descriptor).ok()?.checked_add(12)?)? & 255;
+    if word(12)? != 0
+        || !is_flat
+        || scheme > 2
+        || ![163, 166].contains(&model)
+        || !(1..=MAX_SAMPLES).contains(&n_samples)
+    {
+        return None;
+    }
+    let mut is_sound = is_within(descriptor.into(), word(52)?.into()) && is_within(word(56)?.into(), word(60)?.into());
+    is_sound &= is_within(long(64)?, long(72)?);
+    // Sixteen bytes for each block of four by four.
+    let most = u64::from(columns.div_ceil(4)) * u64::from(rows.div_ceil(4)) * 16;
+    for level in 0..n_levels as usize {
+        is_sound &= is_within(long(80 + 24 * level)?, long(88 + 24 * level)?) && long(96 + 24 * level)? <= most;
+    }
+    is_sound.then_some((columns, rows))
+}
+
 #[cfg(test)]
 mod tests {
     use dioptric_pictures::save;
@@ -420,5 +468,21 @@ mod tests {
         let path = folder.path().join("c.png");
         std::fs::write(&path, b"no picture").unwrap();
         assert!(ImageTexture::read(&path, Encoding::Srgb, Wrap::Repeat).unwrap_err().to_string().contains("c.png"));
+    }
+
+    /// Changed copies of pictures packed by Basis Universal are pictures or not, and no more.
+    #[cfg(feature = "gltf")]
+    #[test]
+    fn broken_packed_pictures_do_no_harm() {
+        for (name, seed) in [
+            ("etc1s.ktx2", &include_bytes!("../tests/corpus/etc1s.ktx2")[..]),
+            ("uastc.ktx2", &include_bytes!("../tests/corpus/uastc.ktx2")[..]),
+        ] {
+            let n_read = (0..400).filter(|number| {
+                let bytes = dioptric_golden::mutant(seed, *number);
+                ImageTexture::of_bytes(&bytes, Encoding::Srgb, Wrap::Repeat).is_ok()
+            });
+            assert!(n_read.count() > 0, "{name}");
+        }
     }
 }

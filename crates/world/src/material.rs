@@ -4,9 +4,9 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    Beyond, Bsdf, Hit, MaterialId, SpectralCurve, TextureId, WorldError,
+    Beyond, Bsdf, Film, Hit, MaterialId, SpectralCurve, TextureId, WorldError,
     bsdf::{Lobe, MAX_LOBES},
-    fresnel,
+    film, fresnel,
     microfacet::Ggx,
     sampling::Frame,
     texture::Textures,
@@ -230,6 +230,10 @@ pub(crate) struct Surface {
     pub(crate) absorption: Option<SpectralCurve>,
     /// How far what is brushed is turned from u, counterclockwise, rad.
     pub(crate) turn_rad: f32,
+    /// What lets diffuse light through the base of glTF's material: the share of it, and its color (`KHR_materials_diffuse_transmission`).
+    pub(crate) behind: Option<[TextureId; 2]>,
+    /// The film over the base of glTF's material (`KHR_materials_iridescence`).
+    pub(crate) film: Option<Film>,
     /// Whether rays may pass as if the surface weren't there.
     pub(crate) has_gaps: bool,
 }
@@ -241,7 +245,19 @@ impl Surface {
             _ => None,
         };
         let has_gaps = material == Material::Open;
-        Self { name, material, relief, inside, coverage: None, glow: None, absorption: None, turn_rad: 0.0, has_gaps }
+        let (coverage, glow, absorption, behind, film) = (None, None, None, None, None);
+        Self { name, material, relief, inside, coverage, glow, absorption, turn_rad: 0.0, behind, film, has_gaps }
+    }
+
+    /// How many kinds of scattering it has besides those of its parts.
+    fn n_own_lobes(&self) -> usize {
+        match &self.material {
+            Material::Blend { .. } | Material::Sum { .. } => 0,
+            Material::MetallicRoughness { transmission, .. } => {
+                1 + usize::from(transmission.is_some()) + usize::from(self.behind.is_some())
+            }
+            _ => 1,
+        }
     }
 }
 
@@ -279,15 +295,6 @@ impl Material {
             Self::Blend { of, .. } | Self::Sum { of } => of,
             Self::Clearcoat { base, .. } | Self::Sheen { base, .. } => std::slice::from_ref(base),
             _ => &[],
-        }
-    }
-
-    /// How many kinds of scattering it has besides those of its parts.
-    fn n_own_lobes(&self) -> usize {
-        match self {
-            Self::Blend { .. } | Self::Sum { .. } => 0,
-            Self::MetallicRoughness { transmission: Some(_), .. } => 2,
-            _ => 1,
         }
     }
 }
@@ -442,23 +449,37 @@ impl Surfaces<'_> {
                 let through = transmission.map_or(0.0, number);
                 let strength = brushed.map_or(0.0, number);
                 let rough = Ggx::new(alpha + (1.0 - alpha) * strength * strength, alpha);
+                let (behind, behind_color) =
+                    surface.behind.map_or((0.0, [0.0; N]), |[share, color]| (number(share), share_of(color)));
+                let below = (1.0 - metallic) * (1.0 - through);
+                let diffuse = lanes(|lane| color[lane] * below * (1.0 - behind));
+                let straight = lanes(|lane| mirrored[lane] + metallic * (color[lane] - mirrored[lane]));
                 let lost = [mirrored.iter().copied().fold(0.0, f32::max), edge];
-                let base = (1.0 - metallic) * (1.0 - through);
-                let layered = Lobe::Layered {
-                    diffuse: lanes(|lane| color[lane] * base),
-                    mirrored: lanes(|lane| mirrored[lane] + metallic * (color[lane] - mirrored[lane])),
-                    edge: edge + metallic * (1.0 - edge),
-                    lost,
-                    rough,
+                let cos = bsdf.cosine();
+                // The layer, and what it lets through to the base.
+                let (layer, let_through): (Lobe<N>, [f32; N]) = match surface.film {
+                    None => {
+                        let edge = edge + metallic * (1.0 - edge);
+                        let mirrored = fresnel::between(lost[0], lost[1], fresnel::schlick_tail(cos));
+                        (Lobe::Layered { diffuse, mirrored: straight, edge, lost, rough }, [1.0 - mirrored; N])
+                    }
+                    Some(Film { index, thickness_nm }) => {
+                        let thickness_nm = self.textures.number(thickness_nm, at).max(0.0);
+                        let waves = wavelengths_nm.map(|nm| 2.0 * index * thickness_nm / nm);
+                        let let_through =
+                            lanes(|lane| 1.0 - film::reflectance(cos, index, straight[lane], waves[lane]));
+                        (Lobe::Filmed { diffuse, base: straight, waves, index, rough }, let_through)
+                    }
                 };
-                if through <= 0.0 || metallic >= 1.0 {
-                    layered
+                let (clear, behind) = ((1.0 - metallic) * through, below * behind);
+                if clear <= 0.0 && behind <= 0.0 {
+                    layer
                 } else {
-                    let tail = fresnel::schlick_tail(bsdf.cosine());
-                    let left = (1.0 - metallic) * through * (1.0 - fresnel::between(lost[0], lost[1], tail));
-                    bsdf.push_term(share, layered);
-                    let pane = Lobe::Pane { reflectance: [0.0; N], transmittance: color.map(|c| c * left), rough };
-                    bsdf.push_term(share, pane);
+                    bsdf.push_term(share, layer);
+                    let transmittance = lanes(|lane| color[lane] * (clear * let_through[lane]));
+                    bsdf.push_term(share, Lobe::Pane { reflectance: [0.0; N], transmittance, rough });
+                    let transmittance = lanes(|lane| behind_color[lane] * behind * let_through[lane]);
+                    bsdf.push_term(share, Lobe::Diffuse { reflectance: [0.0; N], transmittance });
                     return;
                 }
             }
@@ -556,8 +577,7 @@ impl Surfaces<'_> {
                     n: index,
                 });
             }
-            n_lobes[index] =
-                surface.material.n_own_lobes() + parts.iter().map(|part| n_lobes[part.0 as usize]).sum::<usize>();
+            n_lobes[index] = surface.n_own_lobes() + parts.iter().map(|part| n_lobes[part.0 as usize]).sum::<usize>();
             surface.has_gaps |= surface.coverage.is_some()
                 || matches!(surface.material, Material::Blend { .. })
                     && parts.iter().any(|part| earlier[part.0 as usize].has_gaps);

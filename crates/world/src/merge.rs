@@ -40,7 +40,10 @@ impl WorldBuilder {
         self.surfaces.extend(surfaces.into_iter().map(|mut surface| {
             numbers.material(&mut surface.material);
             surface.relief.iter_mut().for_each(|relief| numbers.grow(relief_texture(relief)));
-            surface.coverage.iter_mut().chain(&mut surface.glow).for_each(|texture| numbers.grow(texture));
+            let more =
+                surface.behind.iter_mut().flatten().chain(surface.film.iter_mut().map(|film| &mut film.thickness_nm));
+            let more = more.chain(&mut surface.coverage).chain(&mut surface.glow);
+            more.for_each(|texture| numbers.grow(texture));
             surface
         }));
         let group_of = |group: GroupId| if group == GroupId::ROOT { group } else { GroupId(group.0 + numbers.groups) };

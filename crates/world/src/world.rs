@@ -9,8 +9,8 @@ use dioptric_spectrum::{SmoothReflectance, lanes};
 use glam::{DAffine3, DVec3, Vec2, Vec3};
 
 use crate::{
-    Bsdf, Emission, GroupId, Hit, InstanceId, Light, LightSample, Material, MaterialId, Ray, Receiver, Relief, Shape,
-    ShapeId, SpectralCurve, Texture, TextureId, TriangleMesh, WorldCamera, WorldError,
+    Bsdf, Choices, Emission, Film, GroupId, Hit, InstanceId, Light, LightSample, Material, MaterialId, Ray, Receiver,
+    Relief, Shape, ShapeId, SpectralCurve, Texture, TextureId, TriangleMesh, WorldCamera, WorldError,
     group::{Crossing, Group, GroupParts, Instance, Parts, Primitive},
     lights::Lights,
     material::{Surface, Surfaces},
@@ -37,6 +37,7 @@ pub struct World {
     textures: Vec<Texture>,
     lights: Lights,
     cameras: Vec<WorldCamera>,
+    choices: Choices,
     notes: Vec<String>,
     /// Whether rays pass some of its surfaces.
     has_gaps: bool,
@@ -283,6 +284,11 @@ impl World {
         &self.cameras
     }
 
+    /// What its file can show in place of what it shows.
+    pub fn choices(&self) -> &Choices {
+        &self.choices
+    }
+
     /// What of a file wasn't understood, and what stands in its place; a sentence each.
     pub fn notes(&self) -> &[String] {
         &self.notes
@@ -524,6 +530,7 @@ pub struct WorldBuilder {
     pub(crate) textures: Vec<Texture>,
     pub(crate) lights: Vec<NewLight>,
     pub(crate) cameras: Vec<WorldCamera>,
+    choices: Choices,
     pub(crate) notes: Notes,
     pub(crate) sources: Vec<PathBuf>,
     up: DVec3,
@@ -579,6 +586,7 @@ impl WorldBuilder {
             textures: Vec::new(),
             lights: Vec::new(),
             cameras: Vec::new(),
+            choices: Choices::default(),
             notes: Notes::default(),
             sources: Vec::new(),
             up: DVec3::Y,
@@ -635,6 +643,20 @@ impl WorldBuilder {
     pub fn set_turn(&mut self, material: MaterialId, turn_rad: f32) {
         if let Some(surface) = self.surfaces.get_mut(material.0 as usize) {
             surface.turn_rad = turn_rad;
+        }
+    }
+
+    /// Says what share of the base of glTF's material lets diffuse light through, and its color.
+    pub fn set_behind(&mut self, material: MaterialId, share: TextureId, color: TextureId) {
+        if let Some(surface) = self.surfaces.get_mut(material.0 as usize) {
+            surface.behind = Some([share, color]);
+        }
+    }
+
+    /// Lays a film over the base of glTF's material.
+    pub fn set_film(&mut self, material: MaterialId, film: Film) {
+        if let Some(surface) = self.surfaces.get_mut(material.0 as usize) {
+            surface.film = Some(film);
         }
     }
 
@@ -735,6 +757,16 @@ impl WorldBuilder {
         self.cameras.push(camera);
     }
 
+    /// Says what its file can show in place of what it shows.
+    pub fn set_choices(&mut self, choices: Choices) {
+        self.choices = choices;
+    }
+
+    /// What its file can show in place of what it shows.
+    pub fn choices(&self) -> &Choices {
+        &self.choices
+    }
+
     /// Adds a sentence about what wasn't understood; said again, it is counted.
     pub fn note(&mut self, note: impl Into<String>) {
         self.notes.add(note.into());
@@ -809,7 +841,7 @@ impl WorldBuilder {
         let (up, is_left_handed) = self.convention();
         let has_patterns = self.textures.iter().any(|texture| matches!(texture, Texture::Pattern { .. }));
         let patterned = Patterned::of(has_patterns, self.shapes.iter().map(|s| s.place), &self.things);
-        let Self { shapes, n_groups, instances, surfaces, textures, lights, cameras, objects, .. } = self;
+        let Self { shapes, n_groups, instances, surfaces, textures, lights, cameras, choices, objects, .. } = self;
         let of_shapes = shapes.iter().map(|shape| if shape.group == GroupId::ROOT { Some(shape.object) } else { None });
         let objects = ObjectTable::new(objects, of_shapes, instances.iter().map(|instance| instance.object));
         let (notes, sources) = (self.notes.sentences(), self.sources);
@@ -843,6 +875,7 @@ impl WorldBuilder {
             textures,
             lights,
             cameras,
+            choices,
             notes,
             has_gaps,
             sources,
@@ -887,6 +920,8 @@ impl WorldBuilder {
         }
         for surface in &self.surfaces {
             let more = surface.relief.map(Relief::texture).into_iter().chain(surface.coverage).chain(surface.glow);
+            let more =
+                more.chain(surface.behind.into_iter().flatten()).chain(surface.film.map(|film| film.thickness_nm));
             for texture in surface.material.textures().into_iter().chain(more) {
                 named("a material", "texture", texture.0, self.textures.len())?;
             }

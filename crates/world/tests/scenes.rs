@@ -134,7 +134,8 @@ fn units_scale_lengths_and_keep_light() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("world.pbrt");
     std::fs::write(&path, SMALL).unwrap();
-    let small = read_world(&path, &ReadOptions { metres_per_unit: 0.001 }, &Cancel::new()).unwrap();
+    let small =
+        read_world(&path, &ReadOptions { metres_per_unit: 0.001, ..ReadOptions::default() }, &Cancel::new()).unwrap();
     let large = read(&path).unwrap();
     let ball = hit(&small, [0.002, 0.0, -0.005], [0.0, 0.0, 1.0]).unwrap();
     assert!((ball.distance_m - 0.0045).abs() < 1e-8);
@@ -171,7 +172,8 @@ fn power_and_illuminance_set_the_light() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("world.pbrt");
         std::fs::write(&path, format!("WorldBegin {text}")).unwrap();
-        let world = read_world(&path, &ReadOptions { metres_per_unit }, &Cancel::new()).unwrap();
+        let world =
+            read_world(&path, &ReadOptions { metres_per_unit, ..ReadOptions::default() }, &Cancel::new()).unwrap();
         let sample = world.sample_light(Vec3::ZERO, 0.5, [0.3, 0.4], &[550.0]);
         (f64::from(sample.expect("a light that is seen").radiance[0]), world.notes().to_vec())
     };
@@ -447,7 +449,8 @@ fn all_reference_scenes_load() {
 #[test]
 fn figure_4_is_seen_by_its_camera() {
     let path = shared("data/paper/indestructibleObject/mainDefocused.pbrt");
-    let world = read_world(&path, &ReadOptions { metres_per_unit: 0.001 }, &Cancel::new()).unwrap();
+    let world =
+        read_world(&path, &ReadOptions { metres_per_unit: 0.001, ..ReadOptions::default() }, &Cancel::new()).unwrap();
     let camera = &world.cameras()[0];
     let CameraKind::Lens { focal_length_mm, film_distance_mm, film_diagonal_mm, .. } = camera.kind else {
         panic!("{camera:?}")

@@ -90,8 +90,11 @@ impl DualPixelSpec {
         if let BlurSpec::Views(_) = camera.blur {
             checker.wrong("blur", &camera.blur.to_string(), &with("layered or pointwise"))?;
         }
-        if matches!(camera.frames, FramesSpec::MovingBurst { .. } | FramesSpec::Interleaved { .. }) {
-            checker.wrong("frames", "MovingBurst or Interleaved", &with("Single, Burst or BracketStops"))?;
+        if matches!(
+            camera.frames,
+            FramesSpec::MovingBurst { .. } | FramesSpec::BothGains | FramesSpec::Interleaved { .. }
+        ) {
+            checker.wrong("frames", "MovingBurst, BothGains or Interleaved", &with("Single, Burst or BracketStops"))?;
         }
         if camera.light_field.is_some() {
             checker.wrong("light_field", "a light-field camera", &with("none"))?;

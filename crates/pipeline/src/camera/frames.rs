@@ -3,8 +3,8 @@
 use std::borrow::Cow;
 
 use dioptric_sensor::{
-    DisparityMap, DisparitySearch, ElectronRate, Electrons, Exposure, Interleaved, Noise, Raw, Sensor, SensorError,
-    Volts,
+    DisparityMap, DisparitySearch, ElectronRate, Electrons, Exposure, GainMode, Interleaved, Noise, Raw, Sensor,
+    SensorError, Volts,
 };
 use ndarray::Array2;
 use serde::{Deserialize, Serialize};
@@ -38,6 +38,9 @@ pub enum FramesSpec {
     /// Exposures that differ from the chosen one by powers of two, merged into one of more range; −2 is a quarter of the
     /// time.
     BracketStops(Vec<f64>),
+    /// One that is read with both gains of a dual-gain pixel, also one whose capacitor takes what overflows the photodiode (LOFIC), merged into one
+    /// of more range. The sensor states its `high_gain`.
+    BothGains,
     /// One whose rows are exposed for the chosen time and for a part of it in turn, or read with the chosen analog gain and a part of it, merged
     /// into one of more range.
     Interleaved {
@@ -126,7 +129,7 @@ impl FramesSpec {
     /// The number of frames that are taken.
     pub(crate) fn count(&self) -> usize {
         match self {
-            Self::Single | Self::Interleaved { .. } => 1,
+            Self::Single | Self::BothGains | Self::Interleaved { .. } => 1,
             Self::Burst(frames) | Self::MovingBurst { frames, .. } => *frames,
             Self::BracketStops(stops) => stops.len(),
         }
@@ -175,6 +178,9 @@ impl FramesSpec {
     fn raw_note(&self, sensor: &Sensor) -> Option<String> {
         let of_several = match self {
             Self::Single => None,
+            Self::BothGains => {
+                Some("the read of pixels with their high gain, without that with the low one".to_owned())
+            }
             Self::Burst(n) | Self::MovingBurst { frames: n, .. } => {
                 (*n > 1).then(|| format!("the first of {n} frames of a burst"))
             }
@@ -208,6 +214,10 @@ impl FramesSpec {
             Self::Single => vec![*exposure],
             Self::Burst(n) | Self::MovingBurst { frames: n, .. } => vec![*exposure; *n],
             Self::BracketStops(stops) => exposure.bracket(stops),
+            Self::BothGains => {
+                let exposed = expose_both_gains(sensor, rate, exposure, noise)?;
+                return Ok(Exposed { raw_note: self.raw_note(sensor), ..exposed });
+            }
             &Self::Interleaved { ratio, period_rows, gain_ratio } => {
                 let rows = Interleaved { ratio, period_rows, gain_ratio };
                 let exposed = expose_interleaved(sensor, rate, exposure, &rows, noise)?;
@@ -242,7 +252,7 @@ impl FramesSpec {
             _ if small_sensor.is_some() => Some(sensor.merge_split(&frames, &small_frames)?),
             Self::MovingBurst { .. } => Some(sensor.merge_moving(&frames)?),
             Self::Burst(_) | Self::BracketStops(_) => Some(sensor.merge(&frames)?),
-            Self::Single | Self::Interleaved { .. } => None,
+            Self::Single | Self::BothGains | Self::Interleaved { .. } => None,
         };
         let raw_note = self.raw_note(sensor);
         let small = small_frames.into_iter().next();
@@ -263,9 +273,12 @@ impl FramesSpec {
             Self::Single => vec![*exposure],
             Self::Burst(n) => vec![*exposure; *n],
             Self::BracketStops(stops) => exposure.bracket(stops),
-            Self::MovingBurst { .. } | Self::Interleaved { .. } => {
+            Self::MovingBurst { .. } | Self::BothGains | Self::Interleaved { .. } => {
                 let reason = "are not read photodiode by photodiode, expected Single, Burst or BracketStops".to_owned();
-                return Err(PipelineError::Unsuitable { what: "moving bursts and interleaved rows", reason });
+                return Err(PipelineError::Unsuitable {
+                    what: "moving bursts, both gains and interleaved rows",
+                    reason,
+                });
             }
         };
         let (one, sum) = (sensor.photodiode(rates.len())?, sensor.of_summed_reads(rates.len()));
@@ -321,6 +334,29 @@ fn expose_interleaved(
     let raw = sensor.digitize_interleaved(&volts, exposure, rows)?;
     let merged = Some(sensor.merge_interleaved(&raw, rows)?);
     Ok(Exposed { electrons, volts, raw, raw_note: None, merged, small: None, photodiodes: None })
+}
+
+/// Takes one frame that is read with both gains, and merges the reads.
+fn expose_both_gains(
+    sensor: &Sensor,
+    rate: &MovedRate<'_>,
+    exposure: &Exposure,
+    noise: &Noise,
+) -> Result<Exposed, PipelineError> {
+    if sensor.split_pixel.is_some() {
+        return Err(split_pixels_want("reads with both gains"));
+    }
+    if exposure.gain_mode == GainMode::High {
+        let reason =
+            "reads with both, expected exposure with gain_mode: Low, for whose saturation it is exposed".to_owned();
+        return Err(PipelineError::Unsuitable { what: "frames: BothGains", reason });
+    }
+    let electrons = sensor.electrons(&*rate([0.0; 2])?, exposure, noise)?;
+    let [high, low] = sensor.read_both_gains(&electrons, exposure, noise)?;
+    let merged = Some(sensor.merge_gains(&[[high.raw.clone(), low.raw]])?);
+    let of_high = Exposure { gain_mode: GainMode::High, ..*exposure };
+    let (electrons, volts) = (sensor.lit_electrons(electrons), sensor.lit_volts(high.volts, &of_high)?);
+    Ok(Exposed { electrons, volts, raw: high.raw, raw_note: None, merged, small: None, photodiodes: None })
 }
 
 fn digitized(sensor: &Sensor, rate: &ElectronRate, exposure: &Exposure, noise: &Noise) -> Result<Raw, SensorError> {

@@ -7,6 +7,7 @@ use std::{
 
 use dioptric_backward::{BandSampling, LightPaths};
 use dioptric_spectrum::WavelengthGrid;
+use dioptric_world::ReadOptions;
 use serde::{Deserialize, Serialize};
 
 use super::{check::Checker, world_change::WorldChange};
@@ -26,6 +27,16 @@ pub struct WorldSpec {
     /// How long the file's unit of length is, m.
     #[serde(default = "one_meter")]
     pub unit_m: f64,
+    /// How far the animations of a glTF file have come, s; without it everything stands as it is written.
+    #[serde(default)]
+    pub time_s: Option<f64>,
+    /// Which animation moves it, by its name or its number from 1, from its beginning on if no time is given; if left out the
+    /// first, and others that move what none before them does.
+    #[serde(default)]
+    pub animation: Option<String>,
+    /// Which of the variants of its materials a glTF file shows, by name; the file's own materials if left out.
+    #[serde(default)]
+    pub variant: Option<String>,
     /// What is changed in it, one after the other.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub changes: Vec<WorldChange>,
@@ -217,6 +228,9 @@ impl WorldSpec {
         Self {
             file,
             unit_m: one_meter(),
+            time_s: None,
+            animation: None,
+            variant: None,
             changes: Vec::new(),
             view: WorldView::default(),
             sky: None,
@@ -242,6 +256,16 @@ impl WorldSpec {
     /// The built-in still life in a view of so many columns and rows, with the defaults for all else.
     pub fn still_life(size: (usize, usize)) -> Self {
         Self { size: Some(size), ..Self::of_file(PathBuf::from(Self::STILL_LIFE)) }
+    }
+
+    /// Returns how its file is read.
+    pub fn reading(&self) -> ReadOptions {
+        ReadOptions {
+            metres_per_unit: self.unit_m,
+            time_s: self.time_s,
+            animation: self.animation.clone(),
+            variant: self.variant.clone(),
+        }
     }
 
     /// The name of a world of nothing, in place of a file; its frame is that of glTF.
@@ -290,6 +314,7 @@ impl WorldSpec {
 
     pub(super) fn check(&self, checker: &Checker<'_>) -> Result<(), PipelineError> {
         checker.number("unit_m", self.unit_m)?;
+        self.time_s.map_or(Ok(()), |time_s| checker.number("time_s", time_s))?;
         let point = |key: &'static str, (x, y, z): (f64, f64, f64)| {
             [x, y, z].into_iter().try_for_each(|value| checker.number(key, value))
         };
@@ -322,6 +347,10 @@ impl WorldSpec {
         if self.is_still_life() {
             if self.unit_m != one_meter() {
                 checker.wrong("unit_m", &self.unit_m.to_string(), "1, the unit of the still life")?;
+            }
+            if self.time_s.is_some() || self.animation.is_some() || self.variant.is_some() {
+                let expected = "none: nothing in the still life moves or has variants";
+                checker.wrong("time_s, animation or variant", "given", expected)?;
             }
             let has_more = self.sky.is_some() || !self.lamps.is_empty() || !self.changes.is_empty();
             if self.view != WorldView::OfFile || has_more {

@@ -5,7 +5,9 @@
 
 mod decode;
 mod depth;
+mod frame;
 mod geometry;
+mod lattice;
 mod shift;
 
 use ndarray::Array2;
@@ -13,7 +15,9 @@ use rayon::prelude::*;
 
 pub(crate) use decode::{ArrayFilm, Decoding};
 pub use depth::{DepthEstimate, DepthSearch};
-pub use geometry::ViewGeometry;
+pub use frame::ArrayFrame;
+pub use geometry::{ParallelCameras, ViewGeometry};
+pub(crate) use lattice::fitted;
 
 use crate::PipelineError;
 use shift::shifted;
@@ -35,6 +39,8 @@ pub(crate) struct View {
     pub(crate) planes: Vec<Array2<f32>>,
     /// What it counts: 0 where the rim of the pupil cuts off a part of its light.
     pub(crate) weight: f32,
+    /// Depth of what each sample sees, m, where the scene is known.
+    pub(crate) depth_m: Option<Array2<f32>>,
 }
 
 impl LightField {
@@ -86,6 +92,12 @@ impl LightField {
     /// the left. `None` where there is no such viewpoint.
     pub fn view(&self, row: usize, column: usize) -> Option<&[Array2<f32>]> {
         (row < self.rows && column < self.columns).then(|| &self.views[row * self.columns + column].planes[..])
+    }
+
+    /// Returns the true depth of what each sample of a view sees, from the center of the entrance pupil, m, where the scene is known:
+    /// along the line in the middle of the sample's light. Infinite where nothing is met, NaN where no light comes.
+    pub fn true_depth_m(&self, row: usize, column: usize) -> Option<&Array2<f32>> {
+        self.views.get(row * self.columns + column).filter(|_| column < self.columns)?.depth_m.as_ref()
     }
 
     /// Whether a view counts: whether no rim of the pupil cuts off a part of its light.
@@ -143,7 +155,7 @@ mod tests {
                 // Nearer points move to the left in views from farther right, and down in those from above.
                 pattern(x as f64 + disparity * right, y as f64 - disparity * up)
             });
-            View { planes: vec![plane], weight: 1.0 }
+            View { planes: vec![plane], weight: 1.0, depth_m: None }
         };
         let views = (0..15).map(|i| view(i / 5, i % 5)).collect();
         let lens = Lens::thin(50.0, 10.0).unwrap().at(550.0).unwrap();
@@ -181,7 +193,7 @@ mod tests {
     #[test]
     fn views_must_fit_each_other() {
         let lens = Lens::thin(50.0, 10.0).unwrap().at(550.0).unwrap();
-        let view = |rows| View { planes: vec![Array2::zeros((rows, 4))], weight: 1.0 };
+        let view = |rows| View { planes: vec![Array2::zeros((rows, 4))], weight: 1.0, depth_m: None };
         let new = |views| LightField::new((1, 2), views, ViewGeometry::cameras(&lens, 50.0, 20.0, 0.1));
         assert!(new(vec![view(3), view(3)]).is_ok());
         for views in [vec![view(3)], vec![view(3), view(4)], vec![view(0), view(0)]] {

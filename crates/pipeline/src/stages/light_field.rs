@@ -1,12 +1,13 @@
 //! The light field of a camera: the irradiance behind its array taken apart, or the pictures of a raster of cameras.
 
+use dioptric_backward::{FilmLine, MicroArray};
 use dioptric_spectrum::Cancel;
 use ndarray::Array2;
 
-use super::{Irradiance, KeptCamera, part::Part};
+use super::{Irradiance, KeptCamera, part::Part, watch::Watch};
 use crate::{
-    FilmSpec, FocusSpec, LightField, LightFieldSpec, PipelineError, Progress, SceneSource, ViewGeometry,
-    light_field::{ArrayFilm, Decoding, View},
+    ArrayFrame, FilmSpec, FocusSpec, LightField, LightFieldSpec, PipelineError, Progress, SceneSource, ViewGeometry,
+    light_field::{ArrayFilm, Decoding, View, fitted},
 };
 
 impl KeptCamera {
@@ -46,10 +47,46 @@ impl KeptCamera {
         progress: &dyn Progress,
         cancel: &Cancel,
     ) -> Result<LightField, PipelineError> {
-        let Some(array) = self.camera().light_field.as_ref().and_then(LightFieldSpec::micro_array) else {
-            return Err(no_light_field());
+        self.taken_apart(|_| Ok(irradiance.summary.seen.planes.to_vec()), n_views, &Watch { progress, cancel })
+    }
+
+    /// Returns the light field of a frame that was taken behind this camera's array; with a white picture, by the lattice that is found in it,
+    /// which is returned too.
+    ///
+    /// # Errors
+    /// When the camera has no array, its numbers and the frame do not go together, or the white picture does not show the array.
+    pub fn decoded_frame(
+        &self,
+        frame: &ArrayFrame,
+        n_views: Option<usize>,
+        progress: &dyn Progress,
+        cancel: &Cancel,
+    ) -> Result<(LightField, MicroArray), PipelineError> {
+        let mut array = self.micro_array()?;
+        let planes = |decoding: &mut Decoding<'_>| {
+            if let Some(white) = frame.white() {
+                decoding.array = fitted(decoding, white)?;
+            }
+            array = decoding.array;
+            Ok(frame.planes().to_vec())
         };
-        let (lens, place) = self.lens_and_film(progress, cancel)?;
+        let field = self.taken_apart(planes, n_views, &Watch { progress, cancel })?;
+        Ok((field, array))
+    }
+
+    fn micro_array(&self) -> Result<MicroArray, PipelineError> {
+        self.camera().light_field.as_ref().and_then(LightFieldSpec::micro_array).ok_or_else(no_array)
+    }
+
+    /// Takes the planes apart that `planes_of` returns, which may change how.
+    fn taken_apart(
+        &self,
+        planes_of: impl FnOnce(&mut Decoding<'_>) -> Result<Vec<Array2<f32>>, PipelineError>,
+        n_views: Option<usize>,
+        watch: &Watch<'_>,
+    ) -> Result<LightField, PipelineError> {
+        let array = self.micro_array()?;
+        let (lens, place) = self.lens_and_film(watch.progress, watch.cancel)?;
         let [right_mm, down_mm] = place.exit_pupil_axis_mm;
         let film = ArrayFilm {
             rows: place.rows,
@@ -59,8 +96,11 @@ impl KeptCamera {
             array_distance_mm: place.film_distance_mm,
             exit_pupil_axis_mm: [right_mm, -down_mm],
         };
-        let decoding = Decoding { array: &array, lens: &lens.reference, film: &film, n_views };
-        decoding.light_field(&irradiance.summary.seen.planes)
+        let mut decoding = Decoding { array, lens: &lens.reference, film: &film, n_views };
+        let planes = planes_of(&mut decoding)?;
+        let inputs = self.irradiance_inputs()?;
+        let render = self.chain(watch.progress, watch.cancel).world_render(&inputs)?;
+        decoding.light_field(&planes, Some(&|lines: &[FilmLine]| render.depth_along(lines, watch.cancel)))
     }
 
     /// Takes the pictures of a raster of cameras.
@@ -98,15 +138,22 @@ impl KeptCamera {
                     spec.aside_mm.1 += spacing_mm * up;
                 }
             });
-            let irradiance = aside.irradiance(&Part { progress, number, of }, cancel)?;
+            let part = Part { progress, number, of };
+            let irradiance = aside.irradiance(&part, cancel)?;
             let planes: Vec<Array2<f32>> = irradiance.summary.seen.planes.to_vec();
-            Ok(View { planes, weight: 1.0 })
+            let depth_m = aside.world_render(&part, cancel)?.auxiliary(cancel)?.z_m;
+            Ok(View { planes, weight: 1.0, depth_m: Some(depth_m) })
         });
         let views = views.collect::<Result<Vec<View>, PipelineError>>()?;
         let pitch_mm = 1e-3 * place.pitch_um;
         let geometry = ViewGeometry::cameras(&lens.reference, place.film_distance_mm, spacing_mm, pitch_mm);
         LightField::new((rows, columns), views, geometry)
     }
+}
+
+fn no_array() -> PipelineError {
+    let reason = "the camera has no array before its film, expected 'light_field: Array((...))'".to_owned();
+    PipelineError::Unsuitable { what: "light_field", reason }
 }
 
 fn no_light_field() -> PipelineError {

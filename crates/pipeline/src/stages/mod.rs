@@ -84,5 +84,5 @@ pub use video::{Video, VideoFrame, VideoFrameFacts};
 pub use white_of::WhiteOf;
 pub use world::WorldRender;
 pub use world_change::change_world;
-pub use world_summary::{CameraSummary, WorldSummary};
+pub use world_summary::{AnimationSummary, CameraSummary, WorldSummary};
 pub use world_view::world_camera;

@@ -14,6 +14,7 @@ use dioptric_optics::{Iris, LensFile};
 use dioptric_scene::{FileReading, FillDepth, PointTable, Scene, may_be_read_with};
 use dioptric_sensor::{ExposureControl, Noise, OpticalFilter, Processing, Sensor, WhiteBalance};
 use dioptric_spectrum::Illuminant;
+use dioptric_world::ReadOptions;
 use serde::{Deserialize, Serialize};
 
 use super::{
@@ -119,7 +120,7 @@ pub(crate) struct SceneInputs {
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct WorldInputs {
     pub(crate) file: PathBuf,
-    pub(crate) unit_m: f64,
+    pub(crate) reading: ReadOptions,
     pub(crate) changes: Vec<WorldChange>,
     pub(crate) sky: Option<WorldSky>,
     pub(crate) lamps: Vec<WorldLamp>,
@@ -296,7 +297,7 @@ impl GeometryInputs {
         });
         let inputs = WorldInputs {
             file: spec.file.clone(),
-            unit_m: spec.unit_m,
+            reading: spec.reading(),
             changes: spec.changes.clone(),
             sky: spec.sky.clone(),
             lamps: spec.lamps.clone(),

@@ -3,14 +3,14 @@
 use std::{fs, path::Path, sync::Arc};
 
 use dioptric_backward::{
-    Auxiliary, Bands, Camera, GatheredView, LensCamera, LensCameraSettings, LensOrigin, LightPaths, Pinhole, PixelGrid,
-    RenderSettings, Renderer, Rendering, ViewDetail, auxiliary, gathered_view, layered_depth, write_auxiliary_exr,
-    write_rendering_exr,
+    Auxiliary, Bands, Camera, FilmLine, GatheredView, LensCamera, LensCameraSettings, LensOrigin, LightPaths, Pinhole,
+    PixelGrid, RenderSettings, Renderer, Rendering, ViewDetail, auxiliary, depth_along, gathered_view, layered_depth,
+    write_auxiliary_exr, write_rendering_exr,
 };
 use dioptric_optics::{Lens, glam::DVec2};
 use dioptric_scene::{HiddenLayer, Scene, SceneLight, View};
 use dioptric_spectrum::{Cancel, DepthMap, Illuminant, Quantity, SpectralImage, WavelengthGrid};
-use dioptric_world::{CameraKind, Flux, Light, ReadOptions, World, WorldBuilder, WorldCamera, glam::DVec3, open_world};
+use dioptric_world::{CameraKind, Flux, Light, World, WorldBuilder, WorldCamera, glam::DVec3, open_world};
 use ndarray::Array2;
 
 use super::{
@@ -62,7 +62,7 @@ pub(super) fn read(inputs: &WorldInputs, watch: &Watch<'_>) -> Result<World, Pip
     }
     let is_file = inputs.file.as_os_str() != WorldSpec::EMPTY;
     let mut builder = match is_file {
-        true => open_world(&inputs.file, &ReadOptions { metres_per_unit: inputs.unit_m }, watch.cancel)?,
+        true => open_world(&inputs.file, &inputs.reading, watch.cancel)?,
         false => WorldBuilder::new(),
     };
     let extent_m = builder.extent_m();
@@ -88,7 +88,7 @@ pub(super) fn read(inputs: &WorldInputs, watch: &Watch<'_>) -> Result<World, Pip
         Some("stl") => MOST_LIKELY_OF_STL_M,
         _ => MOST_LIKELY_M,
     };
-    if is_file && inputs.unit_m == 1.0 && extent_m > most_likely_m {
+    if is_file && inputs.reading.metres_per_unit == 1.0 && extent_m > most_likely_m {
         builder.note(format!(
             "the file says no unit: in metres, as it is taken, all of it is {extent_m:.0} m wide; --unit-m 0.001 takes millimetres"
         ));
@@ -465,6 +465,14 @@ impl WorldRender {
         Ok(auxiliary(&self.world, &self.camera, &self.bands.grid, cancel)?)
     }
 
+    /// Returns the depth of what is met along lines from the film through the array before it, m from the center of the entrance pupil.
+    pub(super) fn depth_along(&self, lines_mm: &[FilmLine], cancel: &Cancel) -> Result<Vec<f32>, PipelineError> {
+        match &self.camera {
+            Camera::Lens(lens) => Ok(depth_along(&self.world, lens, lines_mm, cancel)?),
+            _ => Ok(vec![f32::NAN; lines_mm.len()]),
+        }
+    }
+
     /// Writes a picture with its standard errors and its depth, and beside it `auxiliary.exr`; returns the names of the files.
     ///
     /// # Errors
@@ -497,8 +505,8 @@ fn fingerprint(world: &World, spec: &WorldSpec) -> String {
         hasher.update(&[u8::from(is_read)]);
         hasher.update(own.finalize().as_bytes());
     }
-    let changes = if spec.changes.is_empty() { String::new() } else { format!(" {:?}", spec.changes) };
-    let gain = if world.gain() == 1.0 { String::new() } else { format!(" {}", world.gain()) };
-    let hash = hasher.finalize().to_hex();
-    format!("{hash} {} {:?} {:?} {:?}{changes}{gain}", spec.unit_m, spec.view, spec.sky, spec.lamps)
+    let WorldSpec { unit_m, time_s, animation, variant, changes, view, sky, lamps, .. } = spec;
+    let shown = (time_s, animation, variant);
+    let (hash, gain) = (hasher.finalize().to_hex(), world.gain());
+    format!("{hash} {unit_m} {shown:?} {changes:?} {view:?} {sky:?} {lamps:?} {gain}")
 }

@@ -36,7 +36,7 @@ pub fn change_world(builder: &mut WorldBuilder, change: &WorldChange, cancel: &C
             builder.add_shape(shape, place, material, None);
         }
         WorldChange::AddFile { name, file, unit_m, at_m } => {
-            let part = open_world(file, &ReadOptions { metres_per_unit: *unit_m }, cancel)?;
+            let part = open_world(file, &ReadOptions { metres_per_unit: *unit_m, ..ReadOptions::default() }, cancel)?;
             builder.add_world(part, name, DAffine3::from_translation(point(*at_m)?))?;
         }
         WorldChange::Move { object, by_m } => builder.move_object(object, point(*by_m)?)?,

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use dioptric_world::{CameraKind, World, WorldCamera};
+use dioptric_world::{Animation, CameraKind, World, WorldCamera};
 use serde::Serialize;
 
 use super::world_view::horizontal_fov_deg;
@@ -29,6 +29,10 @@ pub struct WorldSummary {
     pub materials: Vec<String>,
     /// Its cameras, in the order in which `--camera N` counts them from 1.
     pub cameras: Vec<CameraSummary>,
+    /// Its animations, in the order in which `--animation N` counts them from 1.
+    pub animations: Vec<AnimationSummary>,
+    /// The variants of its materials.
+    pub variants: Vec<String>,
     /// The files that it was read from, pictures included.
     pub sources: Vec<PathBuf>,
     /// What of it isn't understood, and what stands in its place.
@@ -52,6 +56,15 @@ pub struct CameraSummary {
     pub forward: [f64; 3],
 }
 
+/// How things of a file move.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct AnimationSummary {
+    /// Its name, or its number where the file gives none.
+    pub name: String,
+    /// When it ends, s.
+    pub end_s: f64,
+}
+
 impl WorldSummary {
     /// Sums up a world that was read.
     pub fn of(world: &World, spec: &WorldSpec) -> Self {
@@ -68,9 +81,17 @@ impl WorldSummary {
             objects: world.object_names().to_vec(),
             materials,
             cameras: world.cameras().iter().map(CameraSummary::of).collect(),
+            animations: world.choices().animations.iter().map(AnimationSummary::of).collect(),
+            variants: world.choices().variants.clone(),
             sources: world.sources().to_vec(),
             notes: world.notes().to_vec(),
         }
+    }
+}
+
+impl AnimationSummary {
+    fn of(Animation { name, end_s }: &Animation) -> Self {
+        Self { name: name.clone(), end_s: *end_s }
     }
 }
 

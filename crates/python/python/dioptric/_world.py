@@ -112,6 +112,8 @@ class World:
         towards the viewer.
     unit_m : float
         Length of the file's unit, m.
+    time_s, animation, variant : optional
+        Of a glTF file, as of `Scene.world`.
 
     Objects have names, which `names` lists. In a name that is asked for, ``*`` stands for any letters and ``?`` for one; what an object is
     made of goes with it. Lengths are metres. An object that isn't there is a `ValueError` that tells which names are near.
@@ -127,8 +129,16 @@ class World:
     >>> scene = world.scene(samples=16)
     """
 
-    def __init__(self, path: _Path | None = None, *, unit_m: float = 1.0) -> None:
-        self._native = _World(None if path is None else os.fspath(path), unit_m)
+    def __init__(
+        self,
+        path: _Path | None = None,
+        *,
+        unit_m: float = 1.0,
+        time_s: float | None = None,
+        animation: str | None = None,
+        variant: str | None = None,
+    ) -> None:
+        self._native = _World(None if path is None else os.fspath(path), unit_m, time_s, animation, variant)
 
     def _change(self, kind: str, **words: Any) -> None:
         self._native.change({kind: {key: value for key, value in words.items() if value is not None}})
@@ -442,5 +452,5 @@ class World:
         return self.__copy__()
 
     def __repr__(self) -> str:
-        file, _, changes = self._native.parts()
-        return f"<World {file}: {len(self.names)} objects, {len(changes)} changes>"
+        words = self._native.words()
+        return f"<World {words['file']}: {len(self.names)} objects, {len(words.get('changes', []))} changes>"

@@ -20,13 +20,18 @@ impl Block {
         let (n_rows, n_columns) = frame.dim();
         let width = columns + 2 * margin;
         let mut values = Vec::with_capacity(width * (rows + 2 * margin));
-        let places: Vec<usize> = (0..width).map(|c| mirrored(column + c, margin, n_columns)).collect();
-        for r in 0..rows + 2 * margin {
-            let from = frame.row(mirrored(row + r, margin, n_rows));
+        let places = mirrored_places(column, columns, margin, n_columns);
+        for r in mirrored_places(row, rows, margin, n_rows) {
+            let from = frame.row(r);
             values.extend(places.iter().map(|&c| from[c]));
         }
         Self { width, values }
     }
+}
+
+/// Returns the places in 0..n of `n_cut` places from `first` on with a margin on both sides, mirrored as a block is.
+pub(super) fn mirrored_places(first: usize, n_cut: usize, margin: usize, n: usize) -> Vec<usize> {
+    (0..n_cut + 2 * margin).map(|i| mirrored(first + i, margin, n)).collect()
 }
 
 /// Returns the place in 0..n of place `shifted` − `margin`, mirrored about 0 and n − 1; n is at least 2.

@@ -26,14 +26,14 @@ pub(super) fn demosaic(values: &Array2<f32>, bayer: Bayer, n_channels: usize) ->
 
 /// Returns asinh(v / s).
 #[inline]
-fn scaled(v: f32) -> f32 {
+pub(super) fn scaled(v: f32) -> f32 {
     let x = v.abs() / SOFTNESS;
     (x + (x * x + 1.0).sqrt()).ln().copysign(v)
 }
 
 /// Returns s sinh(y).
 #[inline]
-fn unscaled(y: f32) -> f32 {
+pub(super) fn unscaled(y: f32) -> f32 {
     let e = y.exp();
     0.5 * SOFTNESS * (e - e.recip())
 }

@@ -288,6 +288,17 @@ impl DngFile {
     /// # Errors
     /// When a setting makes no sense, or asks for what the file does not hold: the lens, quantum efficiencies, or noise.
     pub fn develop(&self, processing: &Processing) -> Result<Developed, SensorError> {
+        let linear = self.develop_linear(processing)?;
+        let mut developed = linear.encode(processing.brightness, processing.curve, processing.space);
+        developed.picture = developed.picture.oriented(self.orientation);
+        Ok(developed)
+    }
+
+    /// Returns the linear light of the frame, as [`develop`](Self::develop) has it before brightness and tone curve, not turned.
+    ///
+    /// # Errors
+    /// As [`develop`](Self::develop).
+    pub fn develop_linear(&self, processing: &Processing) -> Result<LinearPicture, SensorError> {
         let white = match (&processing.white, &self.neutral) {
             (WhiteBalance::Scene, Some(neutral)) => {
                 let largest = neutral.iter().copied().fold(0.0, f64::max);
@@ -319,9 +330,7 @@ impl DngFile {
         ) {
             self.render(&mut linear);
         }
-        let mut developed = linear.encode(processing.brightness, processing.curve, processing.space);
-        developed.picture = developed.picture.oriented(self.orientation);
-        Ok(developed)
+        Ok(linear)
     }
 }
 

@@ -28,7 +28,9 @@ impl<const N: usize> Bsdf<N> {
         let (mut sum, mut shares) = (0.0, 0.0);
         for (factor, lobe) in self.lobes() {
             let (weight, of) = match lobe {
-                Lobe::Diffuse { .. } | Lobe::RoughDiffuse { .. } | Lobe::Layered { .. } => (1.0, factor.share),
+                Lobe::Diffuse { .. } | Lobe::RoughDiffuse { .. } | Lobe::Layered { .. } | Lobe::Filmed { .. } => {
+                    (1.0, factor.share)
+                }
                 Lobe::Substrate { .. } => (PI * substrate_base(1.0, cos) / base_seen(1.0), factor.share),
                 Lobe::Coated { index, inside, .. } => {
                     let let_in = 1.0 - fresnel::dielectric(cos, index[0]);
@@ -54,6 +56,9 @@ impl<const N: usize> Bsdf<N> {
                 Lobe::Layered { mirrored, edge, lost, rough: rough @ Some(_), .. } => {
                     Lobe::Layered { diffuse: [0.0; N], mirrored, edge, lost, rough }
                 }
+                Lobe::Filmed { base, waves, index, rough: rough @ Some(_), .. } => {
+                    Lobe::Filmed { diffuse: [0.0; N], base, waves, index, rough }
+                }
                 Lobe::Substrate { mirrored, rough: rough @ Some(_), .. } => {
                     Lobe::Substrate { diffuse: [0.0; N], mirrored, rough }
                 }
@@ -75,6 +80,7 @@ impl<const N: usize> Bsdf<N> {
                 | Lobe::Dielectric { .. }
                 | Lobe::Coated { .. }
                 | Lobe::Layered { .. }
+                | Lobe::Filmed { .. }
                 | Lobe::Substrate { .. }
                 | Lobe::Open => continue,
             };
@@ -116,6 +122,7 @@ impl<const N: usize> Bsdf<N> {
                 | Lobe::Metal { rough: None, .. }
                 | Lobe::Coated { rough: None, .. }
                 | Lobe::Layered { rough: None, .. }
+                | Lobe::Filmed { rough: None, .. }
                 | Lobe::Substrate { rough: None, .. }
                 | Lobe::Open => {
                     if let Some(mirrored) = lobe.mirrored(o, 0.0) {
@@ -132,6 +139,7 @@ impl<const N: usize> Bsdf<N> {
                 | Lobe::Dielectric { .. }
                 | Lobe::Coated { .. }
                 | Lobe::Layered { .. }
+                | Lobe::Filmed { .. }
                 | Lobe::Substrate { .. } => {}
             }
         }
@@ -157,6 +165,11 @@ impl<const N: usize> Lobe<N> {
             Self::Layered { diffuse, lost, .. } => {
                 let below = 1.0 - fresnel::between(lost[0], lost[1], mean_schlick_tail(cos));
                 lanes(|lane| diffuse[lane] * below)
+            }
+            Self::Filmed { diffuse, .. } => {
+                // At the cosine of the half vector whose tail is the mean one.
+                let mirrored = self.filmed(1.0 - mean_schlick_tail(cos).max(0.0).powf(0.2));
+                lanes(|lane| diffuse[lane] * (1.0 - mirrored[lane]))
             }
             Self::Substrate { diffuse, mirrored, .. } => {
                 lanes(|lane| diffuse[lane] * (1.0 - mirrored[lane]) * base_seen(cos))

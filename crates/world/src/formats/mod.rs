@@ -15,21 +15,53 @@ use glam::{DAffine3, DVec3};
 
 pub use self::{obj::read_obj, ply::read_ply, stl::read_stl, write::write_world};
 use crate::{
-    Encoding, Material, MaterialId, Shape, SpectralCurve, Texture, TriangleMesh, UvMapping, World, WorldBuilder,
-    WorldError,
+    Choices, Encoding, Material, MaterialId, Shape, SpectralCurve, Texture, TriangleMesh, UvMapping, World,
+    WorldBuilder, WorldError,
 };
 
 /// How a world file is read.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct ReadOptions {
     /// How long the file's unit of length is, m. glTF is in metres by its standard; others don't say.
     pub metres_per_unit: f64,
+    /// How far its animations have come, s; without it everything stands as it is written.
+    pub time_s: Option<f64>,
+    /// Which animation moves it, by name or by number from 1; without it the first, and others that move what none before
+    /// them does.
+    pub animation: Option<String>,
+    /// Which of the variants of its materials is shown, by name; without it the file's own materials.
+    pub variant: Option<String>,
 }
 
 impl Default for ReadOptions {
-    /// Files in metres.
+    /// Files in metres, as they are written.
     fn default() -> Self {
-        Self { metres_per_unit: 1.0 }
+        Self { metres_per_unit: 1.0, time_s: None, animation: None, variant: None }
+    }
+}
+
+impl ReadOptions {
+    /// Checks that a file has the animation and the variant that are asked for; a time that moves nothing is noted.
+    fn check_against(&self, path: &Path, builder: &mut WorldBuilder) -> Result<(), WorldError> {
+        let Choices { animations, variants } = builder.choices();
+        let wrong = |what: &str, name: &str, known: Vec<&str>| {
+            let known = if known.is_empty() { "it has none".to_owned() } else { known.join(", ") };
+            let reason = format!("it has no {what} '{name}'; expected one of its own: {known}");
+            Err(WorldError::Unreadable { file: path.to_owned(), reason })
+        };
+        if let Some(name) = self.variant.as_ref().filter(|name| !variants.contains(name)) {
+            return wrong("variant", name, variants.iter().map(String::as_str).collect());
+        }
+        match &self.animation {
+            Some(name) if builder.choices().animation(name).is_none() => {
+                return wrong("animation", name, animations.iter().map(|of| of.name.as_str()).collect());
+            }
+            None if self.time_s.is_some() && animations.is_empty() => {
+                builder.note("nothing in the file moves: the time changes nothing");
+            }
+            _ => {}
+        }
+        Ok(())
     }
 }
 
@@ -62,7 +94,7 @@ pub fn open_world(path: &Path, options: &ReadOptions, cancel: &Cancel) -> Result
     let mut builder = match name.rsplit_once('.').map(|(_, kind)| kind) {
         Some("pbrt") => pbrt::read(path, unit, cancel)?,
         #[cfg(feature = "gltf")]
-        Some("gltf" | "glb") => gltf::read(path, scale, cancel)?,
+        Some("gltf" | "glb") => gltf::read(path, scale, options, cancel)?,
         #[cfg(not(feature = "gltf"))]
         Some("gltf" | "glb") => return Err(WorldError::LacksFeature { file: path.to_owned(), feature: "gltf" }),
         Some("obj") => obj::read(path, unit)?,
@@ -77,6 +109,7 @@ pub fn open_world(path: &Path, options: &ReadOptions, cancel: &Cancel) -> Result
         _ => return Err(WorldError::UnknownKind { file: path.to_owned() }),
     };
     cancel.check()?;
+    options.check_against(path, &mut builder)?;
     if builder.is_empty() {
         builder.note("nothing in the file has an area: no faces and no other shapes");
     }

@@ -1,6 +1,10 @@
 //! Triangle meshes of PLY files, text and binary.
 
-use std::{fs::File, io::BufReader, path::Path};
+use std::{
+    fs::File,
+    io::{BufReader, Cursor, Read},
+    path::Path,
+};
 
 use dioptric_spectrum::srgb_decode;
 use glam::{Vec2, Vec3};
@@ -226,7 +230,11 @@ pub(super) fn read(path: &Path) -> Result<Contents, WorldError> {
     let unreadable = |reason: String| WorldError::Unreadable { file: path.to_owned(), reason };
     let file = File::open(path).map_err(|e| unreadable(e.to_string()))?;
     let n_bytes = file.metadata().map_err(|e| unreadable(e.to_string()))?.len();
-    let mut reader = Reader::new(BufReader::with_capacity(1 << 20, file));
+    // Some writers begin with capital letters.
+    let mut magic = Vec::with_capacity(3);
+    (&file).take(3).read_to_end(&mut magic).map_err(|e| unreadable(e.to_string()))?;
+    magic.make_ascii_lowercase();
+    let mut reader = Reader::new(BufReader::with_capacity(1 << 20, Cursor::new(magic).chain(file)));
     let header = Parser::<Other>::new().read_header(&mut reader).map_err(|e| malformed(path, &e))?;
     let picture = |comment: &String| Some(comment.trim().strip_prefix("TextureFile")?.trim().to_owned());
     let pictures = header.comments.iter().filter_map(picture).collect();
@@ -359,12 +367,14 @@ mod tests {
         text += "4 0 1 2 3\n";
         binary.push(4);
         (0..4_i32).for_each(|v| binary.extend(v.to_le_bytes()));
-        let meshes = [("a.ply", text.into_bytes()), ("b.ply", binary)].map(|(name, bytes)| {
-            let path = folder.path().join(name);
-            File::create(&path).unwrap().write_all(&bytes).unwrap();
-            read_ply(&path).unwrap()
-        });
-        assert_eq!(meshes[0], meshes[1]);
+        let capital = text.replacen("ply", "PLY", 1);
+        let meshes =
+            [("a.ply", text.into_bytes()), ("b.ply", binary), ("c.ply", capital.into_bytes())].map(|(name, bytes)| {
+                let path = folder.path().join(name);
+                File::create(&path).unwrap().write_all(&bytes).unwrap();
+                read_ply(&path).unwrap()
+            });
+        assert_eq!((&meshes[0], &meshes[0]), (&meshes[1], &meshes[2]));
         assert_eq!(meshes[0], TriangleMesh::quad(Vec3::Z * 3.0, Vec3::X, Vec3::Y));
     }
 

@@ -25,7 +25,11 @@ pub fn write_world(builder: &WorldBuilder, path: &Path, is_strict: bool) -> Resu
         Some("gltf" | "glb") => return Err(WorldError::LacksFeature { file: path.to_owned(), feature: "gltf" }),
         _ => return Err(WorldError::UnknownKind { file: path.to_owned() }),
     };
-    let Written { files, losses } = files;
+    let Written { files, mut losses } = files;
+    let choices = builder.choices();
+    if !(choices.animations.is_empty() && choices.variants.is_empty()) {
+        losses.push("animations, and variants of materials: what is shown is written".to_owned());
+    }
     if is_strict && !losses.is_empty() {
         return Err(WorldError::Unwritable { file: path.to_owned(), reason: losses.join("; ") });
     }

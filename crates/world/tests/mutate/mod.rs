@@ -5,7 +5,7 @@ use std::path::Path;
 use dioptric_spectrum::Cancel;
 use dioptric_world::{ReadOptions, read_world};
 
-const SEEDS: [(&str, &[u8]); 12] = [
+const SEEDS: [(&str, &[u8]); 13] = [
     ("small.pbrt", include_bytes!("../corpus/small.pbrt")),
     ("second.pbrt", include_bytes!("../corpus/second.pbrt")),
     ("square.ply", include_bytes!("../corpus/mesh.ply")),
@@ -18,6 +18,7 @@ const SEEDS: [(&str, &[u8]); 12] = [
     ("faces.ply", include_bytes!("../corpus/faces.ply")),
     ("roof.obj", include_bytes!("../corpus/roof.obj")),
     ("world.packed.glb", include_bytes!("../corpus/packed.glb")),
+    ("world.moving.glb", include_bytes!("../corpus/moving.glb")),
 ];
 
 /// Returns the seeds of the formats that are read here: name and bytes. The name's extension tells the format.
@@ -48,7 +49,7 @@ pub(crate) fn write_beside(folder: &Path) {
 pub(crate) fn read(folder: &Path, name: &str, bytes: &[u8]) -> bool {
     let path = folder.join(name);
     std::fs::write(&path, bytes).expect("a folder that can be written to");
-    match read_world(&path, &ReadOptions::default(), &Cancel::new()) {
+    match read_world(&path, &ReadOptions { time_s: Some(0.7), ..ReadOptions::default() }, &Cancel::new()) {
         Ok(_) => true,
         Err(error) => {
             let sentence = error.to_string();

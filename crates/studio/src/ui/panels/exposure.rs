@@ -92,11 +92,12 @@ fn frames(ui: &mut Ui, frames: &mut FramesSpec) {
         (FramesSpec::Burst(8), "burst"),
         (FramesSpec::MovingBurst { frames: 8, motion_px: 4.0 }, "burst by hand"),
         (FramesSpec::BracketStops(vec![-4.0, -2.0, 0.0]), "bracket"),
+        (FramesSpec::BothGains, "both gains"),
         (FramesSpec::Interleaved { ratio: 8.0, period_rows: 2, gain_ratio: 1.0 }, "interleaved rows"),
     ];
     variant(ui, "frames", "How many frames the picture is made of", frames, &kinds);
     match frames {
-        FramesSpec::Single => {}
+        FramesSpec::Single | FramesSpec::BothGains => {}
         FramesSpec::Burst(n) => drop(count(ui, "frames of burst", "Frames that are merged", 1..=64, n)),
         FramesSpec::MovingBurst { frames, motion_px } => {
             count(ui, "frames of burst", "Frames that are aligned and merged", 1..=64, frames);

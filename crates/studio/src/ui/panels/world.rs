@@ -4,7 +4,7 @@ use dioptric_pipeline::{BandSampling, LightPaths, RenderEffort, RenderMethod, Wo
 use egui::{CollapsingHeader, Ui};
 
 use super::{
-    super::fields::{NumberField, choice, count, tick, variant},
+    super::fields::{NumberField, choice, count, text, tick, variant},
     Desk, path,
 };
 
@@ -39,6 +39,23 @@ pub(super) fn show(ui: &mut Ui, world: &mut WorldSpec, desk: &Desk<'_>) {
 fn more(ui: &mut Ui, world: &mut WorldSpec) {
     let unit = "Length of the file's unit";
     NumberField::by_factors("unit", "m", 1e-9..=1e9, 1e-3..=10.0, unit).show(ui, &mut world.unit_m);
+    let mut is_given = world.time_s.is_some();
+    let words = "How far the animations of a glTF file have come; else everything stands as it is written";
+    if tick(ui, "at a time", words, &mut is_given) {
+        world.time_s = is_given.then_some(0.0);
+    }
+    if let Some(time_s) = &mut world.time_s {
+        NumberField::even("time", "s", 0.0..=1e6, 0.0..=10.0, words).show(ui, time_s);
+    }
+    let name = |ui: &mut Ui, title, words, name: &mut Option<String>| {
+        if let Some(typed) = text(ui, title, words, name.as_deref().unwrap_or("")) {
+            *name = Some(typed).filter(|typed| !typed.is_empty());
+        }
+    };
+    let words = "Which animation moves it, by name or number; left empty the first, and others that move what none before them does";
+    name(ui, "animation", words, &mut world.animation);
+    let words = "Which of the variants of its materials a glTF file shows; left empty its own materials";
+    name(ui, "variant", words, &mut world.variant);
     let place = |label, words| NumberField::even(label, "mm", -1e9..=1e9, -1000.0..=1000.0, words);
     let words = "How far the camera stands before the place of the file's, along its axis";
     place("advance", words).show(ui, &mut world.advance_mm);

@@ -60,18 +60,37 @@ impl Component {
         }
     }
 
+    /// The integer that stands for 1.
+    fn one(self) -> f64 {
+        match self {
+            Self::I8 => 127.0,
+            Self::U8 => 255.0,
+            Self::I16 => 32767.0,
+            Self::U16 => 65535.0,
+            Self::U32 | Self::F32 => 1.0,
+        }
+    }
+
     fn read(self, bytes: &[u8], is_normalized: bool) -> f64 {
-        let share = |value: f64, most: f64| if is_normalized { (value / most).max(-1.0) } else { value };
+        let share = |value: f64| if is_normalized { (value / self.one()).max(-1.0) } else { value };
         match (self, bytes) {
-            (Self::I8, &[a]) => share(f64::from(a as i8), 127.0),
-            (Self::U8, &[a]) => share(f64::from(a), 255.0),
-            (Self::I16, &[a, b]) => share(f64::from(i16::from_le_bytes([a, b])), 32767.0),
-            (Self::U16, &[a, b]) => share(f64::from(u16::from_le_bytes([a, b])), 65535.0),
+            (Self::I8, &[a]) => share(f64::from(a as i8)),
+            (Self::U8, &[a]) => share(f64::from(a)),
+            (Self::I16, &[a, b]) => share(f64::from(i16::from_le_bytes([a, b]))),
+            (Self::U16, &[a, b]) => share(f64::from(u16::from_le_bytes([a, b]))),
             (Self::U32, &[a, b, c, d]) => f64::from(u32::from_le_bytes([a, b, c, d])),
             (Self::F32, &[a, b, c, d]) => f64::from(f32::from_le_bytes([a, b, c, d])),
             _ => 0.0,
         }
     }
+}
+
+/// Returns what stands for 1 in an accessor: an integer where those are shares.
+pub(super) fn one_of(accessor: Option<&Value>) -> f64 {
+    let word = |key: &str| accessor.and_then(|accessor| accessor.get(key));
+    let is_normalized = word("normalized").and_then(Value::as_bool).unwrap_or(false);
+    let component = word("componentType").and_then(Value::as_u64).and_then(Component::of);
+    component.filter(|_| is_normalized).map_or(1.0, Component::one)
 }
 
 /// What accessors are read from.

@@ -21,6 +21,10 @@ const WORDS: &[(&str, &str)] = &[
     ("accessors.sparse", "count:index indices:object values:object"),
     ("accessors.sparse.indices", "bufferView:index byteOffset:index componentType:code=5121|5123|5125"),
     ("accessors.sparse.values", "bufferView:index byteOffset:index"),
+    ("animations", "channels:objects samplers:objects"),
+    ("animations.channels", "sampler:index target:object"),
+    ("animations.channels.target", "node:index path:text=translation|rotation|scale|weights|pointer"),
+    ("animations.samplers", "input:index interpolation:text=LINEAR|STEP|CUBICSPLINE output:index"),
     ("asset", "copyright:text generator:text minVersion:text version:text"),
     ("buffers", "byteLength:index uri:text"),
     ("bufferViews", "buffer:index byteLength:index byteOffset:index byteStride:index target:code=34962|34963"),
@@ -54,14 +58,13 @@ const WORDS: &[(&str, &str)] = &[
     ("skins", "inverseBindMatrices:index joints:indices skeleton:index"),
     ("texture", "index:index scale:1 strength:1=0|1 texCoord:index"),
     ("textures", "sampler:index source:index"),
-    (
-        "EXT_meshopt_compression",
-        "buffer:index byteLength:index byteOffset:index byteStride:index count:index fallback:flag \
-         filter:text=NONE|OCTAHEDRAL|QUATERNION|EXPONENTIAL mode:text=ATTRIBUTES|TRIANGLES|INDICES",
-    ),
+    ("EXT_meshopt_compression", MESHOPT),
     ("EXT_mesh_gpu_instancing", "attributes:object"),
     ("EXT_mesh_gpu_instancing.attributes", "*:index"),
     ("EXT_texture_webp", "source:index"),
+    ("KHR_animation_pointer", "pointer:text"),
+    ("KHR_draco_mesh_compression", "attributes:object bufferView:index"),
+    ("KHR_draco_mesh_compression.attributes", "*:index"),
     ("KHR_lights_punctual", "light:index lights:objects"),
     ("KHR_lights_punctual.lights", "color:3=0| intensity:1=0| range:1=0| spot:object type:text"),
     ("KHR_lights_punctual.lights.spot", "innerConeAngle:1=0|1.5708 outerConeAngle:1=0|1.5708"),
@@ -71,9 +74,19 @@ const WORDS: &[(&str, &str)] = &[
         "clearcoatFactor:1=0|1 clearcoatNormalTexture:object clearcoatRoughnessFactor:1=0|1 clearcoatRoughnessTexture:object \
          clearcoatTexture:object",
     ),
+    (
+        "KHR_materials_diffuse_transmission",
+        "diffuseTransmissionColorFactor:3=0|1 diffuseTransmissionColorTexture:object diffuseTransmissionFactor:1=0|1 \
+         diffuseTransmissionTexture:object",
+    ),
     ("KHR_materials_dispersion", "dispersion:1=0|"),
     ("KHR_materials_emissive_strength", "emissiveStrength:1=0|"),
     ("KHR_materials_ior", "ior:1=0|"),
+    (
+        "KHR_materials_iridescence",
+        "iridescenceFactor:1=0|1 iridescenceIor:1=1| iridescenceTexture:object iridescenceThicknessMaximum:1=0| \
+         iridescenceThicknessMinimum:1=0| iridescenceThicknessTexture:object",
+    ),
     (
         "KHR_materials_pbrSpecularGlossiness",
         "diffuseFactor:4=0|1 diffuseTexture:object glossinessFactor:1=0|1 specularFactor:3=0|1 specularGlossinessTexture:object",
@@ -96,8 +109,15 @@ const WORDS: &[(&str, &str)] = &[
     ("KHR_materials_variants.mappings", "material:index variants:indices"),
     ("KHR_materials_variants.variants", ""),
     ("KHR_mesh_quantization", ""),
+    ("KHR_meshopt_compression", MESHOPT),
+    ("KHR_node_visibility", "visible:flag"),
+    ("KHR_texture_basisu", "source:index"),
     ("KHR_texture_transform", "offset:2 rotation:1 scale:2 texCoord:index"),
 ];
+
+/// The words of buffers packed by meshoptimizer.
+const MESHOPT: &str = "buffer:index byteLength:index byteOffset:index byteStride:index count:index fallback:flag \
+     filter:text=NONE|OCTAHEDRAL|QUATERNION|EXPONENTIAL|COLOR mode:text=ATTRIBUTES|TRIANGLES|INDICES";
 
 /// Whether an extension is read.
 pub(super) fn is_read(extension: &str) -> bool {
@@ -126,6 +146,14 @@ impl Left {
         let mut left = Self::default();
         left.look_at(root, "");
         left
+    }
+
+    /// Adds what was taken out of it later.
+    pub(super) fn append(&mut self, later: Self) {
+        self.words.extend(later.words);
+        self.wrong.extend(later.wrong);
+        self.near.extend(later.near);
+        self.extensions.extend(later.extensions);
     }
 
     fn look_at(&mut self, value: &mut Value, place: &str) {

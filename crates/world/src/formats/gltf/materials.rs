@@ -10,7 +10,7 @@ use super::{
     json::{extension, index, list, number, number_or, numbers},
 };
 use crate::{
-    Beyond, Coordinates, Emission, Encoding, ImageTexture, Material, MaterialId, Relief, SpectralCurve, Texture,
+    Beyond, Coordinates, Emission, Encoding, Film, ImageTexture, Material, MaterialId, Relief, SpectralCurve, Texture,
     TextureId, UvMapping, WorldError, Wrap,
 };
 use dioptric_spectrum::Spectrum;
@@ -95,8 +95,12 @@ impl Reader<'_> {
         name: &str,
         (color, pbr, is_glossy): (TextureId, Option<&Value>, bool),
     ) -> Result<MaterialId, WorldError> {
-        let index_of_refraction = number_or(extension(material, "KHR_materials_ior"), "ior", 1.5).max(1.0);
+        let index_of_refraction = number_or(extension(material, "KHR_materials_ior"), "ior", 1.5);
+        // An index of 0 stands for one without end.
+        let is_mirror = index_of_refraction == 0.0;
+        let index_of_refraction = index_of_refraction.max(1.0);
         let straight = (((index_of_refraction - 1.0) / (index_of_refraction + 1.0)).powi(2)) as f32;
+        let straight = if is_mirror { 1.0 } else { straight };
         let (mut mirrored, mut edge) = (self.even(straight), self.even(1.0));
         let (metallic, roughness);
         if is_glossy {
@@ -153,14 +157,36 @@ impl Reader<'_> {
             Material::MetallicRoughness { color, metallic, roughness, mirrored, edge, transmission: thin, brushed };
         let is_coated = extension(material, "KHR_materials_clearcoat")
             .filter(|coat| number_or(Some(coat), "clearcoatFactor", 0.0) > 0.0);
-        let is_filled = through.is_some() && volume.is_some();
+        let is_filled = through.is_some() && volume.is_some() && !is_mirror;
         let sheen = extension(material, "KHR_materials_sheen").filter(|sheen| {
             numbers::<3>(sheen, "sheenColorFactor").is_some_and(|color| color.iter().any(|v| *v > 0.0))
         });
         let relief_of = |is_last: bool| if is_last { relief } else { None };
-        let mut id =
-            self.builder.add_material_with(name, base, relief_of(!is_filled && is_coated.is_none() && sheen.is_none()));
-        if let (Some(through), true) = (through, volume.is_some()) {
+        let behind = self.behind(material)?;
+        let film = self.film(material)?;
+        let is_bare = !is_filled && is_coated.is_none() && sheen.is_none();
+        let mut based = |film: Option<Film>, relief: Option<Relief>| {
+            let id = self.builder.add_material_with(name, base.clone(), relief);
+            if let Some([share, color]) = behind {
+                self.builder.set_behind(id, share, color);
+            }
+            if let Some(film) = film {
+                self.builder.set_film(id, film);
+            }
+            id
+        };
+        let mut id = match film {
+            None => based(None, relief_of(is_bare)),
+            Some((film, None)) => based(Some(film), relief_of(is_bare)),
+            Some((film, Some(amount))) => {
+                let of = [based(None, None), based(Some(film), None)];
+                self.builder.add_material_with(name, Material::Blend { of, amount }, relief_of(is_bare))
+            }
+        };
+        if film.is_some() && is_filled {
+            self.builder.note_of("films over what fills its shape, left out where it lets light through", name);
+        }
+        if let Some(through) = through.filter(|_| is_filled) {
             let alpha = self.builder.add_texture(Texture::Product([roughness, roughness]));
             let glass = Material::Glass {
                 reflectance: self.even(1.0),
@@ -209,7 +235,7 @@ impl Reader<'_> {
         if brushed.is_some() {
             self.builder.set_turn(id, turn_rad);
         }
-        if let Some(per_m) = volume.filter(|_| is_filled).and_then(absorption) {
+        if let Some(per_m) = volume.filter(|_| is_filled || behind.is_some()).and_then(absorption) {
             self.builder.set_absorption(id, per_m);
         }
         Ok(id)
@@ -241,6 +267,49 @@ impl Reader<'_> {
             Some(picture) => self.builder.add_texture(picture.channel(0, factor)),
             None => self.even(factor),
         }))
+    }
+
+    /// Returns the share of the base that lets diffuse light through, and the color of that.
+    fn behind(&mut self, material: &Value) -> Result<Option<[TextureId; 2]>, WorldError> {
+        let of = extension(material, "KHR_materials_diffuse_transmission");
+        let factor = number_or(of, "diffuseTransmissionFactor", 0.0) as f32;
+        if factor <= 0.0 {
+            return Ok(None);
+        }
+        let share = match self.picture(of, "diffuseTransmissionTexture", Holds::Numbers)? {
+            Some(picture) => self.builder.add_texture(picture.channel(3, factor)),
+            None => self.even(factor),
+        };
+        let tint = of.and_then(|of| numbers::<3>(of, "diffuseTransmissionColorFactor")).unwrap_or([1.0; 3]);
+        let mut color = self.curve(SpectralCurve::from_rgb_reflectance(tint.map(|v| v as f32)));
+        if let Some(Picture { image, mapping }) = self.picture(of, "diffuseTransmissionColorTexture", Holds::Colors)? {
+            color = self.times(color, Texture::Image { image, mapping, scale: 1.0 }, tint == [1.0; 3]);
+        }
+        Ok(Some([share, color]))
+    }
+
+    /// Returns the film over the base, and its share where that isn't all.
+    fn film(&mut self, material: &Value) -> Result<Option<(Film, Option<TextureId>)>, WorldError> {
+        let of = extension(material, "KHR_materials_iridescence");
+        let factor = number_or(of, "iridescenceFactor", 0.0) as f32;
+        if factor <= 0.0 {
+            return Ok(None);
+        }
+        let amount = match self.picture(of, "iridescenceTexture", Holds::Numbers)? {
+            Some(picture) => Some(self.builder.add_texture(picture.channel(0, factor))),
+            None if factor < 1.0 => Some(self.even(factor)),
+            None => None,
+        };
+        let [least, most] = [("iridescenceThicknessMinimum", 100.0), ("iridescenceThicknessMaximum", 400.0)]
+            .map(|(word, usual)| number_or(of, word, usual) as f32);
+        let thickness_nm = match self.picture(of, "iridescenceThicknessTexture", Holds::Numbers)? {
+            Some(Picture { image, mapping }) => {
+                let green = Texture::Channel { image, channel: 1, mapping, scale: most - least, offset: least };
+                self.builder.add_texture(green)
+            }
+            None => self.even(most),
+        };
+        Ok(Some((Film { index: number_or(of, "iridescenceIor", 1.3) as f32, thickness_nm }, amount)))
     }
 
     fn relief(&mut self, material: &Value) -> Result<Option<Relief>, WorldError> {
@@ -332,8 +401,9 @@ impl Reader<'_> {
         let texture = textures.get(number);
         let texture =
             texture.ok_or_else(|| self.fault(format!("texture {number}, of which there are {}", textures.len())))?;
-        let webp = extension(texture, "EXT_texture_webp").and_then(|of| index(of, "source"));
-        let Some(source) = webp.or_else(|| index(texture, "source")) else {
+        let of = |name: &str| extension(texture, name).and_then(|of| index(of, "source"));
+        let source = of("EXT_texture_webp").or_else(|| index(texture, "source")).or_else(|| of("KHR_texture_basisu"));
+        let Some(source) = source else {
             self.builder.note_of("textures without a picture that can be read, left out", &number.to_string());
             return Ok(None);
         };
@@ -371,6 +441,10 @@ impl Reader<'_> {
         let encoding = if holds == Holds::Colors { Encoding::Srgb } else { Encoding::Linear };
         let uri = image.get("uri").and_then(Value::as_str);
         let read = match (uri, index(image, "bufferView")) {
+            (Some(uri), _) if uri.to_ascii_lowercase().ends_with(".ktx2") => match self.resource(uri) {
+                Ok(bytes) => ImageTexture::of_bytes(&bytes, encoding, Wrap::Repeat),
+                Err(error) => Err(error.to_string()),
+            },
             (Some(uri), _) if !uri.starts_with("data:") => {
                 let path = self.beside(uri);
                 self.builder.add_source(&path);
@@ -378,9 +452,7 @@ impl Reader<'_> {
             }
             (Some(uri), _) => ImageTexture::of_bytes(&self.resource(uri)?, encoding, Wrap::Repeat),
             (None, Some(view)) => {
-                let source =
-                    super::Source { root: self.root, buffers: &self.buffers, unpacked: &self.unpacked, most_zeros: 0 };
-                let (bytes, _) = source.view(view).map_err(|reason| self.fault(reason))?;
+                let (bytes, _) = self.source().view(view).map_err(|reason| self.fault(reason))?;
                 ImageTexture::of_bytes(bytes, encoding, Wrap::Repeat)
             }
             (None, None) => return Err(self.fault(format!("image {number} has neither a uri nor a bufferView"))),

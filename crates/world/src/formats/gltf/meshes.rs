@@ -1,16 +1,22 @@
 //! Meshes of glTF files: morphed, skinned and placed.
 
+use std::collections::HashMap;
+
 use glam::{DAffine3, DMat4, DVec3, Vec2, Vec3};
 use serde_json::Value;
 
 use super::{
     MOST_COPIES, Reader,
-    accessors::Rows,
-    json::{index, list},
+    accessors::{self, Rows},
+    draco,
+    json::{extension, index, list},
     numbers_of,
     own::OwnPrimitive,
 };
 use crate::{GroupId, Shape, TriangleMesh, WorldError};
+
+/// What a packed mesh may become at most, a byte.
+const MOST_EXPANSION: u64 = 128;
 
 /// A mesh's primitive as it is written.
 struct Vertices {
@@ -93,19 +99,19 @@ impl Reader<'_> {
             }
             return Ok(());
         }
-        let is_compressed = super::OF_GEOMETRY.iter().any(|name| super::extension(primitive, name).is_some());
-        let Some(vertices) = self.vertices(primitive, morphs)? else { return Ok(()) };
-        if is_compressed && vertices.mesh.positions.iter().all(|p| *p == Vec3::ZERO) {
-            self.builder.note("compressed meshes, left out");
-            return Ok(());
-        }
+        let packed = self.unpacked(primitive)?;
+        let rows = packed.as_ref().map(|packed| &packed.rows);
+        let Some(vertices) = self.vertices(primitive, rows, morphs)? else { return Ok(()) };
         let Vertices { mut mesh, joints: of_vertices, weights } = vertices;
         let n = mesh.positions.len();
-        let indices: Vec<u32> = match index(primitive, "indices") {
-            Some(accessor) => self.rows(accessor)?.values.iter().map(|v| *v as u32).collect(),
-            None => (0..n as u32).collect(),
+        mesh.triangles = match (packed, index(primitive, "indices")) {
+            (Some(packed), _) => triangles(4, &packed.indices),
+            (None, Some(accessor)) => {
+                let indices: Vec<u32> = self.rows(accessor)?.values.iter().map(|v| *v as u32).collect();
+                triangles(mode, &indices)
+            }
+            (None, None) => triangles(mode, &(0..n as u32).collect::<Vec<u32>>()),
         };
-        mesh.triangles = triangles(mode, &indices);
         let place = match joints {
             Some(joints) => {
                 skinned(&mut mesh, joints, (&of_vertices, &weights));
@@ -124,15 +130,47 @@ impl Reader<'_> {
         }
         let (material, glow) = match own {
             Some(own) => (own.material, own.emission),
-            None => self.material(index(primitive, "material"), !mesh.colors.is_empty())?,
+            None => self.material(self.material_of(primitive), !mesh.colors.is_empty())?,
         };
         self.builder.add_shape_to(group, Shape::Mesh(mesh), place, material, glow);
         Ok(())
     }
 
-    fn vertices(&mut self, primitive: &Value, morphs: &[f64]) -> Result<Option<Vertices>, WorldError> {
+    /// Unpacks a primitive that is packed by Draco.
+    fn unpacked(&self, primitive: &Value) -> Result<Option<draco::Unpacked>, WorldError> {
+        let Some(packed) = extension(primitive, "KHR_draco_mesh_compression") else { return Ok(None) };
+        let source = self.source();
+        let view = index(packed, "bufferView").ok_or_else(|| self.fault("a mesh packed by Draco has no bufferView"))?;
+        let (bytes, _) = source.view(view).map_err(|reason| self.fault(reason))?;
+        let attributes = packed.get("attributes").and_then(Value::as_object).into_iter().flatten();
+        let attributes = attributes.filter_map(|(name, id)| {
+            let accessor = primitive.get("attributes").and_then(|of| index(of, name))?;
+            let one = accessors::one_of(list(self.root, "accessors").get(accessor));
+            Some(draco::Attribute { name: name.clone(), id: u32::try_from(id.as_u64()?).ok()?, one })
+        });
+        let most_bytes = (bytes.len() as u64).saturating_mul(MOST_EXPANSION).clamp(1 << 20, super::MAX_BYTES);
+        let unpacked = draco::unpacked(bytes, attributes.collect(), most_bytes);
+        unpacked.map(Some).map_err(|reason| self.fault(format!("a mesh packed by Draco {reason}")))
+    }
+
+    /// Returns the material of a primitive, in the variant that is shown.
+    fn material_of(&self, primitive: &Value) -> Option<usize> {
+        let mappings = extension(primitive, "KHR_materials_variants").map_or(&[][..], |of| list(of, "mappings"));
+        let is_shown = |mapping: &&Value| numbers_of(mapping, "variants").iter().any(|of| Some(*of) == self.variant);
+        mappings.iter().find(is_shown).and_then(|mapping| index(mapping, "material")).or(index(primitive, "material"))
+    }
+
+    fn vertices(
+        &mut self,
+        primitive: &Value,
+        packed: Option<&HashMap<String, Rows>>,
+        morphs: &[f64],
+    ) -> Result<Option<Vertices>, WorldError> {
         let Some(Value::Object(attributes)) = primitive.get("attributes") else { return Ok(None) };
         let rows = |reader: &Self, name: &str| -> Result<Option<Rows>, WorldError> {
+            if let Some(rows) = packed.and_then(|packed| packed.get(name)) {
+                return Ok(Some(rows.clone()));
+            }
             let accessor = attributes.get(name).and_then(Value::as_u64).and_then(|n| usize::try_from(n).ok());
             accessor.map(|accessor| reader.rows(accessor)).transpose()
         };

@@ -1,4 +1,4 @@
-//! Buffers packed by meshoptimizer: the extension `EXT_meshopt_compression`.
+//! Buffers packed by meshoptimizer: the extensions `EXT_meshopt_compression` and `KHR_meshopt_compression`.
 
 use serde_json::Value;
 
@@ -78,45 +78,133 @@ fn signed(number: u32) -> u32 {
     (number >> 1) ^ (number & 1).wrapping_neg()
 }
 
+/// How a byte of all rows of a block is packed.
+#[derive(Clone, Copy)]
+enum Packing {
+    /// In differences of so many bits, by the two bits that each group has of its own.
+    Of([usize; 4]),
+    /// All alike.
+    Zeros,
+    /// In full.
+    Full,
+}
+
+/// What the differences of four bytes of rows are.
+#[derive(Clone, Copy, PartialEq)]
+enum Differences {
+    /// Of numbers of so many bytes, of alternating sign.
+    Bytes(usize),
+    /// The bits that change in all four, turned left by so many.
+    Bits(u32),
+}
+
+impl Differences {
+    fn of(code: u8) -> Option<Self> {
+        match (code & 15, code >> 4) {
+            (0, 0) => Some(Self::Bytes(1)),
+            (1, 0) => Some(Self::Bytes(2)),
+            (2, turn) => Some(Self::Bits(turn.into())),
+            _ => None,
+        }
+    }
+
+    fn add_to(self, last: &mut [u8], differences: [u8; 4]) {
+        let four = |bytes: &[u8]| bytes.iter().rev().fold(0_u32, |four, byte| four << 8 | u32::from(*byte));
+        match self {
+            Self::Bytes(1) => {
+                for (last, difference) in last.iter_mut().zip(differences) {
+                    *last = last.wrapping_add(signed(difference.into()) as u8);
+                }
+            }
+            Self::Bytes(n) => {
+                for (last, difference) in last.chunks_exact_mut(n).zip(differences.chunks_exact(n)) {
+                    let next = four(last).wrapping_add(signed(four(difference)));
+                    last.copy_from_slice(&next.to_le_bytes()[..n]);
+                }
+            }
+            Self::Bits(turn) => {
+                last.copy_from_slice(&(four(last) ^ four(&differences).rotate_right(turn)).to_le_bytes());
+            }
+        }
+    }
+}
+
 fn vertices(bytes: &[u8], count: usize, stride: usize) -> Option<Vec<u8>> {
-    let (&0xa0, rest) = bytes.split_first()? else { return None };
-    let mut last = rest.get(rest.len().checked_sub(stride)?..)?.to_vec();
-    let mut bytes = Bytes(rest.get(..rest.len().checked_sub(stride.max(32))?)?);
+    let (&version, rest) = bytes.split_first()?;
+    let n_channels = stride / 4;
+    // The first row's predecessor stands at the end and, in the second version, what the differences are.
+    let (tail, padded) = match version {
+        0xa0 => (stride, stride.max(32)),
+        0xa1 => (stride + n_channels, (stride + n_channels).max(24)),
+        _ => return None,
+    };
+    let (last, codes) = rest.get(rest.len().checked_sub(tail)?..)?.split_at(stride);
+    let mut last = last.to_vec();
+    let of_channels = match version {
+        0xa0 => vec![Differences::Bytes(1); n_channels],
+        _ => codes.iter().map(|code| Differences::of(*code)).collect::<Option<_>>()?,
+    };
+    let mut bytes = Bytes(rest.get(..rest.len().checked_sub(padded)?)?);
     let most = (BYTES_OF_BLOCK / stride / GROUP * GROUP).min(MOST_OF_BLOCK);
     let mut rows = vec![0; count * stride];
     for block in rows.chunks_mut(most * stride) {
         let n = block.len() / stride;
-        let n_groups = n.div_ceil(GROUP);
-        for (channel, last) in last.iter_mut().enumerate() {
-            let widths = bytes.take(n_groups.div_ceil(4))?;
-            for group in 0..n_groups {
-                let width = widths[group / 4] >> (2 * (group % 4)) & 3;
-                for (k, difference) in differences(&mut bytes, width)?.into_iter().enumerate() {
-                    let row = group * GROUP + k;
-                    if row < n {
-                        *last = last.wrapping_add(signed(u32::from(difference)) as u8);
-                        block[row * stride + channel] = *last;
-                    }
-                }
+        let packings = if version == 0xa0 { None } else { Some(bytes.take(n_channels)?) };
+        for (channel, differences) in of_channels.iter().enumerate() {
+            let mut four = [[0; MOST_OF_BLOCK]; 4];
+            for (k, column) in four.iter_mut().enumerate() {
+                let packing = match packings.map(|packings| packings[channel] >> (2 * k) & 3) {
+                    None => Packing::Of([0, 2, 4, 8]),
+                    Some(0) => Packing::Of([0, 1, 2, 4]),
+                    Some(1) => Packing::Of([1, 2, 4, 8]),
+                    Some(2) => Packing::Zeros,
+                    Some(_) => Packing::Full,
+                };
+                unpack(&mut bytes, packing, &mut column[..n])?;
+            }
+            let last = &mut last[4 * channel..][..4];
+            for (row, into) in block.chunks_exact_mut(stride).enumerate() {
+                differences.add_to(last, four.map(|column| column[row]));
+                into[4 * channel..][..4].copy_from_slice(last);
             }
         }
     }
     Some(rows)
 }
 
-/// Returns sixteen numbers of 0, 2, 4 or 8 bits, the largest of few bits standing for one that follows in full.
-fn differences(bytes: &mut Bytes<'_>, width: u8) -> Option<[u8; GROUP]> {
-    let bits = match width {
-        0 => return Some([0; GROUP]),
-        3 => return bytes.take(GROUP)?.try_into().ok(),
-        width => 2 * usize::from(width),
+fn unpack(bytes: &mut Bytes<'_>, packing: Packing, into: &mut [u8]) -> Option<()> {
+    let bits_of = match packing {
+        Packing::Of(bits) => bits,
+        Packing::Zeros => return Some(()),
+        Packing::Full => {
+            into.copy_from_slice(bytes.take(into.len())?);
+            return Some(());
+        }
     };
+    let n_groups = into.len().div_ceil(GROUP);
+    let widths = bytes.take(n_groups.div_ceil(4))?;
+    for (group, into) in into.chunks_mut(GROUP).enumerate() {
+        let bits = bits_of[usize::from(widths[group / 4] >> (2 * (group % 4)) & 3)];
+        into.copy_from_slice(differences(bytes, bits)?.get(..into.len())?);
+    }
+    Some(())
+}
+
+/// Returns sixteen numbers of 0, 1, 2, 4 or 8 bits, the largest of few bits standing for one that follows in full.
+fn differences(bytes: &mut Bytes<'_>, bits: usize) -> Option<[u8; GROUP]> {
+    match bits {
+        0 => return Some([0; GROUP]),
+        8 => return bytes.take(GROUP)?.try_into().ok(),
+        _ => {}
+    }
     let packed = bytes.take(GROUP * bits / 8)?;
     let full = (1_u8 << bits) - 1;
     let mut numbers = [0; GROUP];
     for (k, number) in numbers.iter_mut().enumerate() {
         let at = k * bits;
-        *number = packed[at / 8] >> (8 - bits - at % 8) & full;
+        // Single bits begin with the lowest of a byte, others with the highest.
+        let shift = if bits == 1 { at % 8 } else { 8 - bits - at % 8 };
+        *number = packed[at / 8] >> shift & full;
         if *number == full {
             *number = bytes.next()?;
         }
@@ -267,6 +355,28 @@ fn filtered(rows: &mut [u8], stride: usize, filter: &str) -> Result<(), String> 
                 number.copy_from_slice(&(value as f32).to_le_bytes());
             }
         }
+        ("COLOR", 4 | 8) => {
+            let bytes = stride / 4;
+            let number = |row: &[u8], k: usize, is_signed: bool| match (bytes, is_signed) {
+                (1, false) => i32::from(row[k]),
+                (1, true) => i32::from(row[k] as i8),
+                (_, false) => i32::from(u16::from_le_bytes([row[2 * k], row[2 * k + 1]])),
+                (_, true) => i32::from(i16::from_le_bytes([row[2 * k], row[2 * k + 1]])),
+            };
+            for row in rows.chunks_exact_mut(stride) {
+                // The highest bit of the share of cover says how many bits the numbers have.
+                let alpha = number(row, 3, false);
+                let most = (2 << alpha.max(1).ilog2()) - 1;
+                let (luma, orange, green) = (number(row, 0, false), number(row, 1, true), number(row, 2, true));
+                let cover = alpha & (most >> 1);
+                let colors = [luma + orange - green, luma + green, luma - orange - green, cover << 1 | cover & 1];
+                let full = if bytes == 1 { 255.0 } else { 65535.0 };
+                for (k, value) in colors.into_iter().enumerate() {
+                    let value = (f64::from(value) * full / f64::from(most)).round() as u16;
+                    row[bytes * k..][..bytes].copy_from_slice(&value.to_le_bytes()[..bytes]);
+                }
+            }
+        }
         _ => return Err(format!("of the filter {filter} has rows of {stride} bytes")),
     }
     Ok(())
@@ -303,6 +413,13 @@ mod tests {
         IAAeJCIEIAAeJCIEIAAeJCIEIAAeJCIEIAAeJB4EIAAeJCIEIAAeJCIEIAAeJCIEIAAeJCIEIAAeJCIEIAAeJCIEIAAeJCIEIAAeJB4EIAAeJC\
         IEIAAeJCIEIAAeJCIEIAAeJCIEIAAeJCIEIAAeJCIEIAAeJCIEIAAeJB4EIAAeJCIEIAAeJCIEIAAeJCIEIAAeJCIEIAAeJCIEIAAeJCIEIAAe\
         JCIEIAAeJB4EIAAeJCIEIAAeJCIEIAAeJCIEIAAeJCIEIAAeJCIEIAAeJCIEIAAeJCIEIAAeJBUmCSgbcVsmXW8FBXYEAgVQBAACTAAAAAA=";
+
+    /// Packed by meshoptimizer 1.3 in its second version: 36 rows whose four channels hold bits that change, numbers of 16 bits, and bits of bytes.
+    const SECOND: &str = "\
+        obq3nroAQkJCQvhCQkJC+EJCQkL4QkJCQvhCQkJC+EJCQkL4QkJCQvgAEhISEhISEhISEhISEhISEhISEhISEhISEhISEhISEhISEhIKBmZmZm\
+        ZmZmZmZmZmZmZmZg8ABgYGBgA8PDw8PDw8PDw8PDw8PDw8PDw8PDw8PDw8PDw8PDw8PDw8PADArxMqOsGl5KRDLyaW3dnISDcrotKZvRxcW/fu\
+        /qVhUFC/wwkLOCzgAwMDAyMDLwIwMgAjgAYAAwIAsdNx17FT8V+x03HXsVPxT9GzUfdRs9F/0bNR91Gz0U/xU7EAAAAAAACAPwAA6P0AAAAJAA\
+        AAAAABckI=";
 
     fn view(packed: &str, count: usize, stride: usize, mode: &str) -> Result<(Vec<u8>, Option<usize>), String> {
         let bytes = BASE64_STANDARD.decode(packed).unwrap();
@@ -345,6 +462,19 @@ mod tests {
         assert_eq!(short[2 * 30..][..2], (expected[30] as u16).to_le_bytes());
     }
 
+    #[test]
+    fn the_second_version_is_unpacked() {
+        let rows = (0..36_u32).flat_map(|i| {
+            let bits = 0x3f80_0000 ^ (i % 5 * 0x21_0000);
+            let shorts = [i * 777 % 65536, (65000 + i * 30) % 65536].map(|v| v as u16);
+            let bytes = [(i * i * i * 37 + i * 91) as u8, (i * i % 7) as u8, u8::from(i > 20), 9];
+            let scattered = (i.wrapping_mul(2_654_435_761) & 0xff) << 12;
+            let shorts = shorts.map(u16::to_le_bytes).concat();
+            [&bits.to_le_bytes()[..], &shorts, &bytes, &scattered.to_le_bytes()].concat()
+        });
+        assert_eq!(view(SECOND, 36, 16, "ATTRIBUTES").unwrap().0, rows.collect::<Vec<u8>>());
+    }
+
     /// As meshoptimizer's own decoders give them.
     #[test]
     fn filters_are_undone() {
@@ -361,6 +491,13 @@ mod tests {
         assert_eq!(wide, [1411, -28215, 16601, 5, -19345, 4193, -26112, 1]);
         let turns = of_shorts(&[1000, -2000, 3000, 32766, 0, 0, 0, 32765], "QUATERNION");
         assert_eq!(turns, [-1414, 2121, 32660, 707, 0, 32767, 0, 0]);
+        // Colors of six and of twelve bits.
+        let mut colors = [36, 23, 253, 63, 0, 0, 0, 32, 38, 250, 19, 51, 63, 0, 0, 48];
+        filtered(&mut colors, 4, "COLOR").unwrap();
+        assert_eq!(colors, [251, 134, 65, 255, 0, 0, 0, 0, 53, 231, 101, 158, 255, 255, 255, 130]);
+        let mut colors = [0, 9, 255, 5, 1, 255, 255, 15, 153, 9, 103, 254, 204, 4, 204, 12];
+        filtered(&mut colors, 8, "COLOR").unwrap();
+        assert_eq!(colors, [239, 255, 24, 128, 4, 64, 255, 255, 67, 51, 93, 230, 102, 102, 137, 153]);
         let mut floats: Vec<u8> = [-50331643_i32, 50331641, 0].iter().flat_map(|v| v.to_le_bytes()).collect();
         filtered(&mut floats, 12, "EXPONENTIAL").unwrap();
         let expected: Vec<u8> = [0.625_f32, -28.0, 0.0].iter().flat_map(|v| v.to_le_bytes()).collect();
@@ -371,9 +508,12 @@ mod tests {
     /// Cut off or of other bytes, it ends in a sentence or in some numbers.
     #[test]
     fn broken_bytes_do_no_harm() {
-        for (packed, count, stride, mode) in
-            [(VERTICES, 81, 8, "ATTRIBUTES"), (TRIANGLES, 405, 4, "TRIANGLES"), (INDICES, 405, 4, "INDICES")]
-        {
+        for (packed, count, stride, mode) in [
+            (VERTICES, 81, 8, "ATTRIBUTES"),
+            (SECOND, 36, 16, "ATTRIBUTES"),
+            (TRIANGLES, 405, 4, "TRIANGLES"),
+            (INDICES, 405, 4, "INDICES"),
+        ] {
             let whole = BASE64_STANDARD.decode(packed).unwrap();
             for n in 0..whole.len() {
                 let _ = view(&BASE64_STANDARD.encode(&whole[..n]), count, stride, mode);

@@ -4,6 +4,8 @@
 //! read must be told.
 
 mod accessors;
+mod animations;
+mod draco;
 mod json;
 mod materials;
 mod meshes;
@@ -29,7 +31,7 @@ use self::{
     accessors::{Rows, Source},
     json::{Left, extension, index, is_read, list, number, number_or, numbers},
 };
-use super::read_bytes;
+use super::{ReadOptions, read_bytes};
 use crate::{
     CameraKind, Emission, FallOff, GroupId, ImageTexture, Light, MaterialId, SpectralCurve, WorldBuilder, WorldCamera,
     WorldError,
@@ -49,11 +51,13 @@ const BASE64: GeneralPurpose = GeneralPurpose::new(
         .with_decode_allow_trailing_bits(true),
 );
 
-/// Extensions that geometry can't be read without.
-const OF_GEOMETRY: [&str; 2] = ["KHR_draco_mesh_compression", "KHR_meshopt_compression"];
-
 /// Reads the default scene.
-pub(super) fn read(path: &Path, place: DAffine3, cancel: &Cancel) -> Result<WorldBuilder, WorldError> {
+pub(super) fn read(
+    path: &Path,
+    place: DAffine3,
+    options: &ReadOptions,
+    cancel: &Cancel,
+) -> Result<WorldBuilder, WorldError> {
     let unreadable = |reason: String| WorldError::Unreadable { file: path.to_owned(), reason };
     let bytes = read_bytes(path, MAX_BYTES)?;
     let (text, binary) = parts(&bytes).map_err(unreadable)?;
@@ -65,15 +69,12 @@ pub(super) fn read(path: &Path, place: DAffine3, cancel: &Cancel) -> Result<Worl
     let version = root.get("asset").and_then(|asset| asset.get("version")).and_then(Value::as_str);
     if !version.is_some_and(|version| version.starts_with("2.")) {
         let found = version.map_or("no version".to_owned(), |version| format!("version {version}"));
-        return Err(unreadable(format!("its asset has {found}, expected 2.0 of glTF")));
+        return Err(unreadable(format!(
+            "its asset has {found}, expected 2.0 of glTF, which gltf-pipeline makes of 1.0"
+        )));
     }
-    let required = list(&root, "extensionsRequired").iter().filter_map(Value::as_str);
-    if let Some(name) = required.into_iter().find(|name| OF_GEOMETRY.contains(name)) {
-        let reason =
-            format!("it needs the extension {name}, which isn't supported; expected a file exported without it");
-        return Err(unreadable(reason));
-    }
-    let left = Left::out_of(&mut root);
+    let mut left = Left::out_of(&mut root);
+    let moved;
     let mut reader = Reader {
         builder: WorldBuilder::new(),
         root: &root,
@@ -87,6 +88,7 @@ pub(super) fn read(path: &Path, place: DAffine3, cancel: &Cancel) -> Result<Worl
         uses: HashMap::new(),
         globals: HashMap::new(),
         seen: HashSet::new(),
+        variant: None,
         n_bytes: bytes.len() as u64,
         own_pictures: Vec::new(),
         is_own: false,
@@ -102,12 +104,24 @@ pub(super) fn read(path: &Path, place: DAffine3, cancel: &Cancel) -> Result<Worl
         reader.buffers.push(data);
     }
     for (number, view) in list(&root, "bufferViews").iter().enumerate() {
-        let Some(packed) = extension(view, "EXT_meshopt_compression") else { continue };
+        let packed = extension(view, "KHR_meshopt_compression").or(extension(view, "EXT_meshopt_compression"));
+        let Some(packed) = packed else { continue };
         let unpacked = meshopt::unpacked(packed, &reader.buffers);
         let unpacked = unpacked.map_err(|reason| reader.fault(format!("packed buffer view {number} {reason}")))?;
         reader.n_bytes += unpacked.0.len() as u64;
         reader.unpacked.insert(number, unpacked);
     }
+    reader.builder.set_choices(reader.choices());
+    let pose = reader.pose(options)?;
+    if !pose.is_empty() {
+        let (mut posed, lost) = animations::posed(&root, &pose);
+        lost.iter().for_each(|way| reader.builder.note_of("animations of what isn't there, left out", way));
+        left.append(Left::out_of(&mut posed));
+        moved = posed;
+        reader.root = &moved;
+    }
+    let variants = &reader.builder.choices().variants;
+    reader.variant = options.variant.as_ref().and_then(|name| variants.iter().position(|known| known == name));
     reader.note_left(left);
     reader.read_own()?;
     reader.scene(place)?;
@@ -119,7 +133,7 @@ fn parts(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>), String> {
     let Some(rest) = bytes.strip_prefix(b"glTF") else { return Ok((bytes, None)) };
     let word = |at: usize| rest.get(at..at + 4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
     if word(0) != Some(2) {
-        return Err(format!("version {} of GLB, expected 2", word(0).unwrap_or(0)));
+        return Err(format!("version {} of GLB, expected 2, which gltf-pipeline makes of 1", word(0).unwrap_or(0)));
     }
     let (mut json, mut binary, mut at) = (None, None, 8);
     while let (Some(length), Some(kind)) = (word(at), word(at + 4)) {
@@ -158,6 +172,8 @@ struct Reader<'c> {
     /// Where nodes stand.
     globals: HashMap<usize, DAffine3>,
     seen: HashSet<usize>,
+    /// Which variant of the materials is shown.
+    variant: Option<usize>,
     n_bytes: u64,
     /// Pictures of what this program wrote, and whether it wrote the file.
     own_pictures: Vec<Arc<ImageTexture>>,
@@ -192,10 +208,13 @@ impl Reader<'_> {
         if path.is_file() { path } else { self.folder.join(unescaped(uri).replace('\\', "/")) }
     }
 
-    fn rows(&self, accessor: usize) -> Result<Rows, WorldError> {
+    fn source(&self) -> Source<'_> {
         let most_zeros = 1 << 16 | usize::try_from(self.n_bytes).unwrap_or(usize::MAX).min(1 << 28);
-        let source = Source { root: self.root, buffers: &self.buffers, unpacked: &self.unpacked, most_zeros };
-        source.rows(accessor).map_err(|reason| self.fault(reason))
+        Source { root: self.root, buffers: &self.buffers, unpacked: &self.unpacked, most_zeros }
+    }
+
+    fn rows(&self, accessor: usize) -> Result<Rows, WorldError> {
+        self.source().rows(accessor).map_err(|reason| self.fault(reason))
     }
 
     fn note_left(&mut self, left: Left) {
@@ -210,12 +229,10 @@ impl Reader<'_> {
         ] {
             words.iter().for_each(|word| self.builder.note_of(sentence, word));
         }
-        for variant in extension(self.root, "KHR_materials_variants").map_or(&[][..], |of| list(of, "variants")) {
-            let name = variant.get("name").and_then(Value::as_str).unwrap_or("without a name");
-            self.builder.note_of("variants of the materials, of which the file's own is shown", name);
-        }
-        if !list(self.root, "animations").is_empty() {
-            self.builder.note("animations: not followed, everything stands as it is written");
+        if self.variant.is_none() {
+            for variant in self.builder.choices().variants.clone() {
+                self.builder.note_of("variants of the materials, of which the file's own is shown", &variant);
+            }
         }
     }
 
@@ -279,6 +296,9 @@ impl Reader<'_> {
         let place = self.globals.get(&number).copied().unwrap_or(DAffine3::IDENTITY);
         if !place.is_finite() {
             return Err(self.fault(format!("node {number} stands nowhere: its numbers aren't finite")));
+        }
+        if extension(node, "KHR_node_visibility").and_then(|of| of.get("visible")) == Some(&Value::Bool(false)) {
+            return Ok(());
         }
         let name =
             |of: &Value| of.get("name").and_then(Value::as_str).filter(|name| !name.is_empty()).map(str::to_owned);

@@ -12,8 +12,8 @@ use super::{
     local,
 };
 use crate::{
-    Emission, Encoding, ImageTexture, Light, Material, MaterialId, Relief, Shape, SpectralCurve, Texture, TextureId,
-    WorldCamera, WorldError, Wrap,
+    Emission, Encoding, Film, ImageTexture, Light, Material, MaterialId, Relief, Shape, SpectralCurve, Texture,
+    TextureId, WorldCamera, WorldError, Wrap,
 };
 
 /// What files of this program name as what made them: of others, which may have been changed, `extras` are left alone.
@@ -29,6 +29,8 @@ struct Surface {
     glow: Option<TextureId>,
     absorption: Option<SpectralCurve>,
     turn_rad: f32,
+    behind: Option<[TextureId; 2]>,
+    film: Option<Film>,
 }
 
 /// A primitive as it is.
@@ -65,7 +67,8 @@ impl Reader<'_> {
             self.builder.add_texture(texture);
         }
         let surfaces: Vec<Surface> = self.parsed(own, "materials")?;
-        for Surface { name, material, relief, coverage, glow, absorption, turn_rad } in surfaces {
+        for surface in surfaces {
+            let Surface { name, material, relief, coverage, glow, absorption, turn_rad, behind, film } = surface;
             let id = self.builder.add_material_with(&name, material, relief);
             if let Some(coverage) = coverage {
                 self.builder.set_coverage(id, coverage);
@@ -75,6 +78,12 @@ impl Reader<'_> {
             }
             if let Some(absorption) = absorption {
                 self.builder.set_absorption(id, absorption);
+            }
+            if let Some([share, color]) = behind {
+                self.builder.set_behind(id, share, color);
+            }
+            if let Some(film) = film {
+                self.builder.set_film(id, film);
             }
             self.builder.set_turn(id, turn_rad);
         }

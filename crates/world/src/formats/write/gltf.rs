@@ -144,6 +144,8 @@ impl<'a> Writer<'a> {
                     "glow": own(&surface.glow)?,
                     "absorption": own(&surface.absorption)?,
                     "turn_rad": surface.turn_rad,
+                    "behind": own(&surface.behind)?,
+                    "film": own(&surface.film)?,
                 }));
             }
             let pictures = std::mem::take(&mut self.pictures);
@@ -580,6 +582,9 @@ impl<'a> Writer<'a> {
         }
         let surface = &self.builder.surfaces[id.0 as usize];
         let mut words = json!({ "name": surface.name });
+        if surface.film.is_some() || surface.behind.is_some() {
+            self.others.insert("films and light through leaves".to_owned());
+        }
         self.surface(&surface.material, &mut words);
         if let Some(coverage) = surface.coverage {
             words["alphaMode"] = json!("BLEND");

@@ -323,6 +323,9 @@ impl Writer<'_> {
         let is_taken = self.materials.values().any(|name| *name == plain);
         let name = if is_taken || plain.is_empty() { format!("{plain}.{}", id.0) } else { plain };
         self.materials.insert(id, name.clone());
+        if surface.film.is_some() || surface.behind.is_some() {
+            self.lose("films over materials of glTF, and light through their base");
+        }
         if surface.turn_rad != 0.0 {
             self.lose("how far brushed surfaces are turned");
         }
