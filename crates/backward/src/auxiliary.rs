@@ -25,6 +25,8 @@ pub struct Auxiliary {
     pub instance: Array2<f32>,
     /// The number of the shape plus 1; 0 where nothing is met.
     pub shape: Array2<f32>,
+    /// The number of the object plus 1, as [`World::object_names`] has them; 0 where nothing is met.
+    pub object: Array2<f32>,
     /// The share of light that the surface gives back, band by band.
     pub albedo: SpectralImage,
 }
@@ -35,7 +37,7 @@ struct Seen {
     z_m: f32,
     distance_m: f32,
     normal: Vec3,
-    ids: [f32; 3],
+    ids: [f32; 4],
     albedo: Vec<f32>,
 }
 
@@ -77,6 +79,7 @@ pub fn auxiliary(
         material: plane(&|seen| seen.ids[0]),
         instance: plane(&|seen| seen.ids[1]),
         shape: plane(&|seen| seen.ids[2]),
+        object: plane(&|seen| seen.ids[3]),
         albedo: SpectralImage::new(Quantity::Reflectance, grid.clone(), albedo)?,
     })
 }
@@ -161,7 +164,7 @@ fn center_and_axis(placement: &Placement) -> (DVec3, DVec3) {
 impl Seen {
     fn nothing(n_bands: usize) -> Self {
         let albedo = vec![0.0; n_bands];
-        Self { z_m: f32::INFINITY, distance_m: f32::INFINITY, normal: Vec3::ZERO, ids: [0.0; 3], albedo }
+        Self { z_m: f32::INFINITY, distance_m: f32::INFINITY, normal: Vec3::ZERO, ids: [0.0; 4], albedo }
     }
 
     fn along(world: &World, ray: Option<Ray>, place: (DVec3, DVec3), grid: &WavelengthGrid) -> Self {
@@ -179,7 +182,12 @@ impl Seen {
             z_m: from_center_m.dot(axis) as f32,
             distance_m: from_center_m.length() as f32,
             normal: if normal.dot(ray.direction) > 0.0 { -normal } else { normal },
-            ids: [number(hit.material.0), hit.instance.map_or(0.0, |instance| number(instance.0)), number(hit.shape.0)],
+            ids: [
+                number(hit.material.0),
+                hit.instance.map_or(0.0, |instance| number(instance.0)),
+                number(hit.shape.0),
+                number(world.object_of(hit) as u32),
+            ],
             albedo: grid.centers_nm().iter().map(albedo_at).collect(),
         }
     }

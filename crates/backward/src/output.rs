@@ -36,7 +36,7 @@ pub fn write_rendering_exr(path: &Path, rendering: &Rendering, z_m: Option<&Arra
 }
 
 /// Writes what a camera sees besides light: `Z` and `distance` (m), `normal.X` to `normal.Z`, `material`, `instance`,
-/// `shape` and the albedo as `T.…nm`.
+/// `shape`, `object` and the albedo as `T.…nm`.
 ///
 /// # Errors
 /// When the file cannot be written; it is then not there.
@@ -47,6 +47,7 @@ pub fn write_auxiliary_exr(path: &Path, seen: &Auxiliary) -> Result<(), Backward
         channel("material", &seen.material),
         channel("instance", &seen.instance),
         channel("shape", &seen.shape),
+        channel("object", &seen.object),
     ];
     channels.extend(
         ["normal.X", "normal.Y", "normal.Z"].iter().zip(&seen.normal).map(|(name, plane)| channel(name, plane)),

@@ -60,8 +60,7 @@ pub(crate) fn run(arguments: &RenderArgs, common: &Common) -> anyhow::Result<()>
     kept.camera().validate()?;
     check_lens(kept.camera(), arguments)?;
     let world = kept.world(&clock, &cancel)?;
-    let notes = world.notes();
-    tell(notes, common);
+    tell(world.notes(), common);
     let is_of_file = matches!(&kept.camera().scene.source, SceneSource::World(spec) if spec.view == WorldView::OfFile);
     if is_of_file && world.cameras().is_empty() {
         let whole = "the file has no camera: the whole of it is seen; --eye and --look-at give another view";
@@ -75,6 +74,23 @@ pub(crate) fn run(arguments: &RenderArgs, common: &Common) -> anyhow::Result<()>
     let own = world_camera(&world, &spec, arguments.fov_deg)?;
     let takes_own = arguments.camera_file().is_none() && !is_still_life;
     let own_has_lens = takes_own && camera.take_from_world(&own)?;
+    // The level is that of a view, which the camera of the file has a part in.
+    let kept = match arguments.mean_luminance_cd_m2 {
+        None => kept,
+        level => {
+            camera.scene.mean_luminance_cd_m2 = level;
+            kept.with(|own| own.scene = camera.scene.clone())
+        }
+    };
+    kept.camera().validate()?;
+    let world = match arguments.mean_luminance_cd_m2 {
+        None => world,
+        Some(_) => {
+            let world = kept.world(&clock, &cancel)?;
+            tell(world.notes().last().map_or(&[], std::slice::from_ref), common);
+            world
+        }
+    };
     if !has_lens && !own_has_lens {
         let grid = camera.wavelengths.grid()?.map_or_else(|| WavelengthGrid::uniform(400.0, 700.0, 10.0), Ok)?;
         let (first_nm, last_nm) = grid.range_nm();
@@ -84,10 +100,15 @@ pub(crate) fn run(arguments: &RenderArgs, common: &Common) -> anyhow::Result<()>
                 "--lens-reflections {reflections} is of a lens, expected --lens or --camera: the camera of the world's file has none"
             );
         }
+        if arguments.mean_lux.is_some() {
+            bail!(
+                "--mean-lux is of a film, expected --lens or --camera, or --mean-luminance: the camera of the world's file has none"
+            );
+        }
         let render = WorldRender::of_own_camera(world.clone(), &own, &spec, grid)?;
         let render = cropped(render, arguments)?;
         return render_without_sensor(arguments, common, (&render, &clock, &cancel), &|rendering| {
-            RenderingSummary::of(rendering, notes, &spec)
+            RenderingSummary::of(rendering, &world, &spec)
         });
     }
     change_lens(&mut camera, arguments)?;
@@ -101,9 +122,12 @@ pub(crate) fn run(arguments: &RenderArgs, common: &Common) -> anyhow::Result<()>
     let kept = kept.with(|own| *own = camera);
     let render = kept.world_render(&clock, &cancel)?;
     if arguments.crop.is_some() {
+        if arguments.mean_lux.is_some() {
+            bail!("--mean-lux is of a whole picture, expected no --crop, or --mean-luminance");
+        }
         let render = cropped(render, arguments)?;
         return render_without_sensor(arguments, common, (&render, &clock, &cancel), &|rendering| {
-            RenderingSummary::of(rendering, notes, &spec)
+            RenderingSummary::of(rendering, &world, &spec)
         });
     }
     let rendering = refine(arguments, (&render, &clock, &cancel))?;
@@ -139,6 +163,7 @@ fn camera_of(arguments: &RenderArgs, common: &Common) -> anyhow::Result<Camera> 
     camera.scene = SceneSpec {
         source: SceneSource::World(spec),
         field_of_view_deg: arguments.fov_deg,
+        mean_lux: arguments.mean_lux,
         ..SceneSpec::of_file(arguments.world.clone())
     };
     if arguments.camera_file().is_none() {
@@ -278,6 +303,7 @@ fn finish(
     let run = Run { capture: &capture, model: &model, depth: Some(&depth) };
     let mut report = write_run(&run, staged.path(), &|| clock.times())?;
     // The same samples, with their standard errors.
+    let rendering = &brightened(rendering, capture.irradiance.summary.factor);
     let files = render.write_files(rendering, &render.auxiliary(cancel)?, staged.path())?;
     report.files.extend(
         files
@@ -290,9 +316,8 @@ fn finish(
         report.files.push(SCENE.to_owned());
     }
     let world = kept.world(&Silent, cancel)?;
-    let notes = world.notes();
     let SceneSource::World(spec) = &kept.camera().scene.source else { unreachable!("the scene is a world") };
-    let rendering = RenderingSummary::of(rendering, notes, spec);
+    let rendering = RenderingSummary::of(rendering, &world, spec);
     let report = Report { run: Some(report), rendering };
     write_json(&staged.path().join("report.json"), &report)?;
     write_json(&staged.path().join("timings.json"), &clock.times())?;
@@ -320,6 +345,16 @@ fn finish(
         Some(run) if !common.quiet => print(&(samples(&report.rendering) + &summary(run, clock.total_s(), out))),
         _ => Ok(()),
     }
+}
+
+/// Returns a rendering under light so many times as strong.
+fn brightened(rendering: &Rendering, factor: f64) -> Rendering {
+    let mut rendering = rendering.clone();
+    if factor != 1.0 {
+        let planes = rendering.picture.planes_mut().chain(rendering.standard_error.planes_mut());
+        planes.for_each(|mut plane| plane *= factor as f32);
+    }
+    rendering
 }
 
 /// Renders what a camera by formula sees, which has no film, or a part of a picture, which is no sensor's: the picture is as

@@ -81,6 +81,12 @@ pub(crate) struct RenderArgs {
     pub(crate) white: Option<String>,
     #[command(flatten)]
     pub(crate) view: ViewArgs,
+    /// Scales all lights so that what is seen has this mean luminance, cd/m²
+    #[arg(long, alias = "mean-luminance", value_name = "L", help_heading = "World")]
+    pub(crate) mean_luminance_cd_m2: Option<f64>,
+    /// Scales all lights so that the mean illuminance of the film is this, lux
+    #[arg(long, value_name = "LUX", conflicts_with = "mean_luminance_cd_m2", help_heading = "World")]
+    pub(crate) mean_lux: Option<f64>,
     #[command(flatten)]
     pub(crate) reading: WorldReadArgs,
     /// Follows light over at most so many scatterings: 0 shows what glows, 1 direct light [default: all]
@@ -222,6 +228,18 @@ pub(crate) enum WorldCommand {
         world: PathBuf,
         #[command(flatten)]
         reading: WorldReadArgs,
+    },
+    /// Writes a world as another format; what that doesn't hold is told
+    Convert {
+        /// World: .pbrt, .gltf, .glb, .obj, .ply or .stl
+        input: PathBuf,
+        /// File to write: .glb or .gltf, or .pbrt (version 4) with its pictures and large meshes in a folder beside it
+        output: PathBuf,
+        #[command(flatten)]
+        reading: WorldReadArgs,
+        /// Refuses to write where not all of the world was read, or the format does not hold all of it
+        #[arg(long)]
+        strict: bool,
     },
 }
 

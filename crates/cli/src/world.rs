@@ -1,12 +1,16 @@
 //! `dioptric world`: what the file of a world holds.
 
-use std::fmt::Write;
+use std::{fmt::Write, path::Path};
 
-use dioptric_pipeline::{Camera, KeptCamera, SceneSource, SceneSpec, Silent, WorldSummary};
+use dioptric_pipeline::{
+    Camera, KeptCamera, SceneSource, SceneSpec, Silent, WorldSpec, WorldSummary, open_world, write_world,
+};
 use dioptric_spectrum::Cancel;
+use serde::Serialize;
 
 use crate::{
     args::Common,
+    lens::tell,
     render_args::WorldCommand,
     terminal::{print, print_json},
 };
@@ -15,7 +19,12 @@ use crate::{
 const MOST_NAMED: usize = 24;
 
 pub(crate) fn run(command: &WorldCommand, common: &Common) -> anyhow::Result<()> {
-    let WorldCommand::Info { world, reading } = command;
+    let (world, reading) = match command {
+        WorldCommand::Info { world, reading } => (world, reading),
+        WorldCommand::Convert { input, output, reading, strict } => {
+            return convert((output, *strict), &reading.spec_of(input), common);
+        }
+    };
     let spec = reading.spec_of(world);
     let mut camera = Camera::demo()?;
     camera.scene = SceneSpec { source: SceneSource::World(spec.clone()), ..SceneSpec::of_file(world.clone()) };
@@ -25,6 +34,32 @@ pub(crate) fn run(command: &WorldCommand, common: &Common) -> anyhow::Result<()>
         return print_json(&summary);
     }
     print(&table(&summary)?)
+}
+
+/// What became of a world.
+#[derive(Serialize)]
+struct Converted<'a> {
+    input: &'a Path,
+    output: &'a Path,
+    notes: Vec<String>,
+    losses: Vec<String>,
+}
+
+fn convert((output, is_strict): (&Path, bool), spec: &WorldSpec, common: &Common) -> anyhow::Result<()> {
+    let input = &*spec.file;
+    let builder = open_world(input, &spec.reading(), &Cancel::new())?;
+    let notes = builder.notes();
+    if is_strict && !notes.is_empty() {
+        let notes = notes.join("; ");
+        anyhow::bail!("{}: not all that the file says is read, which --strict asks for: {notes}", input.display());
+    }
+    let losses = write_world(&builder, output, is_strict)?;
+    if common.json {
+        return print_json(&Converted { input, output, notes, losses });
+    }
+    tell(&notes, common);
+    tell(&losses.iter().map(|loss| format!("not held by the format: {loss}")).collect::<Vec<_>>(), common);
+    Ok(())
 }
 
 fn table(summary: &WorldSummary) -> Result<String, std::fmt::Error> {
@@ -41,10 +76,13 @@ fn table(summary: &WorldSummary) -> Result<String, std::fmt::Error> {
     writeln!(text, "unit       {} m; up is {}", summary.unit_m, point(summary.up))?;
     writeln!(text, "shapes     {} triangles and other primitives", summary.n_primitives)?;
     writeln!(text, "lights     {}", summary.n_lights)?;
-    let named: Vec<&str> = summary.materials.iter().take(MOST_NAMED).map(String::as_str).collect();
-    let more = summary.materials.len().saturating_sub(MOST_NAMED);
-    let more = if more > 0 { format!(" and {more} more") } else { String::new() };
-    writeln!(text, "materials  {}{more}", named.join(", "))?;
+    let named = |names: &[String]| {
+        let more = names.len().saturating_sub(MOST_NAMED);
+        let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+        format!("{}{more}", names.iter().take(MOST_NAMED).map(String::as_str).collect::<Vec<_>>().join(", "))
+    };
+    writeln!(text, "objects    {}", named(&summary.objects))?;
+    writeln!(text, "materials  {}", named(&summary.materials))?;
     if summary.cameras.is_empty() {
         writeln!(text, "cameras    none: the whole is seen, or what --eye and --look-at say")?;
     }

@@ -47,13 +47,15 @@ pub use dioptric_scene::{
     may_be_read_with as may_be_read_with_scene,
 };
 pub use dioptric_sensor::{Binning, DngBlack, DngOpcodes, DngReading, DngRendering, ProfileFile};
+pub use dioptric_world::{ObjectInfo, WorldBuilder, open_world, write_world};
 
 pub use camera::{
     BlurSpec, BorderSpec, CAMERA_SCHEMA, Camera, CameraTurn, CoatingSpec, Crop, DrawnEye, DualPixelSpec, Exposed,
-    FilmSpec, FilterSpec, FlatSize, FocusSpec, FramesSpec, LensReadOptions, LensReflections, LensSpec, LightFieldSpec,
-    Movements, PhotodiodeReads, Photodiodes, REFERENCE_WAVELENGTH_NM, RenderEffort, RenderMethod, RetiredBank,
-    SceneSource, SceneSpec, SensorOptions, SensorSpec, StopSpec, TurnPath, VideoSpec, WavelengthSpec, WorldLamp,
-    WorldSky, WorldSpec, WorldView, nearest_to_reference_nm, reference_nm_of, with_blades,
+    FilmSpec, FilterSpec, FlatSize, FocusSpec, FramesSpec, LensReadOptions, LensReflections, LensSpec, LightAmount,
+    LightFieldSpec, Movements, PhotodiodeReads, Photodiodes, REFERENCE_WAVELENGTH_NM, RenderEffort, RenderMethod,
+    RetiredBank, SceneSource, SceneSpec, SensorOptions, SensorSpec, StopSpec, TurnPath, VideoSpec, WavelengthSpec,
+    WorldChange, WorldColor, WorldLamp, WorldLight, WorldMaterial, WorldShape, WorldSky, WorldSpec, WorldView,
+    nearest_to_reference_nm, reference_nm_of, with_blades,
 };
 pub use capture_files::{irradiance_files, write_capture, write_frames_and_depth, write_irradiance, write_scene};
 pub use develop::DevelopedFile;
@@ -81,7 +83,7 @@ pub use stages::{
     AberrationSummary, AnimationSummary, CameraSummary, Capture, FilmPart, FilmPlace, FrameSet, Given, GivenParts,
     IRRADIANCE_FILE, Imaged, Irradiance, IrradianceSummary, KeptCamera, LensAberrations, NarrowSurfaces, PaintReach,
     RESUME_FILE, RenderingSummary, ResolvedLens, ResolvedScene, Resumed, SceneSummary, StageCounts, UnseenPoints,
-    Video, VideoFrame, VideoFrameFacts, WhiteOf, WorldRender, WorldSummary, has_kept_bands, world_camera,
+    Video, VideoFrame, VideoFrameFacts, WhiteOf, WorldRender, WorldSummary, change_world, has_kept_bands, world_camera,
     write_seen_png,
 };
 pub use video_files::{VideoFacts, write_video_frame};

@@ -35,6 +35,7 @@ mod sweep;
 mod video;
 mod view;
 mod worker;
+mod world;
 
 use pyo3::prelude::*;
 
@@ -58,6 +59,7 @@ mod _native {
         video::{Video, VideoFrame},
         view::Memory,
         worker::{_panic, set_threads, threads},
+        world::{_World, _restore_world},
     };
     use pyo3::prelude::*;
 

@@ -23,13 +23,14 @@ use pyo3::{
 
 use crate::{
     errors::{exception, guarded, wrong},
-    input::{is_single, number, numbers, owned_f32},
+    input::{self, is_single, number, numbers, owned_f32},
     options::count,
     restorer::restorer,
     scene_options::{fill_of, with_options},
     serial::to_python,
     view::view,
     worker::{Follower, run, run_apart},
+    world::_World,
 };
 
 /// What stands before the camera: spectral radiance and depth, from arrays, a file, or drawn. It never changes.
@@ -247,7 +248,7 @@ illuminant=None, illuminance_lux=None, light=None, mean_luminance_cd_m2=None)")]
     ///
     /// Parameters
     /// ----------
-    /// path : str or os.PathLike
+    /// path : str, os.PathLike or World
     ///     A file: ``.pbrt``, ``.gltf``, ``.glb``, ``.obj``, ``.ply`` or ``.stl``.
     /// eye, look_at, up : (float, float, float), optional
     ///     Where the center of the entrance pupil stands, what is in the middle of the picture, m, and what is up in it; without ``eye``
@@ -290,7 +291,7 @@ depth_kind=None, depth_variable=None, view=None, panorama=None, illuminant=None,
 mean_luminance_cd_m2=None)")]
     #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
     fn world(
-        path: PathBuf,
+        path: &Bound<'_, PyAny>,
         eye: Option<(f64, f64, f64)>,
         look_at: Option<(f64, f64, f64)>,
         up: Option<(f64, f64, f64)>,
@@ -309,8 +310,13 @@ mean_luminance_cd_m2=None)")]
         seed: Option<&Bound<'_, PyAny>>,
         options: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
-        let mut world = WorldSpec::of_file(path);
-        if !world.is_still_life() && !world.file.exists() {
+        // A `World` of Python's holds the native one.
+        let made = path.getattr_opt("_native")?.and_then(|native| native.cast_into::<_World>().ok());
+        let mut world = match &made {
+            Some(made) => made.get().spec(),
+            None => WorldSpec { unit_m, ..WorldSpec::of_file(input::path("path", path)?) },
+        };
+        if world.is_file() && !world.file.exists() {
             let reason = "there is no such file".to_owned();
             return Err(exception(PipelineError::Read { path: world.file, reason }));
         }
@@ -326,8 +332,8 @@ mean_luminance_cd_m2=None)")]
             (None, Some(camera)) => WorldView::Camera(camera.to_owned()),
             (None, None) => WorldView::OfFile,
         };
-        world.unit_m = unit_m;
-        (world.time_s, world.animation, world.variant) = (time_s, animation, variant);
+        (world.time_s, world.animation, world.variant) =
+            (time_s.or(world.time_s), animation.or(world.animation), variant.or(world.variant));
         world.sky = sky.map(str::parse).transpose().map_err(|error: PipelineError| exception(error))?;
         let lamp = |(x, y, z, lumens)| WorldLamp { at_m: (x, y, z), lumens };
         world.lamps = lamps.unwrap_or_default().into_iter().map(lamp).collect();

@@ -225,6 +225,21 @@ impl Shot {
         view(py, &depth, |depth| depth.z_m().view())
     }
 
+    /// Returns which object of a world each pixel sees in its middle.
+    ///
+    /// Returns
+    /// -------
+    /// labels : ndarray of uint32, (rows, columns)
+    ///     The number of the object plus 1; 0 where there is none.
+    /// names : list of str
+    ///     The names of the objects, in the order of their numbers.
+    fn objects<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Vec<String>)> {
+        let kept = &self.kept;
+        let (labels, names) = run(py, &Follower::nobody(), |progress, cancel| kept.objects(progress, cancel))?;
+        let labels = view(py, &Arc::new(labels), |labels| labels.view())?;
+        Ok((labels, names))
+    }
+
     /// Returns what was measured: lens, film, scene, bank, irradiance, sensor statistics, losses; the keys of ``report.json``.
     fn report<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let (model, depth) = self.model_and_depth(py)?;

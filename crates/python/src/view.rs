@@ -34,6 +34,9 @@ impl Sample for u8 {
 impl Sample for u16 {
     const KIND: &'static str = "u2";
 }
+impl Sample for u32 {
+    const KIND: &'static str = "u4";
+}
 impl Sample for u64 {
     const KIND: &'static str = "u8";
 }

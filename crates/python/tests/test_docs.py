@@ -24,7 +24,7 @@ def test_page_runs(page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
 
 
 def test_everything_is_documented() -> None:
-    kinds = (dp.Camera, dp.Developed, dp.Lens, dp.LightField, dp.Rays, dp.Scene, dp.Sensor, dp.Shot, dp.Video, dp.VideoFrame)
+    kinds = (dp.Camera, dp.Developed, dp.Lens, dp.LightField, dp.Rays, dp.Scene, dp.Sensor, dp.Shot, dp.Video, dp.VideoFrame, dp.World)
     for kind in kinds:
         assert kind.__doc__
         public = [name for name in vars(kind) if not name.startswith("_") and name != "FATES"]

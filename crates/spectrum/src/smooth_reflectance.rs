@@ -4,6 +4,7 @@
 //! low-dimensional function space for efficient spectral upsampling"): smooth, and within [0, 1] for every color. The
 //! three coefficients are fitted here, to linear sRGB under D65 as the CIE 1931 observer sees it.
 
+use serde::{Deserialize, Serialize};
 use std::sync::OnceLock;
 
 use rayon::prelude::*;
@@ -13,7 +14,7 @@ use crate::{Illuminant, Observer, WavelengthGrid, Xyz, lanes};
 /// The smooth reflectance of a color: one lift for photographs and textures.
 ///
 /// It was fitted from 380 to 780 nm; beyond, the parabola goes on, which says nothing of what a thing reflects there.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SmoothReflectance {
     /// Of the parabola in (λ − 550 nm) / 200 nm, the constant first.
     c: [f32; 3],

@@ -1,6 +1,7 @@
 //! Cameras that a world file names.
 
 use glam::DAffine3;
+use serde::{Deserialize, Serialize};
 
 use crate::SkyMapping;
 
@@ -21,7 +22,7 @@ pub struct WorldCamera {
 }
 
 /// How a camera of a file makes its picture.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum CameraKind {
     /// A pinhole, or a thin lens where `lens_radius_m` is over 0.
     Perspective {

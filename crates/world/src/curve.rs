@@ -1,5 +1,6 @@
 //! Functions of wavelength, ready for rendering.
 
+use serde::{Deserialize, Serialize};
 use std::sync::{Arc, OnceLock};
 
 use dioptric_spectrum::{Illuminant, Observer, SmoothReflectance, Spectrum, WavelengthGrid, lanes};
@@ -8,7 +9,8 @@ use dioptric_spectrum::{Illuminant, Observer, SmoothReflectance, Spectrum, Wavel
 ///
 /// It is a number, points with straight lines between them, or the smooth spectrum of a color. A spectrum of many points
 /// is tabulated every nanometer, to which points between whole nanometers are moved by linear interpolation.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(into = "Written", from = "Written")]
 pub struct SpectralCurve {
     kind: Kind,
     scale: f32,
@@ -33,8 +35,51 @@ enum Kind {
     SmoothLight(SmoothReflectance),
 }
 
+/// A curve as files hold it.
+#[derive(Serialize, Deserialize)]
+enum Written {
+    Constant(f32),
+    Knots { scale: f32, knots: Vec<(f32, f32)>, beyond: Beyond },
+    Table { scale: f32, first_nm: f32, values: Vec<f32>, beyond: Beyond },
+    Smooth { scale: f32, of: SmoothReflectance },
+    SmoothLight { scale: f32, of: SmoothReflectance },
+}
+
+impl From<SpectralCurve> for Written {
+    fn from(SpectralCurve { kind, scale, .. }: SpectralCurve) -> Self {
+        match kind {
+            Kind::Constant => Self::Constant(scale),
+            Kind::Knots { knots, beyond } => Self::Knots { scale, knots: knots.to_vec(), beyond },
+            Kind::Table { first_nm, values, beyond } => {
+                Self::Table { scale, first_nm, values: values.to_vec(), beyond }
+            }
+            Kind::Smooth(of) => Self::Smooth { scale, of },
+            Kind::SmoothLight(of) => Self::SmoothLight { scale, of },
+        }
+    }
+}
+
+impl From<Written> for SpectralCurve {
+    fn from(written: Written) -> Self {
+        let constant = Self::constant;
+        let (kind, scale) = match written {
+            Written::Constant(scale) => return constant(scale),
+            // What has no points is nothing.
+            Written::Knots { knots, .. } if knots.is_empty() => return constant(0.0),
+            Written::Table { values, .. } if values.is_empty() => return constant(0.0),
+            Written::Knots { scale, knots, beyond } => (Kind::Knots { knots: knots.into(), beyond }, scale),
+            Written::Table { scale, first_nm, values, beyond } => {
+                (Kind::Table { first_nm, values: values.into(), beyond }, scale)
+            }
+            Written::Smooth { scale, of } => (Kind::Smooth(of), scale),
+            Written::SmoothLight { scale, of } => (Kind::SmoothLight(of), scale),
+        };
+        Self::of(kind).scaled(scale)
+    }
+}
+
 /// What a curve is beyond the ends of its table.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Beyond {
     /// Its end values: for reflectances and indices.
     Held,
@@ -99,6 +144,31 @@ impl SpectralCurve {
         let share = SmoothReflectance::of_rgb(rgb.map(|v| v / largest)).at(wavelengths_nm);
         let white = d65().at(wavelengths_nm);
         lanes(|lane| largest * share[lane] * white[lane])
+    }
+
+    /// Returns it as points with straight lines between them, nm and values: its own, or every 5 nm from 300 to 1100 nm of the smooth spectrum of a
+    /// color, and within the table of D65 of a light's.
+    pub(crate) fn points(&self) -> Vec<(f32, f32)> {
+        let at = |nm: f32| (nm, self.at(&[nm])[0]);
+        match &self.kind {
+            Kind::Constant => vec![(550.0, self.scale)],
+            Kind::Knots { knots, .. } => knots.iter().map(|(nm, value)| (*nm, self.scale * value)).collect(),
+            Kind::Table { first_nm, values, .. } => {
+                values.iter().enumerate().map(|(i, value)| (first_nm + i as f32, self.scale * value)).collect()
+            }
+            Kind::Smooth(_) => (0..=160).map(|i| at(300.0 + 5.0 * i as f32)).collect(),
+            Kind::SmoothLight(_) => (0..=106).map(|i| at(300.0 + 5.0 * i as f32)).collect(),
+        }
+    }
+
+    /// Whether it is a table, and no number or color.
+    pub(crate) fn is_spectrum(&self) -> bool {
+        matches!(self.kind, Kind::Knots { .. } | Kind::Table { .. })
+    }
+
+    /// Whether it has the same value at every wavelength.
+    pub(crate) fn constant_value(&self) -> Option<f32> {
+        matches!(self.kind, Kind::Constant).then_some(self.scale)
     }
 
     /// Whether it is lifted from a color, which tells nothing beyond what is seen; grays are the same everywhere.

@@ -16,6 +16,14 @@ pub enum WorldError {
         /// Why.
         reason: String,
     },
+    /// A file that cannot be written.
+    #[error("{}: cannot be written: {reason}", file.display())]
+    Unwritable {
+        /// The file.
+        file: PathBuf,
+        /// Why.
+        reason: String,
+    },
     /// A line of a text file that cannot be used.
     #[error("{}: line {line}: {reason}", file.display())]
     Line {
@@ -67,6 +75,22 @@ pub enum WorldError {
         index: usize,
         /// How many there are.
         n: usize,
+    },
+    /// An object that isn't there.
+    #[error("no object is called '{name}'{near}")]
+    NoObject {
+        /// What was asked for.
+        name: String,
+        /// Which names are like it, or what there is.
+        near: String,
+    },
+    /// A material that isn't there.
+    #[error("no material is called '{name}'{near}")]
+    NoMaterial {
+        /// What was asked for.
+        name: String,
+        /// Which names are like it, or what there is.
+        near: String,
     },
     /// More parts than are looked after.
     #[error("{what}: {n}: expected {limit} at most")]

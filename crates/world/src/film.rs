@@ -5,7 +5,7 @@ use std::f32::consts::{PI, TAU};
 use crate::fresnel;
 
 /// A film over the base of a material.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Film {
     /// Its index of refraction.
     pub index: f32,

@@ -1,5 +1,6 @@
 //! Pictures laid over surfaces.
 
+use serde::{Deserialize, Serialize};
 use std::{io::Cursor, path::Path, sync::Arc};
 
 use dioptric_spectrum::{SmoothReflectance, srgb_decode};
@@ -8,7 +9,7 @@ use glam::Vec2;
 use crate::WorldError;
 
 /// What lies beyond the edges of a picture.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Wrap {
     /// The picture again.
     Repeat,
@@ -21,7 +22,7 @@ pub enum Wrap {
 }
 
 /// How the numbers of a picture of 8 or 16 bits stand for light.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Encoding {
     /// By the sRGB curve.
     Srgb,
@@ -34,7 +35,8 @@ pub enum Encoding {
 /// A picture, looked up between its samples by bilinear interpolation of linear values.
 ///
 /// Texture coordinates run from (0, 0) at its lower left to (1, 1) at its upper right.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(into = "Reference", from = "Reference")]
 pub struct ImageTexture {
     columns: usize,
     rows: usize,
@@ -73,6 +75,45 @@ const MAX_SAMPLES: u64 = 1 << 28;
 
 /// What a texel takes beside the sample of the file that it is made from, bytes.
 const TEXEL_BYTES: u64 = 16;
+
+/// A picture in a file that holds the pictures elsewhere.
+#[derive(Serialize, Deserialize)]
+struct Reference {
+    /// Where its samples are in memory; the number of the picture, of which a picture that was read has so many columns and no rows.
+    picture: usize,
+    wraps: [Wrap; 2],
+    is_stepped: bool,
+}
+
+impl From<ImageTexture> for Reference {
+    fn from(image: ImageTexture) -> Self {
+        Self { picture: image.texels_key(), wraps: image.wraps, is_stepped: image.is_stepped }
+    }
+}
+
+impl From<Reference> for ImageTexture {
+    fn from(Reference { picture, wraps, is_stepped }: Reference) -> Self {
+        let texels = Arc::new(Texels { rgb: Colors::Linear(Vec::new()), alpha: None });
+        Self { columns: picture, rows: 0, texels, wraps, is_stepped }
+    }
+}
+
+/// Shared pictures as files hold them.
+pub(crate) mod shared {
+    use std::sync::Arc;
+
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+    use super::ImageTexture;
+
+    pub(crate) fn serialize<S: Serializer>(image: &Arc<ImageTexture>, to: S) -> Result<S::Ok, S::Error> {
+        image.as_ref().serialize(to)
+    }
+
+    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Arc<ImageTexture>, D::Error> {
+        ImageTexture::deserialize(from).map(Arc::new)
+    }
+}
 
 impl ImageTexture {
     /// Reads a PNG, JPEG, TGA, TIFF or EXR file; EXR is linear whatever `encoding` is.
@@ -182,6 +223,76 @@ impl ImageTexture {
     #[must_use]
     pub(crate) fn sampled(&self, wraps: [Wrap; 2], is_stepped: bool) -> Self {
         Self { wraps, is_stepped, ..self.clone() }
+    }
+
+    /// Returns the picture as files hold it, and how its numbers stand for light: those of 8 bits by the sRGB curve or in proportion, all
+    /// others in proportion as floats.
+    pub(crate) fn as_picture(&self) -> (image::DynamicImage, Encoding) {
+        use image::DynamicImage as D;
+        let (columns, rows) = (self.columns as u32, self.rows as u32);
+        let table =
+            |encoding: Encoding| -> [f32; 256] { std::array::from_fn(|code| encoding.light(code as f64 / 255.0)) };
+        let known = |light: &[f32; 256]| [Encoding::Srgb, Encoding::Linear].into_iter().find(|e| table(*e) == *light);
+        let alpha_is_bytes = !matches!(self.texels.alpha, Some(Alpha::Linear(_)));
+        if let Colors::Bytes { rgb, light } = &self.texels.rgb
+            && let Some(encoding) = known(light)
+            && alpha_is_bytes
+        {
+            let picture = match &self.texels.alpha {
+                Some(Alpha::Bytes(alpha)) => {
+                    let bytes = rgb.iter().zip(alpha).flat_map(|([r, g, b], a)| [*r, *g, *b, *a]).collect();
+                    image::RgbaImage::from_raw(columns, rows, bytes).map(D::ImageRgba8)
+                }
+                _ => image::RgbImage::from_raw(columns, rows, rgb.as_flattened().to_vec()).map(D::ImageRgb8),
+            };
+            return (picture.expect("as many samples as its size says"), encoding);
+        }
+        let rgb: Vec<[f32; 3]> = match &self.texels.rgb {
+            Colors::Bytes { rgb, light } => {
+                rgb.iter().map(|codes| codes.map(|code| light[usize::from(code)])).collect()
+            }
+            Colors::Linear(rgb) => rgb.clone(),
+        };
+        let alpha: Option<Vec<f32>> = self.texels.alpha.as_ref().map(|alpha| match alpha {
+            Alpha::Bytes(codes) => codes.iter().map(|code| f32::from(*code) / 255.0).collect(),
+            Alpha::Linear(values) => values.clone(),
+        });
+        let picture = match alpha {
+            Some(alpha) => {
+                let samples = rgb.iter().zip(alpha).flat_map(|([r, g, b], a)| [*r, *g, *b, a]).collect();
+                image::Rgba32FImage::from_raw(columns, rows, samples).map(D::ImageRgba32F)
+            }
+            None => image::Rgb32FImage::from_raw(columns, rows, rgb.into_flattened()).map(D::ImageRgb32F),
+        };
+        (picture.expect("as many samples as its size says"), Encoding::Linear)
+    }
+
+    /// A number that two pictures share where their samples are the same in memory.
+    pub(crate) fn texels_key(&self) -> usize {
+        Arc::as_ptr(&self.texels) as usize
+    }
+
+    /// Returns one channel of it, 3 for alpha, as a gray picture of the same edges.
+    pub(crate) fn channel(&self, channel: usize) -> Self {
+        let gray = |v: f32| [v; 3];
+        let rgb = match (&self.texels.rgb, &self.texels.alpha) {
+            (_, Some(Alpha::Bytes(alpha))) if channel == 3 => Colors::Bytes {
+                rgb: alpha.iter().map(|a| [*a; 3]).collect(),
+                light: Box::new(std::array::from_fn(|code| Encoding::Linear.light(code as f64 / 255.0))),
+            },
+            (_, Some(Alpha::Linear(alpha))) if channel == 3 => Colors::Linear(alpha.iter().map(|a| gray(*a)).collect()),
+            (_, None) if channel == 3 => Colors::Linear(vec![gray(1.0); self.columns * self.rows]),
+            (Colors::Bytes { rgb, light }, _) => {
+                Colors::Bytes { rgb: rgb.iter().map(|codes| [codes[channel]; 3]).collect(), light: light.clone() }
+            }
+            (Colors::Linear(rgb), _) => Colors::Linear(rgb.iter().map(|rgb| gray(rgb[channel])).collect()),
+        };
+        Self { texels: Arc::new(Texels { rgb, alpha: None }), ..self.clone() }
+    }
+
+    /// What lies beyond its edges along u and v, and whether it is looked up in steps.
+    pub(crate) fn sampling(&self) -> ([Wrap; 2], bool) {
+        (self.wraps, self.is_stepped)
     }
 
     /// Returns the picture with its light multiplied by a color.

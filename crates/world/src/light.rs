@@ -1,5 +1,6 @@
 //! What gives light.
 
+use serde::{Deserialize, Serialize};
 use std::{
     f32::consts::{PI, TAU},
     sync::Arc,
@@ -14,7 +15,7 @@ use crate::{
 };
 
 /// A light that is no shape.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Light {
     /// A point that shines alike in all directions.
     Point {
@@ -45,6 +46,7 @@ pub enum Light {
         /// Radiant intensity where the picture is white, W sr⁻¹ nm⁻¹.
         intensity: SpectralCurve,
         /// The picture.
+        #[serde(with = "crate::image_texture::shared")]
         picture: Arc<ImageTexture>,
         /// Which direction is where in it.
         layout: Layout,
@@ -68,7 +70,7 @@ pub enum Light {
 }
 
 /// Where the directions of a lamp lie on its picture.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Layout {
     /// All of them; the mean of its channels counts.
     Around(SkyMapping),
@@ -125,7 +127,7 @@ impl Layout {
 }
 
 /// How a spot falls to 0 between its two angles, as a function of t, which goes from 0 to 1 with the cosine.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum FallOff {
     /// 3 t² − 2 t³: pbrt's 4th version.
     #[default]
@@ -172,7 +174,7 @@ impl Flux {
 }
 
 /// The glow of a surface.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Emission {
     /// Radiance, the same in all directions, W m⁻² sr⁻¹ nm⁻¹.
     pub radiance: SpectralCurve,

@@ -1,6 +1,7 @@
 //! What surfaces are made of.
 
 use glam::Vec3;
+use serde::{Deserialize, Serialize};
 
 use crate::{
     Beyond, Bsdf, Film, Hit, MaterialId, SpectralCurve, TextureId, WorldError,
@@ -16,7 +17,7 @@ use dioptric_optics::Glass;
 use dioptric_spectrum::{Spectrum, lanes};
 
 /// How a surface scatters light.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Material {
     /// The ideal diffuse reflector (Lambert), from both sides.
     Matte {
@@ -163,7 +164,7 @@ pub enum Material {
 pub type Roughness = Option<[TextureId; 2]>;
 
 /// Detail of a surface that is too fine for its shape.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Relief {
     /// A texture of heights, m, over the surface.
     Heights(TextureId),

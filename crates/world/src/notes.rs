@@ -3,13 +3,13 @@
 use std::collections::HashMap;
 
 /// Sentences, each with how often it was said and of what.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Notes {
     notes: Vec<Note>,
     by_sentence: HashMap<String, usize>,
 }
 
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 struct Note {
     sentence: String,
     /// The first few things that it is said of.

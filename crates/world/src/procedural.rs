@@ -2,11 +2,12 @@
 //! 3rd edition, 10.6).
 
 use glam::{Affine3A, Vec2, Vec3};
+use serde::{Deserialize, Serialize};
 
 use crate::{TextureId, UvMapping, uv::TexturePoint};
 
 /// A number or color over a surface or through space by formula.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Procedural {
     /// Sums of noise.
     Noise {
@@ -59,7 +60,7 @@ pub enum Procedural {
 }
 
 /// How noise is summed up.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum NoiseKind {
     /// As it is: clouds.
     Fbm,

@@ -1,5 +1,6 @@
 //! Light from pictures of the whole sky.
 
+use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 use glam::{DMat3, Vec2, Vec3};
@@ -9,9 +10,10 @@ use crate::{ImageTexture, SpectralCurve, sampling::Distribution};
 
 /// A picture of all directions, whose linear sRGB colors are radiances in the unit of
 /// [`SpectralCurve::from_rgb_light`], times `scale`.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SkyImage {
     /// The picture.
+    #[serde(with = "crate::image_texture::shared")]
     pub image: Arc<ImageTexture>,
     /// Which direction is where in it.
     pub mapping: SkyMapping,
@@ -53,7 +55,7 @@ pub(crate) fn luminance([r, g, b]: [f32; 3]) -> f64 {
 }
 
 /// How the directions are laid out on a picture of the sky, in whose frame +z is up.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum SkyMapping {
     /// Columns by azimuth from +x to +y, rows by polar angle from +z at the top.
     LatLong,

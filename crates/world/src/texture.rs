@@ -1,5 +1,6 @@
 //! Values that vary over a surface.
 
+use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 use dioptric_spectrum::{SmoothReflectance, lanes};
@@ -13,13 +14,14 @@ use crate::{
 /// A value over a surface: a spectrum where a color is asked for, a number where a number is.
 ///
 /// A spectrum asked for as a number is its mean over 400–700 nm; a picture, the mean of its three channels.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Texture {
     /// The same spectrum everywhere.
     Curve(SpectralCurve),
     /// A picture, whose linear sRGB colors are lifted to smooth reflectances between 0 and 1.
     Image {
         /// The picture.
+        #[serde(with = "crate::image_texture::shared")]
         image: Arc<ImageTexture>,
         /// Which point of the picture is where.
         mapping: UvMapping,
@@ -36,6 +38,7 @@ pub enum Texture {
     /// One channel of a picture, as a number: `scale · channel + offset`.
     Channel {
         /// The picture.
+        #[serde(with = "crate::image_texture::shared")]
         image: Arc<ImageTexture>,
         /// 0 red, 1 green, 2 blue, 3 alpha, which is 1 in pictures without it.
         channel: usize,
@@ -76,6 +79,7 @@ pub enum Texture {
         amount: TextureId,
     },
     /// Textures that share the surface by a formula of the place, in the frame of the shape.
+    #[serde(skip)]
     Pattern {
         /// Up to 32 textures.
         of: Vec<TextureId>,
@@ -85,7 +89,7 @@ pub enum Texture {
 }
 
 /// How a roughness from 0 to 1 becomes GGX's α.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum RoughnessLaw {
     /// α = √roughness: pbrt's 4th version.
     Root,

@@ -1,5 +1,6 @@
 //! Where on a texture a point of a surface lies.
 
+use serde::{Deserialize, Serialize};
 use std::f32::consts::{FRAC_1_PI, PI, TAU};
 
 use glam::{Affine3A, Mat2, Vec2, Vec3};
@@ -7,7 +8,7 @@ use glam::{Affine3A, Mat2, Vec2, Vec3};
 use crate::{Hit, PatternPoint, patterned::OwnFrame};
 
 /// Texture coordinates as a function of a point of the surface: `matrix · uv + offset`.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct UvMapping {
     /// Turns and scales.
     pub matrix: Mat2,
@@ -18,7 +19,7 @@ pub struct UvMapping {
 }
 
 /// Where the two coordinates of a texture come from.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Coordinates {
     /// Those of the surface.
     First,

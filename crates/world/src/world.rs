@@ -1,6 +1,9 @@
 //! Worlds: what there is, checked once and then only looked at.
 
-use std::path::{Path, PathBuf};
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+};
 
 use dioptric_spectrum::{SmoothReflectance, lanes};
 use glam::{DAffine3, DVec3, Vec2, Vec3};
@@ -13,6 +16,7 @@ use crate::{
     material::{Surface, Surfaces},
     mesh::normal_matrix,
     notes::Notes,
+    objects::{ObjectTable, Objects},
     pattern::MOST_SHARES,
     patterned::{Frames, Patterned},
     placed::{PlacedKind, PlacedShape},
@@ -41,9 +45,12 @@ pub struct World {
     up: DVec3,
     is_left_handed: bool,
     patterned: Patterned,
+    objects: ObjectTable,
+    /// What all light is multiplied by.
+    gain: f32,
 }
 
-fn front_of(up: DVec3, is_left_handed: bool) -> DVec3 {
+pub(crate) fn front_of(up: DVec3, is_left_handed: bool) -> DVec3 {
     match (up.z.abs() > 0.5, is_left_handed) {
         (true, _) => DVec3::NEG_Y,
         (false, false) => DVec3::Z,
@@ -184,7 +191,7 @@ impl World {
     pub fn emission<const N: usize>(&self, hit: &Hit, outgoing: Vec3, wavelengths_nm: &[f32; N]) -> [f32; N] {
         match &self.geometry.shapes[hit.shape.0 as usize].emission {
             Some(emission) if emission.is_two_sided || hit.geometric_normal.dot(outgoing) > 0.0 => {
-                let radiance = emission.radiance.at(wavelengths_nm);
+                let radiance = emission.radiance.at(wavelengths_nm).map(|v| self.gain * v);
                 match self.surfaces[hit.material.0 as usize].glow {
                     None => radiance,
                     Some(glow) => {
@@ -204,7 +211,7 @@ impl World {
 
     /// Returns the radiance, W m⁻² sr⁻¹ nm⁻¹, that comes from a direction in which nothing is met.
     pub fn sky<const N: usize>(&self, direction: Vec3, wavelengths_nm: &[f32; N]) -> [f32; N] {
-        self.lights.sky(direction, wavelengths_nm)
+        self.lights.sky(direction, wavelengths_nm).map(|v| self.gain * v)
     }
 
     /// Draws light that falls on a point; `None` where the drawn light doesn't shine there.
@@ -219,6 +226,7 @@ impl World {
     ) -> Option<LightSample<N>> {
         let at = at.into();
         let (mut light, place) = self.lights.sample(&self.geometry.shapes, &at, u_light, u, wavelengths_nm)?;
+        light.radiance = light.radiance.map(|v| self.gain * v);
         if let Some((shape, triangle)) = place
             && let Some(glow) = self.surfaces[self.geometry.shapes[shape as usize].material.0 as usize].glow
         {
@@ -261,6 +269,16 @@ impl World {
         self.surfaces.iter().map(|surface| surface.name.as_str())
     }
 
+    /// The names of the objects, in the order of the numbers that [`object_of`](Self::object_of) gives.
+    pub fn object_names(&self) -> &[String] {
+        self.objects.names()
+    }
+
+    /// Returns the number of the object that a hit lies on.
+    pub fn object_of(&self, hit: &Hit) -> usize {
+        self.objects.of(hit.shape, hit.instance)
+    }
+
     /// The cameras that came with the world.
     pub fn cameras(&self) -> &[WorldCamera] {
         &self.cameras
@@ -286,6 +304,17 @@ impl World {
                 "what its colors reflect beyond {low_nm} to {high_nm} nm is not known: their spectra go on as they were fitted"
             )
         })
+    }
+
+    /// Makes all of its light so many times as strong, and says why in a note.
+    pub fn brighten(&mut self, factor: f32, note: String) {
+        self.gain *= factor;
+        self.notes.push(note);
+    }
+
+    /// How many times as strong its light is as that which was put into it.
+    pub fn gain(&self) -> f32 {
+        self.gain
     }
 
     /// Every file that the world was read from, pictures included, in the order in which they were read.
@@ -492,32 +521,52 @@ impl Hit {
 /// assert_eq!((hit.shape, hit.distance_m), (ball, 1.5));
 /// # Ok::<(), dioptric_world::WorldError>(())
 /// ```
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct WorldBuilder {
-    shapes: Vec<NewShape>,
-    n_groups: u32,
-    instances: Vec<(GroupId, DAffine3)>,
-    surfaces: Vec<Surface>,
-    textures: Vec<Texture>,
-    lights: Vec<Light>,
-    cameras: Vec<WorldCamera>,
+    pub(crate) shapes: Vec<NewShape>,
+    pub(crate) n_groups: u32,
+    pub(crate) instances: Vec<NewInstance>,
+    pub(crate) surfaces: Vec<Surface>,
+    pub(crate) textures: Vec<Texture>,
+    pub(crate) lights: Vec<NewLight>,
+    pub(crate) cameras: Vec<WorldCamera>,
     choices: Choices,
-    notes: Notes,
-    sources: Vec<PathBuf>,
+    pub(crate) notes: Notes,
+    pub(crate) sources: Vec<PathBuf>,
     up: DVec3,
     is_left_handed: bool,
-    things: Vec<Vec<ShapeId>>,
+    /// Whether which way is up is said, and no camera tells it.
+    is_up_known: bool,
+    pub(crate) things: Vec<Vec<ShapeId>>,
+    pub(crate) objects: Objects,
 }
 
 /// A shape to be placed.
-#[derive(Debug)]
-struct NewShape {
-    shape: Shape,
-    place: DAffine3,
-    group: GroupId,
-    material: MaterialId,
-    emission: Option<Emission>,
-    is_reversed: bool,
+#[derive(Clone, Debug)]
+pub(crate) struct NewShape {
+    pub(crate) shape: Arc<Shape>,
+    pub(crate) place: DAffine3,
+    pub(crate) group: GroupId,
+    pub(crate) material: MaterialId,
+    pub(crate) emission: Option<Emission>,
+    pub(crate) is_reversed: bool,
+    /// The object that it is part of, by number; of no account within a group.
+    pub(crate) object: u32,
+}
+
+/// A group to be placed.
+#[derive(Clone, Debug)]
+pub(crate) struct NewInstance {
+    pub(crate) group: GroupId,
+    pub(crate) place: DAffine3,
+    pub(crate) object: u32,
+}
+
+/// A light that is no shape.
+#[derive(Clone, Debug)]
+pub(crate) struct NewLight {
+    pub(crate) light: Light,
+    pub(crate) object: u32,
 }
 
 impl Default for WorldBuilder {
@@ -542,7 +591,9 @@ impl WorldBuilder {
             sources: Vec::new(),
             up: DVec3::Y,
             is_left_handed: false,
+            is_up_known: false,
             things: Vec::new(),
+            objects: Objects::default(),
         }
     }
 
@@ -647,7 +698,9 @@ impl WorldBuilder {
         material: MaterialId,
         emission: Option<Emission>,
     ) -> ShapeId {
-        self.shapes.push(NewShape { shape, place, group, material, emission, is_reversed: false });
+        let object = if group == GroupId::ROOT { self.objects.of_next(shape.word()) } else { 0 };
+        let shape = Arc::new(shape);
+        self.shapes.push(NewShape { shape, place, group, material, emission, is_reversed: false, object });
         ShapeId(self.shapes.len() as u32 - 1)
     }
 
@@ -671,13 +724,32 @@ impl WorldBuilder {
 
     /// Places a group in the world. Lights within it glow, but aren't looked for by [`World::sample_light`].
     pub fn add_instance(&mut self, group: GroupId, place: DAffine3) -> InstanceId {
-        self.instances.push((group, place));
+        let object = self.objects.of_next("instance");
+        self.instances.push(NewInstance { group, place, object });
         InstanceId(self.instances.len() as u32 - 1)
     }
 
     /// Adds a light that is no shape.
     pub fn add_light(&mut self, light: Light) {
-        self.lights.push(light);
+        let object = self.objects.of_next(light.word());
+        self.lights.push(NewLight { light, object });
+    }
+
+    /// Calls the next shape, instance or light so, unless an object is [open](Self::begin_object); a name that is taken gets a number.
+    pub fn name_next(&mut self, name: &str) {
+        self.objects.name_next(name);
+    }
+
+    /// Begins an object, within the one that is open: what is added until it [ends](Self::end_object) is part of it. Returns its name, which
+    /// has a number where it was taken.
+    pub fn begin_object(&mut self, name: &str) -> String {
+        let object = self.objects.begin(name);
+        self.objects.name(object).to_owned()
+    }
+
+    /// Ends the object that was begun last.
+    pub fn end_object(&mut self) {
+        self.objects.end();
     }
 
     /// Adds a camera.
@@ -711,6 +783,12 @@ impl WorldBuilder {
         (self.up, self.is_left_handed) = (up, is_left_handed);
     }
 
+    /// Holds on to what is up and whether the frame is left-handed, whichever cameras are added or leave.
+    pub(crate) fn hold_up(&mut self) {
+        (self.up, self.is_left_handed) = self.convention();
+        self.is_up_known = true;
+    }
+
     /// Adds a file that the world is made of, or that it names and that isn't there.
     pub fn add_source(&mut self, file: &Path) {
         if !self.sources.iter().any(|known| known == file) {
@@ -719,14 +797,17 @@ impl WorldBuilder {
     }
 
     /// Returns which way is up and whether the frame is left-handed: as its first camera stands in it, or by its file's convention.
-    fn convention(&self) -> (DVec3, bool) {
-        let Some(camera) = self.cameras.first() else { return (self.up, self.is_left_handed) };
+    pub(crate) fn convention(&self) -> (DVec3, bool) {
+        let camera = self.cameras.first().filter(|_| !self.is_up_known);
+        let Some(camera) = camera else { return (self.up, self.is_left_handed) };
         let m = camera.world_from_camera.matrix3;
         let y = m.y_axis.normalize_or(self.up);
         // The axis that is nearest.
         let largest = y.abs().max_element();
         let nearest = DVec3::from_array(y.to_array().map(|v| if v.abs() == largest { v.signum() } else { 0.0 }));
-        (nearest.normalize_or(self.up), m.determinant() > 0.0)
+        // A camera that looks far down or up doesn't tell.
+        let up = if largest > 0.8 { nearest.normalize_or(self.up) } else { self.up };
+        (up, m.determinant() > 0.0)
     }
 
     /// Returns which way is up in the world, and what faces the viewer, as [`World::up`] and [`World::front`].
@@ -737,25 +818,13 @@ impl WorldBuilder {
 
     /// Returns the greatest extent along an axis of the shapes that belong to no group, m; 0 where there are none.
     pub fn extent_m(&self) -> f64 {
-        let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-        for shape in self.shapes.iter().filter(|shape| shape.group == GroupId::ROOT) {
-            let (a, b) = match &shape.shape {
-                Shape::Mesh(mesh) => mesh.positions.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(a, b), p| {
-                    (a.min(p.as_dvec3()), b.max(p.as_dvec3()))
-                }),
-                other => Quadric::new(other.clone(), DAffine3::IDENTITY).bounds(),
-            };
-            if a.cmple(b).all() {
-                let (a, b) = crate::shape::placed_bounds(&shape.place, a, b);
-                (low, high) = (low.min(a), high.max(b));
-            }
-        }
+        let (low, high) = crate::edit::bounds_of(self.shapes.iter().filter(|shape| shape.group == GroupId::ROOT));
         if low.cmple(high).all() { (high - low).max_element() } else { 0.0 }
     }
 
     /// Whether nothing in it could be seen: no shape, or meshes without triangles alone.
     pub fn is_empty(&self) -> bool {
-        self.shapes.iter().all(|shape| matches!(&shape.shape, Shape::Mesh(mesh) if mesh.triangles.is_empty()))
+        self.shapes.iter().all(|shape| matches!(&*shape.shape, Shape::Mesh(mesh) if mesh.triangles.is_empty()))
     }
 
     /// Whether anything gives light.
@@ -772,12 +841,14 @@ impl WorldBuilder {
         let (up, is_left_handed) = self.convention();
         let has_patterns = self.textures.iter().any(|texture| matches!(texture, Texture::Pattern { .. }));
         let patterned = Patterned::of(has_patterns, self.shapes.iter().map(|s| s.place), &self.things);
-        let Self { shapes, n_groups, instances, surfaces, textures, lights, cameras, choices, .. } = self;
+        let Self { shapes, n_groups, instances, surfaces, textures, lights, cameras, choices, objects, .. } = self;
+        let of_shapes = shapes.iter().map(|shape| if shape.group == GroupId::ROOT { Some(shape.object) } else { None });
+        let objects = ObjectTable::new(objects, of_shapes, instances.iter().map(|instance| instance.object));
         let (notes, sources) = (self.notes.sentences(), self.sources);
         let mut placed: Vec<PlacedShape> = shapes.into_iter().map(NewShape::placed).collect();
         let instances: Vec<Instance> = instances
             .into_iter()
-            .map(|(group, place)| Instance { group: group.0, place, inverse: place.inverse() })
+            .map(|NewInstance { group, place, .. }| Instance { group: group.0, place, inverse: place.inverse() })
             .collect();
         let mut parts: Vec<GroupParts> = (0..n_groups).map(|_| GroupParts::default()).collect();
         for (index, shape) in placed.iter().enumerate() {
@@ -795,7 +866,7 @@ impl WorldBuilder {
         }
         root.check_extent()?;
         groups.insert(0, Group::build(root));
-        let lights = Lights::new(lights, &mut placed);
+        let lights = Lights::new(lights.into_iter().map(|new| new.light).collect(), &mut placed);
         let geometry = Geometry { shapes: placed, instances, groups };
         let has_gaps = geometry.shapes.iter().any(|shape| surfaces[shape.material.0 as usize].has_gaps);
         Ok(World {
@@ -811,6 +882,8 @@ impl WorldBuilder {
             up,
             is_left_handed,
             patterned,
+            objects,
+            gain: 1.0,
         })
     }
 
@@ -820,7 +893,7 @@ impl WorldBuilder {
             true => Ok(()),
             false => Err(WorldError::Dangling { what, target, index: index as usize, n }),
         };
-        let places = self.shapes.iter().map(|s| &s.place).chain(self.instances.iter().map(|(_, place)| place));
+        let places = self.shapes.iter().map(|s| &s.place).chain(self.instances.iter().map(|instance| &instance.place));
         for place in places {
             if !(place.is_finite() && place.matrix3.determinant().abs() > 0.0) {
                 return Err(WorldError::Setting {
@@ -835,7 +908,7 @@ impl WorldBuilder {
             named("a shape", "material", shape.material.0, self.surfaces.len())?;
             named("a shape", "group", shape.group.0, self.n_groups as usize)?;
         }
-        for (group, _) in &self.instances {
+        for NewInstance { group, .. } in &self.instances {
             named("an instance", "group", group.0, self.n_groups as usize)?;
             if *group == GroupId::ROOT {
                 return Err(WorldError::Setting {
@@ -878,7 +951,7 @@ impl WorldBuilder {
 
 impl NewShape {
     fn placed(self) -> PlacedShape {
-        let kind = match self.shape {
+        let kind = match Arc::unwrap_or_clone(self.shape) {
             Shape::Mesh(mut mesh) => {
                 mesh.transform(&self.place);
                 PlacedKind::Mesh(mesh)

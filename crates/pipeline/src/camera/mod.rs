@@ -19,6 +19,7 @@ mod sensor_options;
 mod syntax;
 mod video;
 mod world;
+mod world_change;
 
 use std::path::{Path, PathBuf};
 
@@ -51,6 +52,7 @@ pub use sensor_options::SensorOptions;
 pub use syntax::CAMERA_SCHEMA;
 pub use video::{CameraTurn, TurnPath, VideoSpec};
 pub use world::{RenderEffort, RenderMethod, WorldLamp, WorldSky, WorldSpec, WorldView};
+pub use world_change::{LightAmount, WorldChange, WorldColor, WorldLight, WorldMaterial, WorldShape};
 
 use self::check::Checker;
 use crate::{Outputs, PipelineError};

@@ -63,7 +63,8 @@ pub struct SceneSpec {
     /// `illuminant` takes the place of.
     #[serde(default)]
     pub light: Option<Illuminant>,
-    /// Scales the radiance to this mean luminance, cd/m²; nothing is scaled unless this is given.
+    /// Scales the radiance to this mean luminance, cd/m²; of a world all of its lights, so that what is seen has it. Nothing is scaled unless
+    /// this is given.
     #[serde(default)]
     pub mean_luminance_cd_m2: Option<f64>,
     /// Scales the light of the scene so that the illuminance of what is simulated of the film is this on average, lux; of any scene,
@@ -123,6 +124,7 @@ impl FlatSize {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
+#[expect(clippy::large_enum_variant, reason = "a camera has one of them")]
 pub enum SceneSource {
     /// A spectral EXR, an ENVI header or its file of numbers, a MATLAB file, an array of `NumPy`, a stack of TIFF pages, a folder of band
     /// pictures, or an ordinary picture.
@@ -234,9 +236,9 @@ impl SceneSpec {
         match self.source {
             SceneSource::File(_) => Ok(()),
             SceneSource::World(ref world) => {
-                let others = [self.illuminance_lux, self.mean_luminance_cd_m2, self.depth_m];
-                if self.illuminant.is_some() || others.iter().any(Option::is_some) {
-                    let expected = "field_of_view_deg and light at most: a world has lights and depths of its own";
+                if self.illuminant.is_some() || self.illuminance_lux.is_some() || self.depth_m.is_some() {
+                    let expected =
+                        "field_of_view_deg, light and a mean level at most: a world has lights and depths of its own";
                     return checker.wrong("scene", "a world under another light or at another depth", expected);
                 }
                 world.check(checker)
@@ -480,8 +482,12 @@ impl SceneSpec {
     pub(crate) fn resolve_paths(&mut self, folder: &Path) {
         match &mut self.source {
             SceneSource::File(path) => *path = folder.join(&path),
-            SceneSource::World(world) if !world.is_still_life() => world.file = folder.join(&world.file),
-            SceneSource::World(_) => {}
+            SceneSource::World(world) => {
+                if world.is_file() {
+                    world.file = folder.join(&world.file);
+                }
+                world.changes.iter_mut().for_each(|change| change.each_file(&mut |file| *file = folder.join(&file)));
+            }
             SceneSource::StillLife { .. } | SceneSource::Target { .. } => {}
         }
         for file in

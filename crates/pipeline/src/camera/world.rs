@@ -7,9 +7,10 @@ use std::{
 
 use dioptric_backward::{BandSampling, LightPaths};
 use dioptric_spectrum::WavelengthGrid;
+use dioptric_world::ReadOptions;
 use serde::{Deserialize, Serialize};
 
-use super::check::Checker;
+use super::{check::Checker, world_change::WorldChange};
 use crate::{PipelineError, parse_numbers};
 
 /// A three-dimensional world before the camera, and how it is rendered.
@@ -20,7 +21,8 @@ use crate::{PipelineError, parse_numbers};
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct WorldSpec {
-    /// The file: `.pbrt`, `.gltf`, `.glb`, `.obj`, `.ply` or `.stl`; or `still-life`, the built-in scene of the demo.
+    /// The file: `.pbrt`, `.gltf`, `.glb`, `.obj`, `.ply` or `.stl`; `still-life`, the built-in scene of the demo;
+    /// or `empty`, a world of nothing, to which `changes` add.
     pub file: PathBuf,
     /// How long the file's unit of length is, m.
     #[serde(default = "one_meter")]
@@ -35,6 +37,9 @@ pub struct WorldSpec {
     /// Which of the variants of its materials a glTF file shows, by name; the file's own materials if left out.
     #[serde(default)]
     pub variant: Option<String>,
+    /// What is changed in it, one after the other.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub changes: Vec<WorldChange>,
     /// From where it is seen.
     #[serde(default)]
     pub view: WorldView,
@@ -226,6 +231,7 @@ impl WorldSpec {
             time_s: None,
             animation: None,
             variant: None,
+            changes: Vec::new(),
             view: WorldView::default(),
             sky: None,
             lamps: Vec::new(),
@@ -250,6 +256,30 @@ impl WorldSpec {
     /// The built-in still life in a view of so many columns and rows, with the defaults for all else.
     pub fn still_life(size: (usize, usize)) -> Self {
         Self { size: Some(size), ..Self::of_file(PathBuf::from(Self::STILL_LIFE)) }
+    }
+
+    /// Returns how its file is read.
+    pub fn reading(&self) -> ReadOptions {
+        ReadOptions {
+            metres_per_unit: self.unit_m,
+            time_s: self.time_s,
+            animation: self.animation.clone(),
+            variant: self.variant.clone(),
+        }
+    }
+
+    /// The name of a world of nothing, in place of a file; its frame is that of glTF.
+    pub const EMPTY: &str = "empty";
+
+    /// Whether it is read from a file, and not built in.
+    pub fn is_file(&self) -> bool {
+        !self.is_still_life() && self.file.as_os_str() != Self::EMPTY
+    }
+
+    /// Returns all files that it names.
+    pub(crate) fn files(&self) -> impl Iterator<Item = PathBuf> {
+        let own = self.is_file().then(|| self.file.clone());
+        own.into_iter().chain(self.changes.iter().flat_map(WorldChange::files))
     }
 
     /// Whether it is the built-in still life and no file.
@@ -322,9 +352,10 @@ impl WorldSpec {
                 let expected = "none: nothing in the still life moves or has variants";
                 checker.wrong("time_s, animation or variant", "given", expected)?;
             }
-            if self.view != WorldView::OfFile || self.sky.is_some() || !self.lamps.is_empty() {
+            let has_more = self.sky.is_some() || !self.lamps.is_empty() || !self.changes.is_empty();
+            if self.view != WorldView::OfFile || has_more {
                 let expected = "none: the still life has a view and light of its own";
-                checker.wrong("view, sky or lamps", "given", expected)?;
+                checker.wrong("view, sky, lamps or changes", "given", expected)?;
             }
         }
         match self.effort {

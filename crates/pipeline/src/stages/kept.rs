@@ -215,7 +215,7 @@ impl KeptCamera {
         check_glasses(&lens, self.camera.wavelengths.grid()?.as_ref())?;
         let file = match &self.camera.scene.source {
             SceneSource::File(path) => Some(path),
-            SceneSource::World(world) => Some(&world.file).filter(|_| !world.is_still_life()),
+            SceneSource::World(world) => Some(&world.file).filter(|_| world.is_file()),
             SceneSource::StillLife { .. } | SceneSource::Target { .. } => None,
         };
         if let Some(path) = file.filter(|_| self.given.scene.is_none()) {

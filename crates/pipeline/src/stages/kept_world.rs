@@ -5,6 +5,7 @@ use std::sync::Arc;
 use dioptric_forward::check_depth_map;
 use dioptric_spectrum::{Cancel, Quantity, SpectralImage};
 use dioptric_world::World;
+use ndarray::Array2;
 
 use super::{
     chain::Chain,
@@ -34,11 +35,6 @@ impl KeptCamera {
     pub fn world_render(&self, progress: &dyn Progress, cancel: &Cancel) -> Result<WorldRender, PipelineError> {
         self.camera.validate()?;
         let inputs = self.irradiance_inputs()?;
-        if inputs.mean_lux.is_some() {
-            let reason = "is of a picture that 'run' takes: rays that are added up bring the light that the world has"
-                .to_owned();
-            return Err(PipelineError::Unsuitable { what: "mean_lux", reason });
-        }
         if self.camera.scene.points.is_some() {
             let reason = "are met by no ray from the film, expected none: 'run' images them".to_owned();
             return Err(PipelineError::Unsuitable { what: "points", reason });
@@ -53,6 +49,22 @@ impl KeptCamera {
         chain.world_render(&inputs)
     }
 
+    /// Returns the object that the middle of each pixel sees of the world before the camera, by number plus 1, 0 for none; and the names of the
+    /// objects.
+    ///
+    /// # Errors
+    /// When the scene is no world, or as [`capture`](Self::capture).
+    pub fn objects(
+        &self,
+        progress: &dyn Progress,
+        cancel: &Cancel,
+    ) -> Result<(Array2<u32>, Vec<String>), PipelineError> {
+        let names = self.world(progress, cancel)?.object_names().to_vec();
+        let inputs = self.irradiance_inputs()?;
+        let render = self.chain(progress, cancel).world_render(&inputs)?;
+        Ok((render.auxiliary(cancel)?.object.mapv(|number| number as u32), names))
+    }
+
     /// Whether the irradiance on the film is kept, so that a capture starts behind it.
     ///
     /// # Errors
@@ -61,7 +73,8 @@ impl KeptCamera {
         Ok(self.kept.irradiance.get(&self.irradiance_inputs()?).is_some())
     }
 
-    /// Keeps a rendered picture as the irradiance of this camera, so that a capture starts behind it.
+    /// Keeps a rendered picture as the irradiance of this camera, brought to the mean illuminance that it asks for, so that a capture starts
+    /// behind it.
     ///
     /// # Errors
     /// When the picture is no irradiance on the film of this camera.
@@ -72,7 +85,8 @@ impl KeptCamera {
             let reason = format!("its unit is {}, expected an irradiance on pixels of a known pitch", quantity.unit());
             return Err(PipelineError::Unsuitable { what: "the picture", reason });
         };
-        self.kept.irradiance.put(inputs, Irradiance::of_image(picture, pitch_um));
+        let irradiance = Irradiance::of_image(picture, pitch_um).with_mean_lux(inputs.mean_lux)?;
+        self.kept.irradiance.put(inputs, irradiance);
         Ok(())
     }
 }

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use dioptric_backward::Rendering;
 use dioptric_spectrum::SpectralImage;
+use dioptric_world::World;
 use image::RgbImage;
 use ndarray::Array2;
 use serde::Serialize;
@@ -28,13 +29,15 @@ pub struct RenderingSummary {
     pub relative_standard_error: Option<Vec<f64>>,
     /// Samples a pixel, in the mean.
     pub samples_per_pixel: f64,
+    /// The names of its objects, which `object` of `auxiliary.exr` counts from 1.
+    pub objects: Vec<String>,
     /// What of the world's file is not supported, and what stands in its place.
     pub notes: Vec<String>,
 }
 
 impl RenderingSummary {
-    /// Sums up a rendering of a world, of whose file so much is not supported.
-    pub fn of(rendering: &Rendering, notes: &[String], spec: &WorldSpec) -> Self {
+    /// Sums up a rendering of a world.
+    pub fn of(rendering: &Rendering, world: &World, spec: &WorldSpec) -> Self {
         let picture = &rendering.picture;
         let n = (picture.rows() * picture.columns()) as f64;
         let mean_of =
@@ -54,7 +57,8 @@ impl RenderingSummary {
             relative_standard_error: errors.iter().any(|&error| error > 0.0).then_some(errors),
             mean,
             samples_per_pixel: rendering.n_samples.iter().map(|&n| f64::from(n)).sum::<f64>() / n,
-            notes: notes.to_vec(),
+            objects: world.object_names().to_vec(),
+            notes: world.notes().to_vec(),
         }
     }
 }

@@ -24,7 +24,7 @@ use super::{
 use crate::{
     BlurSpec, BorderSpec, Camera, Crop, Diffraction, DualPixelSpec, FilmSpec, FilterSpec, FlatSize, FocusSpec,
     FramesSpec, LensReadOptions, LensReflections, LensSpec, LightFieldSpec, Movements, PipelineError, Quality,
-    RenderEffort, SceneSource, SceneSpec, StopSpec, WavelengthSpec, WorldLamp, WorldSky, WorldSpec,
+    RenderEffort, SceneSource, SceneSpec, StopSpec, WavelengthSpec, WorldChange, WorldLamp, WorldSky, WorldSpec,
 };
 
 /// A file as it was when it was looked at, so that a change of it is seen.
@@ -99,6 +99,8 @@ pub(crate) struct GeometryInputs {
     pub(crate) is_summary: bool,
     /// The frame in which a preview has all that the film sees of the still life, where that matters and is known from the lens and the film.
     pub(crate) frame: Option<i32>,
+    /// The level that a world's light is brought to, cd/m²; that of other scenes is no matter of their geometry.
+    pub(crate) mean_luminance_cd_m2: Option<f64>,
     files: Vec<FileStamp>,
 }
 
@@ -119,9 +121,19 @@ pub(crate) struct SceneInputs {
 pub(crate) struct WorldInputs {
     pub(crate) file: PathBuf,
     pub(crate) reading: ReadOptions,
+    pub(crate) changes: Vec<WorldChange>,
     pub(crate) sky: Option<WorldSky>,
     pub(crate) lamps: Vec<WorldLamp>,
+    pub(crate) level: Option<LevelInputs>,
     files: Vec<FileStamp>,
+}
+
+/// The level that a world's light is brought to, and the view that it is that of.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct LevelInputs {
+    pub(crate) mean_luminance_cd_m2: f64,
+    pub(crate) spec: Box<WorldSpec>,
+    pub(crate) fov_deg: Option<f64>,
 }
 
 /// The place and the raster of the film.
@@ -273,16 +285,23 @@ impl GeometryInputs {
     /// Returns what the world of this geometry is read from, or `None` for a scene that is none.
     pub(crate) fn world(&self) -> Option<(WorldInputs, &WorldSpec)> {
         let SceneSource::World(spec) = &self.source else { return None };
+        // What doesn't change the level of the view is left out.
+        let of_view = |spec: &WorldSpec| {
+            let WorldSpec { method, effort, layers, seed, .. } = WorldSpec::of_file(PathBuf::new());
+            Box::new(WorldSpec { method, effort, layers, seed, ..spec.clone() })
+        };
+        let level = self.mean_luminance_cd_m2.map(|mean_luminance_cd_m2| LevelInputs {
+            mean_luminance_cd_m2,
+            spec: of_view(spec),
+            fov_deg: self.field_of_view_deg,
+        });
         let inputs = WorldInputs {
             file: spec.file.clone(),
-            reading: ReadOptions {
-                metres_per_unit: spec.unit_m,
-                time_s: spec.time_s,
-                animation: spec.animation.clone(),
-                variant: spec.variant.clone(),
-            },
+            reading: spec.reading(),
+            changes: spec.changes.clone(),
             sky: spec.sky.clone(),
             lamps: spec.lamps.clone(),
+            level,
             files: self.files.clone(),
         };
         Some((inputs, spec))
@@ -330,6 +349,10 @@ impl SceneInputs {
                 seen_by: None,
                 is_summary: is_summary(&scene.source, camera.film),
                 frame: None,
+                mean_luminance_cd_m2: match &scene.source {
+                    SceneSource::World(_) => scene.mean_luminance_cd_m2,
+                    _ => None,
+                },
                 files: scene
                     .points
                     .iter()
@@ -341,7 +364,7 @@ impl SceneInputs {
                             let others = others.into_iter().flatten().flat_map(|path| FileStamp::all_of(path));
                             FileStamp::all_of(path).into_iter().chain(others).collect()
                         }
-                        SceneSource::World(world) if !world.is_still_life() => FileStamp::all_of(&world.file),
+                        SceneSource::World(world) => world.files().flat_map(|path| FileStamp::all_of(&path)).collect(),
                         _ => Vec::new(),
                     })
                     .collect(),

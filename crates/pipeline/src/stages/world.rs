@@ -10,7 +10,7 @@ use dioptric_backward::{
 use dioptric_optics::{Lens, glam::DVec2};
 use dioptric_scene::{HiddenLayer, Scene, SceneLight, View};
 use dioptric_spectrum::{Cancel, DepthMap, Illuminant, Quantity, SpectralImage, WavelengthGrid};
-use dioptric_world::{CameraKind, Flux, Light, World, WorldCamera, glam::DVec3, open_world};
+use dioptric_world::{CameraKind, Flux, Light, World, WorldBuilder, WorldCamera, glam::DVec3, open_world};
 use ndarray::Array2;
 
 use super::{
@@ -19,6 +19,8 @@ use super::{
     lens::ResolvedLens,
     scene::ResolvedScene,
     spec::{IrradianceInputs, SceneInputs, WorldInputs},
+    world_change::change_world,
+    world_level,
     world_light::light_on,
     world_sky::add_sky,
     world_view::{horizontal_fov_deg, placement, world_camera},
@@ -56,9 +58,15 @@ pub struct WorldRender {
 pub(super) fn read(inputs: &WorldInputs, watch: &Watch<'_>) -> Result<World, PipelineError> {
     watch.progress.at(Stage::Scene, 0.0);
     if inputs.file.as_os_str() == WorldSpec::STILL_LIFE {
-        return Ok(World::still_life());
+        return leveled(World::still_life(), inputs, watch);
     }
-    let mut builder = open_world(&inputs.file, &inputs.reading, watch.cancel)?;
+    let is_file = inputs.file.as_os_str() != WorldSpec::EMPTY;
+    let mut builder = match is_file {
+        true => open_world(&inputs.file, &inputs.reading, watch.cancel)?,
+        false => WorldBuilder::new(),
+    };
+    let extent_m = builder.extent_m();
+    inputs.changes.iter().try_for_each(|change| change_world(&mut builder, change, watch.cancel))?;
     for WorldLamp { at_m: (x, y, z), lumens } in &inputs.lamps {
         let intensity = Flux::Lumens(*lumens).spectrum(&Illuminant::D65.spectrum(), 4.0 * std::f64::consts::PI)?;
         builder.add_light(Light::Point { position: DVec3::new(*x, *y, *z), intensity });
@@ -80,13 +88,19 @@ pub(super) fn read(inputs: &WorldInputs, watch: &Watch<'_>) -> Result<World, Pip
         Some("stl") => MOST_LIKELY_OF_STL_M,
         _ => MOST_LIKELY_M,
     };
-    let extent_m = builder.extent_m();
-    if inputs.reading.metres_per_unit == 1.0 && extent_m > most_likely_m {
+    if is_file && inputs.reading.metres_per_unit == 1.0 && extent_m > most_likely_m {
         builder.note(format!(
             "the file says no unit: in metres, as it is taken, all of it is {extent_m:.0} m wide; --unit-m 0.001 takes millimetres"
         ));
     }
-    Ok(builder.build()?)
+    leveled(builder.build()?, inputs, watch)
+}
+
+fn leveled(world: World, inputs: &WorldInputs, watch: &Watch<'_>) -> Result<World, PipelineError> {
+    match &inputs.level {
+        Some(level) => world_level::bring_to(world, level, watch),
+        None => Ok(world),
+    }
 }
 
 /// Worlds wider than this are seldom in metres, and what is made for printers.
@@ -159,7 +173,9 @@ pub(super) fn view(
         None => light_on(world, &pinhole)?,
     };
     let (first_nm, last_nm) = first.radiance.grid().range_nm();
-    let notes = world.note_on_bands(first_nm, last_nm).map(|note| format!("{name}: {note}")).into_iter().collect();
+    let of_level = world.notes().last().filter(|_| world.gain() != 1.0).cloned();
+    let notes = world.note_on_bands(first_nm, last_nm).into_iter().chain(of_level);
+    let notes = notes.map(|note| format!("{name}: {note}")).collect();
     let scene =
         Scene { depth: Some(first.depth), view: Some(view), hidden, light, notes, ..Scene::new(name, first.radiance) };
     Ok(ResolvedScene { scene, binning })
@@ -242,6 +258,16 @@ impl Progress for AtStage<'_> {
 }
 
 impl WorldRender {
+    /// Returns the world before a camera, to no end but the numbers of its picture.
+    pub(super) fn bare(
+        world: Arc<World>,
+        camera: Camera,
+        bands: Bands,
+        (paths, samples_per_pass): (LightPaths, u32),
+    ) -> Self {
+        Self { world, camera, bands, paths, seed: 1, samples_per_pass, identity: String::new() }
+    }
+
     /// Returns the world as the lens of a camera file sees it.
     pub(super) fn through_lens(
         world: Arc<World>,
@@ -479,7 +505,8 @@ fn fingerprint(world: &World, spec: &WorldSpec) -> String {
         hasher.update(&[u8::from(is_read)]);
         hasher.update(own.finalize().as_bytes());
     }
-    let WorldSpec { unit_m, time_s, animation, variant, view, sky, lamps, .. } = spec;
+    let WorldSpec { unit_m, time_s, animation, variant, changes, view, sky, lamps, .. } = spec;
     let shown = (time_s, animation, variant);
-    format!("{} {unit_m} {shown:?} {view:?} {sky:?} {lamps:?}", hasher.finalize().to_hex())
+    let (hash, gain) = (hasher.finalize().to_hex(), world.gain());
+    format!("{hash} {unit_m} {shown:?} {changes:?} {view:?} {sky:?} {lamps:?} {gain}")
 }

@@ -23,6 +23,8 @@ pub struct WorldSummary {
     pub n_primitives: u64,
     /// Lights, glowing shapes included.
     pub n_lights: usize,
+    /// The names of its objects, lights among them.
+    pub objects: Vec<String>,
     /// The names of its materials, as often as they are made.
     pub materials: Vec<String>,
     /// Its cameras, in the order in which `--camera N` counts them from 1.
@@ -76,6 +78,7 @@ impl WorldSummary {
             up: world.up().to_array(),
             n_primitives: world.n_primitives(),
             n_lights: world.n_lights(),
+            objects: world.object_names().to_vec(),
             materials,
             cameras: world.cameras().iter().map(CameraSummary::of).collect(),
             animations: world.choices().animations.iter().map(AnimationSummary::of).collect(),

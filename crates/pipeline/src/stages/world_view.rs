@@ -115,7 +115,7 @@ pub(super) fn horizontal_fov_deg(camera: &WorldCamera) -> Option<f64> {
 }
 
 /// Returns the place of a camera that looks along a direction; `None` where that is none, or up lies along it.
-fn looking(eye_m: DVec3, along: DVec3, up: DVec3, is_left_handed: bool) -> Option<DAffine3> {
+pub(super) fn looking(eye_m: DVec3, along: DVec3, up: DVec3, is_left_handed: bool) -> Option<DAffine3> {
     let forward = along.try_normalize()?;
     let right = if is_left_handed { up.cross(forward) } else { forward.cross(up) };
     let right = right.try_normalize().filter(|_| eye_m.is_finite())?;

@@ -27,6 +27,7 @@ from ._native import (
     threads,
 )
 from ._psf import Psf
+from ._world import World
 
 __all__ = [
     "Camera",
@@ -40,6 +41,7 @@ __all__ = [
     "Shot",
     "Video",
     "VideoFrame",
+    "World",
     "__version__",
     "develop",
     "measure",

@@ -6,13 +6,14 @@ mod obj;
 mod pbrt;
 mod ply;
 mod stl;
+mod write;
 
 use std::path::Path;
 
 use dioptric_spectrum::Cancel;
 use glam::{DAffine3, DVec3};
 
-pub use self::{obj::read_obj, ply::read_ply, stl::read_stl};
+pub use self::{obj::read_obj, ply::read_ply, stl::read_stl, write::write_world};
 use crate::{
     Choices, Encoding, Material, MaterialId, Shape, SpectralCurve, Texture, TriangleMesh, UvMapping, World,
     WorldBuilder, WorldError,
@@ -144,6 +145,7 @@ fn bare(
         }
         None => plain(&mut builder, !mesh.colors.is_empty()),
     };
+    builder.name_next(&path.file_stem().unwrap_or_default().to_string_lossy());
     builder.add_shape(Shape::Mesh(mesh), place, material, None);
     builder
 }

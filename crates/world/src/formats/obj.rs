@@ -82,6 +82,9 @@ pub(super) fn read(path: &Path, unit: f64) -> Result<WorldBuilder, WorldError> {
     let Contents { parts, smooth_normals, .. } = contents;
     for part in parts {
         let name = part.material.clone();
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+        let object = Some(&*part.object).filter(|object| !object.is_empty()).or(name.as_deref()).unwrap_or(&stem);
+        library.builder.name_next(object);
         let mesh = part.finished(path, &smooth_normals)?;
         let (material, glow) = library.material(name.as_deref(), !mesh.colors.is_empty());
         library.builder.add_shape(Shape::Mesh(mesh), place, material, glow);

@@ -11,6 +11,7 @@ use super::{
     draco,
     json::{extension, index, list},
     numbers_of,
+    own::OwnPrimitive,
 };
 use crate::{GroupId, Shape, TriangleMesh, WorldError};
 
@@ -90,6 +91,14 @@ impl Reader<'_> {
             self.builder.note("points and lines, which have no area: left out");
             return Ok(());
         }
+        let own = self.own_primitive(primitive)?;
+        if let Some(OwnPrimitive { material, emission, shape: Some((shape, own_place, is_reversed)) }) = own {
+            let id = self.builder.add_shape_to(group, shape, place * own_place, material, emission);
+            if is_reversed {
+                self.builder.reverse(id);
+            }
+            return Ok(());
+        }
         let packed = self.unpacked(primitive)?;
         let rows = packed.as_ref().map(|packed| &packed.rows);
         let Some(vertices) = self.vertices(primitive, rows, morphs)? else { return Ok(()) };
@@ -119,7 +128,10 @@ impl Reader<'_> {
             self.builder.note("meshes that a node flattens, left out");
             return Ok(());
         }
-        let (material, glow) = self.material(self.material_of(primitive), !mesh.colors.is_empty())?;
+        let (material, glow) = match own {
+            Some(own) => (own.material, own.emission),
+            None => self.material(self.material_of(primitive), !mesh.colors.is_empty())?,
+        };
         self.builder.add_shape_to(group, Shape::Mesh(mesh), place, material, glow);
         Ok(())
     }

@@ -10,6 +10,7 @@ mod json;
 mod materials;
 mod meshes;
 mod meshopt;
+mod own;
 
 use std::{
     collections::{HashMap, HashSet},
@@ -25,6 +26,7 @@ use dioptric_spectrum::Cancel;
 use glam::{DAffine3, DMat4, DQuat, DVec3};
 use serde_json::Value;
 
+pub(crate) use self::own::GENERATOR;
 use self::{
     accessors::{Rows, Source},
     json::{Left, extension, index, is_read, list, number, number_or, numbers},
@@ -40,7 +42,7 @@ const MAX_BYTES: u64 = 1 << 31;
 /// How deep nodes may be nested.
 const MAX_DEPTH: usize = 256;
 /// Luminous efficacy at 555 nm, lm/W: glTF gives lights in candela and lux.
-const LUMENS_PER_WATT: f64 = 683.002;
+pub(crate) const LUMENS_PER_WATT: f64 = 683.002;
 /// Base64 as files have it, with its padding or without.
 const BASE64: GeneralPurpose = GeneralPurpose::new(
     &STANDARD,
@@ -88,6 +90,8 @@ pub(super) fn read(
         seen: HashSet::new(),
         variant: None,
         n_bytes: bytes.len() as u64,
+        own_pictures: Vec::new(),
+        is_own: false,
         cancel,
     };
     reader.builder.set_up(DVec3::Y, false);
@@ -119,6 +123,7 @@ pub(super) fn read(
     let variants = &reader.builder.choices().variants;
     reader.variant = options.variant.as_ref().and_then(|name| variants.iter().position(|known| known == name));
     reader.note_left(left);
+    reader.read_own()?;
     reader.scene(place)?;
     Ok(reader.builder)
 }
@@ -170,6 +175,9 @@ struct Reader<'c> {
     /// Which variant of the materials is shown.
     variant: Option<usize>,
     n_bytes: u64,
+    /// Pictures of what this program wrote, and whether it wrote the file.
+    own_pictures: Vec<Arc<ImageTexture>>,
+    is_own: bool,
     cancel: &'c Cancel,
 }
 
@@ -292,18 +300,31 @@ impl Reader<'_> {
         if extension(node, "KHR_node_visibility").and_then(|of| of.get("visible")) == Some(&Value::Bool(false)) {
             return Ok(());
         }
+        let name =
+            |of: &Value| of.get("name").and_then(Value::as_str).filter(|name| !name.is_empty()).map(str::to_owned);
+        let mesh = index(node, "mesh").and_then(|mesh| list(self.root, "meshes").get(mesh));
+        let is_part = self.is_part(node);
+        if !is_part {
+            self.builder.begin_object(&name(node).or_else(|| name(mesh?)).unwrap_or_else(|| format!("node {number}")));
+        }
         if let Some(mesh) = index(node, "mesh") {
             for instance in self.instances(node)?.unwrap_or_else(|| vec![DAffine3::IDENTITY]) {
                 self.mesh(node, mesh, place * instance)?;
             }
         }
-        if let Some(light) = extension(node, "KHR_lights_punctual").and_then(|of| index(of, "light")) {
+        if let Some(light) = self.own_light(node, &place)? {
+            self.builder.add_light(light);
+        } else if let Some(light) = extension(node, "KHR_lights_punctual").and_then(|of| index(of, "light")) {
             self.light(light, place)?;
         }
         if let Some(camera) = index(node, "camera") {
             self.camera(camera, node, place)?;
         }
-        numbers_of(node, "children").into_iter().try_for_each(|child| self.node(child, depth + 1))
+        numbers_of(node, "children").into_iter().try_for_each(|child| self.node(child, depth + 1))?;
+        if !is_part {
+            self.builder.end_object();
+        }
+        Ok(())
     }
 
     /// Returns the places of a node's mesh in it, where it has many.
@@ -379,6 +400,10 @@ impl Reader<'_> {
             .get(index)
             .ok_or_else(|| self.fault(format!("camera {index}, of which there are {}", cameras.len())))?;
         let name = |of: &Value| of.get("name").and_then(Value::as_str).map(str::to_owned);
+        if let Some(camera) = self.own_camera(camera, node, &place)? {
+            self.builder.add_camera(camera);
+            return Ok(());
+        }
         let kind = camera.get("type").and_then(Value::as_str).unwrap_or("");
         // Without the scale of its parents, but for a parallel view.
         let (scale, rotation, translation) = place.to_scale_rotation_translation();

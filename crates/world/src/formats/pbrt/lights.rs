@@ -83,6 +83,9 @@ impl Reader<'_> {
             self.builder.note_of("light sources within an object: left out", kind);
             return Ok(());
         }
+        if let Some(name) = &self.attributes.name {
+            self.builder.name_next(name);
+        }
         let place = self.place_m()?;
         let unit = self.metres_per_unit;
         let scale = self.scale(params);

@@ -19,11 +19,13 @@ use std::{
     collections::HashMap,
     io::Read,
     path::{Path, PathBuf},
+    sync::Arc,
 };
 
 use dioptric_spectrum::Cancel;
 use glam::{DAffine3, DMat4, DVec3};
 
+pub(crate) use self::spectra::photopic_mean;
 use self::{
     camera::CameraWords,
     params::Params,
@@ -106,6 +108,9 @@ struct Attributes {
     is_reversed: bool,
     /// The medium that fills shapes.
     inside: String,
+    /// What a comment of ISET's calls the shapes, and the name of their material.
+    name: Option<Arc<str>>,
+    material_name: Option<Arc<str>>,
 }
 
 struct Reader<'c> {
@@ -149,8 +154,15 @@ impl<'c> Reader<'c> {
         builder.set_up(DVec3::Y, true);
         let half = builder.add_texture(Texture::Curve(SpectralCurve::constant(0.5)));
         let material = builder.add_material("default", Material::Matte { reflectance: half });
-        let attributes =
-            Attributes { place: DAffine3::IDENTITY, material, glow: None, is_reversed: false, inside: String::new() };
+        let attributes = Attributes {
+            place: DAffine3::IDENTITY,
+            material,
+            glow: None,
+            is_reversed: false,
+            inside: String::new(),
+            name: None,
+            material_name: None,
+        };
         Self {
             builder,
             metres_per_unit,
@@ -190,6 +202,9 @@ impl<'c> Reader<'c> {
             self.cancel.check()?;
             let at = |line: usize, reason: String| WorldError::Line { file: path.to_owned(), line, reason };
             let next = tokens.next().map_err(|reason| at(tokens.line(), reason))?;
+            if let Some(name) = tokens.take_object_name() {
+                self.attributes.name = Some(name.into());
+            }
             let Some((token, line)) = next else { return Ok(()) };
             let done = match token {
                 Token::Word(directive) => self.directive(directive, &mut tokens, depth),
@@ -265,13 +280,17 @@ impl<'c> Reader<'c> {
                 // Shapes of the object are in metres already.
                 let to_metres = DAffine3::from_scale(DVec3::splat(self.metres_per_unit));
                 let place = to_metres * self.checked_place()? * to_metres.inverse();
+                self.builder.name_next(name);
                 self.builder.add_instance(group, place);
             }
             "Texture" => return self.texture(tokens),
             "NamedMaterial" => {
                 let name = text(directive, tokens)?;
                 match self.materials.get(name) {
-                    Some(material) => self.attributes.material = *material,
+                    Some(material) => {
+                        self.attributes.material = *material;
+                        self.attributes.material_name = Some(name.into());
+                    }
                     None => self.builder.note_of("NamedMaterial: no such material, the one before it stands", name),
                 }
             }
@@ -324,6 +343,7 @@ impl<'c> Reader<'c> {
             "Material" => {
                 let material = self.material(kind, kind, &params)?;
                 self.attributes.material = material;
+                self.attributes.material_name = None;
             }
             "MakeNamedMaterial" => {
                 let of_kind = params.text("type").unwrap_or("matte");

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use glam::{DAffine3, DVec3, Vec2, Vec3};
 
-use super::{Coverage, Fault, Reader, curves, params::Params, surfaces};
+use super::{Attributes, Coverage, Fault, Reader, curves, params::Params, surfaces};
 use crate::{GroupId, Material, MaterialId, Shape, SpectralCurve, Texture, TriangleMesh};
 
 impl Reader<'_> {
@@ -82,6 +82,13 @@ impl Reader<'_> {
         let material = self.material_of_shape(params, emission.is_some())?;
         let material = self.filled(material);
         let group = self.object.unwrap_or(GroupId::ROOT);
+        let stem =
+            |file: &'_ str| std::path::Path::new(file).file_stem().map(|stem| stem.to_string_lossy().into_owned());
+        let of_file = params.text("filename").filter(|_| kind == "plymesh").and_then(stem);
+        let Attributes { name, material_name, .. } = &self.attributes;
+        if let Some(name) = name.as_deref().or(of_file.as_deref()).or(material_name.as_deref()) {
+            self.builder.name_next(name);
+        }
         let id = self.builder.add_shape_to(group, shape, place, material, emission);
         if self.attributes.is_reversed {
             self.builder.reverse(id);

@@ -115,7 +115,7 @@ impl Reader<'_> {
 }
 
 /// Returns the mean of a curve weighted by the photopic sensitivity.
-pub(super) fn photopic_mean(curve: &SpectralCurve) -> Result<f64, String> {
+pub(crate) fn photopic_mean(curve: &SpectralCurve) -> Result<f64, String> {
     let grid = WavelengthGrid::uniform(360.0, 830.0, 1.0).map_err(|e| e.to_string())?;
     let sensitivity = &Observer::Cie1931.weights(&grid)[1];
     let weighted: f64 =

@@ -18,16 +18,22 @@ pub(super) struct Tokens<'a> {
     at: usize,
     line: usize,
     peeked: Option<(Token<'a>, usize)>,
+    object_name: Option<&'a str>,
 }
 
 impl<'a> Tokens<'a> {
     pub(super) fn new(text: &'a str) -> Self {
-        Self { text, at: 0, line: 1, peeked: None }
+        Self { text, at: 0, line: 1, peeked: None, object_name: None }
     }
 
     /// The line that the next token is looked for on, from 1.
     pub(super) fn line(&self) -> usize {
         self.peeked.map_or(self.line, |(_, line)| line)
+    }
+
+    /// Returns the name that a comment of ISET's gave what follows, `#ObjectName chair:...`, once.
+    pub(super) fn take_object_name(&mut self) -> Option<&'a str> {
+        self.object_name.take().filter(|name| !name.is_empty())
     }
 
     /// Returns the next token and the line that it stands on; `None` at the end.
@@ -52,6 +58,10 @@ impl<'a> Tokens<'a> {
             match byte {
                 b'\n' => self.line += 1,
                 b'#' => {
+                    let line = self.text[self.at + 1..].lines().next().unwrap_or("").trim_start();
+                    if let Some(name) = line.strip_prefix("ObjectName") {
+                        self.object_name = name.trim().split(':').next();
+                    }
                     self.at += bytes[self.at..].iter().position(|b| *b == b'\n').unwrap_or(bytes.len() - self.at);
                     continue;
                 }
