@@ -283,7 +283,7 @@ impl Encoding {
 }
 
 /// Returns the size of a KTX 2 picture whose parts lie within it and are no larger than that size needs, which the transcoder
-/// takes for granted; none of other models than ETC1S and UASTC, and of other supercompressions than BasisLZ and Zstandard.
+/// takes for granted; none of other models than ETC1S and UASTC, and of other supercompressions than that of Basis and Zstandard.
 #[cfg(feature = "gltf")]
 fn ktx2_size(bytes: &[u8]) -> Option<(u32, u32)> {
     let word = |at: usize| Some(u32::from_le_bytes(bytes.get(at..at.checked_add(4)?)?.try_into().ok()?));

@@ -123,6 +123,7 @@ impl FlatSize {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
+#[expect(clippy::large_enum_variant, reason = "a camera has one")]
 pub enum SceneSource {
     /// A spectral EXR, an ENVI header or its file of numbers, a MATLAB file, an array of `NumPy`, a stack of TIFF pages, a folder of band
     /// pictures, or an ordinary picture.

@@ -417,8 +417,11 @@ fn brushed_metal_spreads_light_along_its_turn() {
     assert!((turned[0] / across - 1.0).abs() < 1e-3 && (turned[1] / along - 1.0).abs() < 1e-3, "{turned:?}");
 }
 
-/// The file of one triangle, with these channels and a sampler for each of so many floats at 1 s and 3 s.
-fn animated(animations: &[(&str, &[(&str, &[f32])])]) -> String {
+/// What an animation moves, each with its floats at 1 s and at 3 s.
+type Channels<'a> = &'a [(&'a str, &'a [f32])];
+
+/// The file of one triangle, with these animations.
+fn animated(animations: &[(&str, Channels<'_>)]) -> String {
     let mut root: Value = serde_json::from_str(&file("3", 3)).unwrap();
     let mut bytes = Vec::new();
     let mut accessor = |floats: &[f32], count: usize| {
