@@ -1,6 +1,6 @@
 //! Pictures laid over surfaces.
 
-use std::{io::Cursor, path::Path, sync::Arc};
+use std::{path::Path, sync::Arc};
 
 use dioptric_spectrum::{SmoothReflectance, srgb_decode};
 use glam::Vec2;
@@ -93,12 +93,13 @@ impl ImageTexture {
     }
 
     /// Reads a picture that is held within another file, of the kinds that [`read`](Self::read) takes.
+    #[cfg(feature = "gltf")]
     pub(crate) fn of_bytes(bytes: &[u8], encoding: Encoding, wrap: Wrap) -> Result<Self, String> {
-        #[cfg(feature = "gltf")]
         if bytes.starts_with(b"\xabKTX 20\xbb") {
             return Self::of_ktx2(bytes, encoding, wrap);
         }
-        let reader = image::ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| e.to_string())?;
+        let reader =
+            image::ImageReader::new(std::io::Cursor::new(bytes)).with_guessed_format().map_err(|e| e.to_string())?;
         match reader.format() {
             None => return Err("expected a PNG, JPEG, TGA, TIFF, WebP, KTX 2 or EXR picture".to_owned()),
             Some(image::ImageFormat::Jpeg) if cfg!(not(feature = "jpeg")) => {
