@@ -227,8 +227,9 @@ impl Reader<'_> {
                 Some(picture) => self.builder.add_texture(picture.channel(1, rough)),
                 None => self.even(rough),
             };
-            if coat.get("clearcoatNormalTexture").is_some() {
-                self.builder.note_of("normal pictures of clear coats, which follow the base's", name);
+            // By the standard a coat without a picture of its own is smooth.
+            if coat.get("clearcoatNormalTexture").is_some() || relief.is_some() {
+                self.builder.note_of("normals of clear coats, in place of which they follow the base's", name);
             }
             id = self.builder.add_material_with(name, Material::Clearcoat { base: id, amount, roughness }, relief);
         }
