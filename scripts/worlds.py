@@ -10,7 +10,7 @@ too, by their bytes, and second copies are passed over.
 
 Nothing but Python's own library is needed. To get files, any packages that bring some do, for instance:
 
-    apt-get download assimp-testmodels                   # 95: glTF, OBJ, PLY, STL (dpkg-deb -x)
+    apt-get download assimp-testmodels openscad-testing-data prusa-slicer    # 187: glTF, OBJ, PLY, STL (dpkg-deb -x)
     npm pack @webxr-input-profiles/assets                # 82: GLB
     pip download --no-deps compas dm_control pyvista     # 214: OBJ, PLY, STL (python -m zipfile -e)
     pip download --no-deps --no-binary :all: trimesh     # models/

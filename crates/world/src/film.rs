@@ -44,7 +44,7 @@ pub(crate) fn reflectance(cos: f32, index: f32, base: f32, waves: f32) -> f32 {
 mod tests {
     use super::*;
 
-    /// A quarter of a wave over glass mirrors ((n_s − n²)/(n_s + n²))², the coating of lenses; half a wave what the glass does.
+    /// A quarter of a wave over glass mirrors `((n_s − n²)/(n_s + n²))²`, the coating of lenses; half a wave what the glass does.
     #[test]
     fn quarter_waves_coat_and_half_waves_vanish() {
         let glass: f32 = 1.52;

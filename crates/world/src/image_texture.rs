@@ -1,7 +1,7 @@
 //! Pictures laid over surfaces.
 
 use serde::{Deserialize, Serialize};
-use std::{io::Cursor, path::Path, sync::Arc};
+use std::{path::Path, sync::Arc};
 
 use dioptric_spectrum::{SmoothReflectance, srgb_decode};
 use glam::Vec2;
@@ -134,12 +134,13 @@ impl ImageTexture {
     }
 
     /// Reads a picture that is held within another file, of the kinds that [`read`](Self::read) takes.
+    #[cfg(feature = "gltf")]
     pub(crate) fn of_bytes(bytes: &[u8], encoding: Encoding, wrap: Wrap) -> Result<Self, String> {
-        #[cfg(feature = "gltf")]
         if bytes.starts_with(b"\xabKTX 20\xbb") {
             return Self::of_ktx2(bytes, encoding, wrap);
         }
-        let reader = image::ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| e.to_string())?;
+        let reader =
+            image::ImageReader::new(std::io::Cursor::new(bytes)).with_guessed_format().map_err(|e| e.to_string())?;
         match reader.format() {
             None => return Err("expected a PNG, JPEG, TGA, TIFF, WebP, KTX 2 or EXR picture".to_owned()),
             Some(image::ImageFormat::Jpeg) if cfg!(not(feature = "jpeg")) => {
@@ -394,7 +395,7 @@ impl Encoding {
 }
 
 /// Returns the size of a KTX 2 picture whose parts lie within it and are no larger than that size needs, which the transcoder
-/// takes for granted; none of other models than ETC1S and UASTC, and of other supercompressions than BasisLZ and Zstandard.
+/// takes for granted; none of other models than ETC1S and UASTC, and of other supercompressions than that of Basis and Zstandard.
 #[cfg(feature = "gltf")]
 fn ktx2_size(bytes: &[u8]) -> Option<(u32, u32)> {
     let word = |at: usize| Some(u32::from_le_bytes(bytes.get(at..at.checked_add(4)?)?.try_into().ok()?));

@@ -230,6 +230,8 @@ pub(crate) struct Surface {
     pub(crate) absorption: Option<SpectralCurve>,
     /// How far what is brushed is turned from u, counterclockwise, rad.
     pub(crate) turn_rad: f32,
+    /// A picture of directions besides: red and green 0–1 stand for −1 to 1 along u and v.
+    pub(crate) directions: Option<TextureId>,
     /// What lets diffuse light through the base of glTF's material: the share of it, and its color (`KHR_materials_diffuse_transmission`).
     pub(crate) behind: Option<[TextureId; 2]>,
     /// The film over the base of glTF's material (`KHR_materials_iridescence`).
@@ -245,8 +247,22 @@ impl Surface {
             _ => None,
         };
         let has_gaps = material == Material::Open;
-        let (coverage, glow, absorption, behind, film) = (None, None, None, None, None);
-        Self { name, material, relief, inside, coverage, glow, absorption, turn_rad: 0.0, behind, film, has_gaps }
+        let (coverage, glow, absorption, directions, behind, film) = (None, None, None, None, None, None);
+        let turn_rad = 0.0;
+        Self {
+            name,
+            material,
+            relief,
+            inside,
+            coverage,
+            glow,
+            absorption,
+            turn_rad,
+            directions,
+            behind,
+            film,
+            has_gaps,
+        }
     }
 
     /// How many kinds of scattering it has besides those of its parts.
@@ -325,7 +341,8 @@ impl Surfaces<'_> {
         outgoing: Vec3,
         wavelengths_nm: &[f32; N],
     ) -> Bsdf<N> {
-        let frame = self.frame(hit, at).turned(self.surfaces[hit.material.0 as usize].turn_rad);
+        let frame = self.frame(hit, at);
+        let frame = frame.turned(self.turn_rad(hit, at, frame));
         let mut bsdf = Bsdf::new(frame, hit.geometric_normal, outgoing);
         self.add_lobes(&mut bsdf, hit.material, at, (1.0, false), wavelengths_nm);
         // Where a part of a mixture is open, the hit is one of the rest.
@@ -523,6 +540,18 @@ impl Surfaces<'_> {
             true => bsdf.push_term(share, lobe),
             false => bsdf.push(share, lobe),
         }
+    }
+
+    /// Returns how far what is brushed is turned from u about the normal.
+    fn turn_rad(self, hit: &Hit, at: &TexturePoint<'_>, frame: Frame) -> f32 {
+        let surface = &self.surfaces[hit.material.0 as usize];
+        let of_picture = surface.directions.map_or(0.0, |picture| {
+            let [x, y, _] = self.textures.rgb(picture, at).map(|v| 2.0 * v - 1.0);
+            y.atan2(x)
+        });
+        let turn_rad = surface.turn_rad + of_picture;
+        // Pictures may be laid mirrored.
+        if frame.y.dot(hit.dp_dv) < 0.0 { -turn_rad } else { turn_rad }
     }
 
     /// Returns the shading frame at a hit, with relief: x runs along u.

@@ -646,6 +646,13 @@ impl WorldBuilder {
         }
     }
 
+    /// Says by a picture of directions how far it is turned besides: red and green 0–1 stand for −1 to 1 along u and v.
+    pub fn set_directions(&mut self, material: MaterialId, directions: TextureId) {
+        if let Some(surface) = self.surfaces.get_mut(material.0 as usize) {
+            surface.directions = Some(directions);
+        }
+    }
+
     /// Says what share of the base of glTF's material lets diffuse light through, and its color.
     pub fn set_behind(&mut self, material: MaterialId, share: TextureId, color: TextureId) {
         if let Some(surface) = self.surfaces.get_mut(material.0 as usize) {
@@ -920,8 +927,10 @@ impl WorldBuilder {
         }
         for surface in &self.surfaces {
             let more = surface.relief.map(Relief::texture).into_iter().chain(surface.coverage).chain(surface.glow);
-            let more =
-                more.chain(surface.behind.into_iter().flatten()).chain(surface.film.map(|film| film.thickness_nm));
+            let more = more
+                .chain(surface.directions)
+                .chain(surface.behind.into_iter().flatten())
+                .chain(surface.film.map(|film| film.thickness_nm));
             for texture in surface.material.textures().into_iter().chain(more) {
                 named("a material", "texture", texture.0, self.textures.len())?;
             }

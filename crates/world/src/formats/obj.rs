@@ -393,14 +393,16 @@ const SHARES: [&str; 5] = ["kd", "ks", "d", "pr", "pm"];
 
 impl Library {
     fn read(&mut self, folder: &Path, name: &str) -> Result<(), WorldError> {
-        // A name may have blanks, and a line several names.
+        // A name may have blanks, and a line several names, whose own blanks have a stroke before them.
         let whole = beside(folder, name);
-        let names: Vec<&str> = if whole.is_file() { vec![name] } else { name.split_ascii_whitespace().collect() };
+        let parted = name.replace("\\ ", "\0");
+        let parted = parted.split_ascii_whitespace().map(|name| name.replace('\0', " "));
+        let names: Vec<String> = if whole.is_file() { vec![name.to_owned()] } else { parted.collect() };
         for name in names {
-            let path = beside(folder, name);
+            let path = beside(folder, &name);
             self.builder.add_source(&path);
             if !path.is_file() {
-                self.builder.note_of("libraries of materials that aren't there, gray in their place", name);
+                self.builder.note_of("libraries of materials that aren't there, gray in their place", &name);
                 continue;
             }
             let text = dioptric_files::text::of_bytes(&read_bytes(&path, MAX_BYTES)?);
@@ -773,6 +775,19 @@ mod tests {
         let notes = world.notes().join("\n");
         assert!(notes.contains("gone") && notes.contains("foo"), "{notes}");
         assert_eq!(world.sources().len(), 2);
+    }
+
+    #[test]
+    fn names_of_libraries_have_blanks() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("my paints.mtl"), "newmtl red\nKd 1 0 0\n").unwrap();
+        for names in ["my paints.mtl", "none.mtl my\\ paints.mtl"] {
+            let text = format!("mtllib {names}\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl red\nf 1 2 3\n");
+            std::fs::write(folder.path().join("a.obj"), text).unwrap();
+            let (path, cancel) = (folder.path().join("a.obj"), dioptric_spectrum::Cancel::new());
+            let world = crate::read_world(&path, &crate::ReadOptions::default(), &cancel).unwrap();
+            assert_eq!(world.material_names().next(), Some("red"), "{names}");
+        }
     }
 
     /// `Tr 1`, by which nothing could be seen, is what Meshlab writes of opaque materials.

@@ -152,7 +152,7 @@ impl Reader<'_> {
         let thin = through.filter(|_| volume.is_none());
         let brushed = extension(material, "KHR_materials_anisotropy");
         let turn_rad = number_or(brushed, "anisotropyRotation", 0.0) as f32;
-        let brushed = self.brushed(brushed)?;
+        let (brushed, directions) = self.brushed(brushed)?;
         let base =
             Material::MetallicRoughness { color, metallic, roughness, mirrored, edge, transmission: thin, brushed };
         let is_coated = extension(material, "KHR_materials_clearcoat")
@@ -227,13 +227,17 @@ impl Reader<'_> {
                 Some(picture) => self.builder.add_texture(picture.channel(1, rough)),
                 None => self.even(rough),
             };
-            if coat.get("clearcoatNormalTexture").is_some() {
-                self.builder.note_of("normal pictures of clear coats, which follow the base's", name);
+            // By the standard a coat without a picture of its own is smooth.
+            if coat.get("clearcoatNormalTexture").is_some() || relief.is_some() {
+                self.builder.note_of("normals of clear coats, in place of which they follow the base's", name);
             }
             id = self.builder.add_material_with(name, Material::Clearcoat { base: id, amount, roughness }, relief);
         }
         if brushed.is_some() {
             self.builder.set_turn(id, turn_rad);
+        }
+        if let Some(directions) = directions {
+            self.builder.set_directions(id, directions);
         }
         if let Some(per_m) = volume.filter(|_| is_filled || behind.is_some()).and_then(absorption) {
             self.builder.set_absorption(id, per_m);
@@ -241,20 +245,21 @@ impl Reader<'_> {
         Ok(id)
     }
 
-    /// Returns how strongly a surface is brushed.
-    fn brushed(&mut self, of: Option<&Value>) -> Result<Option<TextureId>, WorldError> {
+    /// Returns how strongly a surface is brushed, and a picture of which way.
+    fn brushed(&mut self, of: Option<&Value>) -> Result<(Option<TextureId>, Option<TextureId>), WorldError> {
         let strength = number_or(of, "anisotropyStrength", 0.0) as f32;
         if strength <= 0.0 {
-            return Ok(None);
+            return Ok((None, None));
         }
-        Ok(Some(match self.picture(of, "anisotropyTexture", Holds::Numbers)? {
+        Ok(match self.picture(of, "anisotropyTexture", Holds::Numbers)? {
             Some(picture) => {
-                self.builder
-                    .note("directions in pictures of how surfaces are brushed: left out, all is brushed one way");
-                self.builder.add_texture(picture.channel(2, strength))
+                let strength = self.builder.add_texture(picture.channel(2, strength));
+                let Picture { image, mapping } = picture;
+                let directions = self.builder.add_texture(Texture::Image { image, mapping, scale: 1.0 });
+                (Some(strength), Some(directions))
             }
-            None => self.even(strength),
-        }))
+            None => (Some(self.even(strength)), None),
+        })
     }
 
     fn transmission(&mut self, material: &Value) -> Result<Option<TextureId>, WorldError> {

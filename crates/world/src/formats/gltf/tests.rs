@@ -415,10 +415,30 @@ fn brushed_metal_spreads_light_along_its_turn() {
     assert!((f64::from(across) / value(fine, rough) - 1.0).abs() < 1e-3, "{across} {}", value(fine, rough));
     let turned = brushed(r#","anisotropyRotation":1.5707963"#);
     assert!((turned[0] / across - 1.0).abs() < 1e-3 && (turned[1] / along - 1.0).abs() < 1e-3, "{turned:?}");
+    // By a picture whose red and green say up, and blue seven tenths of the strength.
+    let mut png = std::io::Cursor::new(Vec::new());
+    let picture = image::RgbImage::from_pixel(1, 1, image::Rgb([128, 255, 179]));
+    picture.write_to(&mut png, image::ImageFormat::Png).unwrap();
+    let uri = format!("data:image/png;base64,{}", BASE64_STANDARD.encode(png.into_inner()));
+    let anisotropy =
+        r#""extensions":{"KHR_materials_anisotropy":{"anisotropyStrength":1,"anisotropyTexture":{"index":0}}}"#;
+    let text = file("3", 3)
+        .replace(r#""baseColorFactor":[1,0,0,1],"metallicFactor":0"#, r#""metallicFactor":1,"roughnessFactor":0.4"#)
+        .replace(r#""emissiveFactor":[0,0,1]"#, anisotropy)
+        .replace(r#""scene":0"#, &format!(r#""scene":0,"textures":[{{"source":0}}],"images":[{{"uri":"{uri}"}}]"#));
+    let world = read_text(&text).unwrap();
+    assert_eq!(world.notes(), [""; 0]);
+    let bsdf = world.bsdf(&seen(&world, [0.2, 0.2]), Vec3::Z, &[550.0]);
+    let [x, y] = [Vec3::X, Vec3::Y].map(|side| bsdf.eval((Vec3::Z + 0.5 * side).normalize())[0]);
+    // 128 is a 255th of a half turn aside.
+    assert!((x / across - 1.0).abs() < 0.01 && (y / along - 1.0).abs() < 0.01, "{x} {y}: {across} {along}");
 }
 
-/// The file of one triangle, with these channels and a sampler for each of so many floats at 1 s and 3 s.
-fn animated(animations: &[(&str, &[(&str, &[f32])])]) -> String {
+/// What an animation moves, each with its floats at 1 s and at 3 s.
+type Channels<'a> = &'a [(&'a str, &'a [f32])];
+
+/// The file of one triangle, with these animations.
+fn animated(animations: &[(&str, Channels<'_>)]) -> String {
     let mut root: Value = serde_json::from_str(&file("3", 3)).unwrap();
     let mut bytes = Vec::new();
     let mut accessor = |floats: &[f32], count: usize| {
