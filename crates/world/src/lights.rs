@@ -344,6 +344,7 @@ mod tests {
                 }),
                 is_reversed: false,
                 light: None,
+                interface: None,
             }
         };
         (0..1000).map(pane).collect()

@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use crate::{
-    Beyond, Bsdf, Hit, MaterialId, SpectralCurve, TextureId, WorldError,
+    Beyond, Bsdf, Hit, MaterialId, MediumId, SpectralCurve, TextureId, WorldError,
     bsdf::{Lobe, MAX_LOBES},
     fresnel,
     microfacet::Ggx,
@@ -225,8 +225,8 @@ pub(crate) struct Surface {
     pub(crate) coverage: Option<TextureId>,
     /// What the radiance of shapes that glow is multiplied by.
     pub(crate) glow: Option<TextureId>,
-    /// What a medium that fills the shape takes from light, 1/m.
-    pub(crate) absorption: Option<SpectralCurve>,
+    /// What fills shapes that it lets light into.
+    pub(crate) filling: Option<MediumId>,
     /// How far what is brushed is turned from u, counterclockwise, rad.
     pub(crate) turn_rad: f32,
     /// Whether rays may pass as if the surface weren't there.
@@ -240,7 +240,7 @@ impl Surface {
             _ => None,
         };
         let has_gaps = material == Material::Open;
-        Self { name, material, relief, inside, coverage: None, glow: None, absorption: None, turn_rad: 0.0, has_gaps }
+        Self { name, material, relief, inside, coverage: None, glow: None, filling: None, turn_rad: 0.0, has_gaps }
     }
 }
 

@@ -6,8 +6,8 @@ use dioptric_spectrum::{SmoothReflectance, lanes};
 use glam::{DAffine3, DVec3, Vec2, Vec3};
 
 use crate::{
-    Bsdf, Emission, GroupId, Hit, InstanceId, Light, LightSample, Material, MaterialId, Ray, Receiver, Relief, Shape,
-    ShapeId, SpectralCurve, Texture, TextureId, TriangleMesh, WorldCamera, WorldError,
+    Bsdf, Emission, GroupId, Hit, InstanceId, Interface, Light, LightSample, Material, MaterialId, Medium, MediumId,
+    Ray, Receiver, Relief, Shape, ShapeId, SpectralCurve, Texture, TextureId, TriangleMesh, WorldCamera, WorldError,
     group::{Crossing, Group, GroupParts, Instance, Parts, Primitive},
     lights::Lights,
     material::{Surface, Surfaces},
@@ -40,6 +40,18 @@ pub struct World {
     up: DVec3,
     is_left_handed: bool,
     patterned: Patterned,
+    media: Vec<Medium>,
+    /// What is where no surface tells.
+    surroundings: Option<MediumId>,
+}
+
+/// What a ray meets in a world with media: a surface, or a boundary between media without one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Met {
+    /// Where.
+    pub hit: Hit,
+    /// Whether there is a surface; rays go on straight through a boundary without one.
+    pub is_surface: bool,
 }
 
 fn front_of(up: DVec3, is_left_handed: bool) -> DVec3 {
@@ -171,12 +183,63 @@ impl World {
         self.asked().may_mirror(hit.material)
     }
 
-    /// Returns the share of light that is left after the way along a ray to this hit, where the shape that it lies on is
-    /// filled with an absorbing medium and was met from within; `None` for all of it.
-    pub fn transmittance<const N: usize>(&self, hit: &Hit, ray: &Ray, wavelengths_nm: &[f32; N]) -> Option<[f32; N]> {
-        let absorption = self.surfaces[hit.material.0 as usize].absorption.as_ref()?;
-        let is_within = hit.geometric_normal.dot(ray.direction) > 0.0;
-        is_within.then(|| absorption.at(wavelengths_nm).map(|per_m| (-per_m * hit.distance_m).exp()))
+    /// Whether there is anything else in space than surfaces.
+    pub fn has_media(&self) -> bool {
+        !self.media.is_empty()
+    }
+
+    /// Returns a medium.
+    pub fn medium(&self, id: MediumId) -> &Medium {
+        &self.media[id.0 as usize]
+    }
+
+    /// Returns what a ray first meets nearer than `t_max_m`: a surface as of [`intersect`](Self::intersect), or a boundary
+    /// between media.
+    pub fn meet(&self, ray: &Ray, t_max_m: f32) -> Option<Met> {
+        let (mut from, mut gone_m) = (*ray, 0.0);
+        for _ in 0..MOST_PASSED {
+            let mut hit = self.first_crossing(&from, t_max_m - gone_m)?;
+            let is_surface = self.is_there(&hit, &from);
+            let next = hit.ray_towards(ray.direction);
+            hit.distance_m += gone_m;
+            if is_surface || self.is_boundary(&hit) {
+                return Some(Met { hit, is_surface });
+            }
+            (from, gone_m) = (next, hit.distance_m);
+        }
+        None
+    }
+
+    fn interface(&self, hit: &Hit) -> Option<&Interface> {
+        self.geometry.shapes[hit.shape.0 as usize].interface.as_ref()
+    }
+
+    /// Whether a hit without a surface parts two media; holes of surfaces do not.
+    fn is_boundary(&self, hit: &Hit) -> bool {
+        let surface = &self.surfaces[hit.material.0 as usize];
+        surface.material == Material::Open && surface.coverage.is_none() && self.interface(hit).is_some()
+    }
+
+    /// Returns the medium that light which leaves a hit in a direction goes through, where it came through `before`.
+    pub fn medium_towards(&self, hit: &Hit, direction: Vec3, before: Option<MediumId>) -> Option<MediumId> {
+        self.interface(hit).map_or(before, |interface| interface.towards(direction, hit.geometric_normal))
+    }
+
+    /// Returns the medium that a ray begins in: by the first surface between media that it meets, whatever lies before that, or
+    /// what is around everything.
+    pub fn medium_along(&self, ray: &Ray) -> Option<MediumId> {
+        if self.media.is_empty() {
+            return None;
+        }
+        let mut from = *ray;
+        for _ in 0..MOST_PASSED {
+            let Some(hit) = self.first_crossing(&from, f32::INFINITY) else { break };
+            if let Some(interface) = self.interface(&hit) {
+                return interface.towards(-ray.direction, hit.geometric_normal);
+            }
+            from = hit.ray_towards(ray.direction);
+        }
+        self.surroundings
     }
 
     /// Returns the radiance, W m⁻² sr⁻¹ nm⁻¹, that the surface at a hit gives of itself towards `outgoing`.
@@ -500,6 +563,11 @@ pub struct WorldBuilder {
     up: DVec3,
     is_left_handed: bool,
     things: Vec<Vec<ShapeId>>,
+    media: Vec<Medium>,
+    /// Of shapes that have been told.
+    interfaces: Vec<(ShapeId, Interface)>,
+    /// A place, and the medium that a file says is there.
+    eye: Option<(DVec3, MediumId)>,
 }
 
 /// A shape to be placed.
@@ -535,6 +603,9 @@ impl WorldBuilder {
             up: DVec3::Y,
             is_left_handed: false,
             things: Vec::new(),
+            media: Vec::new(),
+            interfaces: Vec::new(),
+            eye: None,
         }
     }
 
@@ -587,22 +658,34 @@ impl WorldBuilder {
         }
     }
 
-    /// Says what the medium that fills shapes of a material takes from light, 1/m. Shapes must be closed, and their material
-    /// let light in.
-    pub fn set_absorption(&mut self, material: MaterialId, per_m: SpectralCurve) {
+    /// Adds a medium.
+    pub fn add_medium(&mut self, medium: Medium) -> MediumId {
+        self.media.push(medium);
+        MediumId(self.media.len() as u32 - 1)
+    }
+
+    /// Says what fills shapes of a material, unless their own [`Interface`] says it. Shapes must be closed, and their material let
+    /// light in.
+    pub fn set_filling(&mut self, material: MaterialId, medium: MediumId) {
         if let Some(surface) = self.surfaces.get_mut(material.0 as usize) {
-            surface.absorption = Some(per_m);
+            surface.filling = Some(medium);
         }
     }
 
-    /// Adds a material that is another, of shapes filled with a medium that takes so much from light, 1/m; none where it lets no light in.
-    pub(crate) fn add_filled(&mut self, of: MaterialId, per_m: SpectralCurve) -> Option<MaterialId> {
-        let surface = self.surfaces.get(of.0 as usize).cloned()?;
-        if !matches!(surface.material, Material::Dielectric { .. } | Material::Glass { .. }) {
-            return None;
-        }
-        self.surfaces.push(Surface { absorption: Some(per_m), ..surface });
-        Some(MaterialId(self.surfaces.len() as u32 - 1))
+    /// Says the same of a medium that takes so much from light, 1/m, and scatters none.
+    pub fn set_absorption(&mut self, material: MaterialId, per_m: SpectralCurve) {
+        let medium = self.add_medium(Medium::even(per_m, SpectralCurve::constant(0.0), 0.0));
+        self.set_filling(material, medium);
+    }
+
+    /// Says which media are on both sides of a shape.
+    pub fn set_interface(&mut self, shape: ShapeId, interface: Interface) {
+        self.interfaces.push((shape, interface));
+    }
+
+    /// Says which medium is around a place, such as a camera's: where no shape holds it, it is that around everything.
+    pub fn set_medium_at(&mut self, place: DVec3, medium: MediumId) {
+        self.eye = Some((place, medium));
     }
 
     /// Stands a shape in the world.
@@ -743,6 +826,13 @@ impl WorldBuilder {
         let Self { shapes, n_groups, instances, surfaces, textures, lights, cameras, .. } = self;
         let (notes, sources) = (self.notes.sentences(), self.sources);
         let mut placed: Vec<PlacedShape> = shapes.into_iter().map(NewShape::placed).collect();
+        for shape in &mut placed {
+            let filling = surfaces[shape.material.0 as usize].filling;
+            shape.interface = filling.map(|filling| Interface { inside: Some(filling), outside: None });
+        }
+        for (shape, interface) in self.interfaces {
+            placed[shape.0 as usize].interface = (interface.inside != interface.outside).then_some(interface);
+        }
         let instances: Vec<Instance> = instances
             .into_iter()
             .map(|(group, place)| Instance { group: group.0, place, inverse: place.inverse() })
@@ -766,7 +856,7 @@ impl WorldBuilder {
         let lights = Lights::new(lights, &mut placed);
         let geometry = Geometry { shapes: placed, instances, groups };
         let has_gaps = geometry.shapes.iter().any(|shape| surfaces[shape.material.0 as usize].has_gaps);
-        Ok(World {
+        let mut world = World {
             geometry,
             surfaces,
             textures,
@@ -778,7 +868,17 @@ impl WorldBuilder {
             up,
             is_left_handed,
             patterned,
-        })
+            media: self.media,
+            surroundings: None,
+        };
+        if let Some((place, medium)) = self.eye {
+            // What a closed shape holds ends there.
+            let ray = |direction: Vec3| Ray { origin: place.as_vec3(), direction };
+            let is_held = |direction: Vec3| world.medium_along(&ray(direction)) == Some(medium);
+            let is_bounded = [Vec3::X, Vec3::Y, Vec3::Z].into_iter().all(|axis| is_held(axis) && is_held(-axis));
+            world.surroundings = (!is_bounded).then_some(medium);
+        }
+        Ok(world)
     }
 
     fn check(&mut self) -> Result<(), WorldError> {
@@ -818,8 +918,14 @@ impl WorldBuilder {
                 named("a material", "texture", texture.0, self.textures.len())?;
             }
         }
-        for shape in self.things.iter().flatten() {
+        for shape in self.things.iter().flatten().chain(self.interfaces.iter().map(|(shape, _)| shape)) {
             named("a thing", "shape", shape.0, self.shapes.len())?;
+        }
+        self.media.iter().try_for_each(Medium::check)?;
+        let sides = self.interfaces.iter().flat_map(|(_, interface)| [interface.inside, interface.outside]).flatten();
+        let fillings = self.surfaces.iter().filter_map(|surface| surface.filling);
+        for medium in sides.chain(fillings).chain(self.eye.map(|(_, medium)| medium)) {
+            named("a shape", "medium", medium.0, self.media.len())?;
         }
         // Textures are made of earlier ones, so that none is made of itself, and aren't nested too deep for a stack.
         let mut depths = vec![0; self.textures.len()];
@@ -857,6 +963,7 @@ impl NewShape {
             emission: self.emission,
             is_reversed: self.is_reversed,
             light: None,
+            interface: None,
         }
     }
 }

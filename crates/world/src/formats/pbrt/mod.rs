@@ -11,6 +11,7 @@ mod media;
 mod params;
 mod shapes;
 mod spectra;
+mod substances;
 mod surfaces;
 mod textures;
 mod tokens;
@@ -31,7 +32,8 @@ use self::{
 };
 use super::read_bytes;
 use crate::{
-    GroupId, Material, MaterialId, Shape, SpectralCurve, Texture, TextureId, TriangleMesh, WorldBuilder, WorldError,
+    GroupId, Material, MaterialId, MediumId, Shape, SpectralCurve, Texture, TextureId, TriangleMesh, WorldBuilder,
+    WorldError,
 };
 
 /// The most bytes that a file and all that it includes may have.
@@ -68,6 +70,7 @@ pub(super) fn read(path: &Path, metres_per_unit: f64, cancel: &Cancel) -> Result
     let mut reader = Reader::new(path, metres_per_unit, cancel);
     reader.read_file(path, 0)?;
     reader.end_curves();
+    reader.set_medium_of_eye();
     Ok(reader.builder)
 }
 
@@ -104,8 +107,9 @@ struct Attributes {
     material: MaterialId,
     glow: Option<lights::Glow>,
     is_reversed: bool,
-    /// The medium that fills shapes.
+    /// The media that fill shapes, and that are around them.
     inside: String,
+    outside: String,
 }
 
 struct Reader<'c> {
@@ -128,9 +132,10 @@ struct Reader<'c> {
     object: Option<GroupId>,
     /// Materials of which a part is there, by the bits of a number or the number of a texture.
     covered: HashMap<(MaterialId, Coverage), MaterialId>,
-    /// What media that absorb alone take from light, 1/m, none of others; and materials that are filled with one.
-    media: HashMap<String, Option<SpectralCurve>>,
-    filled: HashMap<(MaterialId, String), MaterialId>,
+    /// Media by their names; none where it is left out.
+    media: HashMap<String, Option<MediumId>>,
+    /// Where the camera is, in units of the file, and the name of the medium around it.
+    eye: Option<(DVec3, String)>,
     /// Curves of one material and place, which are one mesh.
     curves: Option<(Attributes, MaterialId, TriangleMesh)>,
     cancel: &'c Cancel,
@@ -149,8 +154,14 @@ impl<'c> Reader<'c> {
         builder.set_up(DVec3::Y, true);
         let half = builder.add_texture(Texture::Curve(SpectralCurve::constant(0.5)));
         let material = builder.add_material("default", Material::Matte { reflectance: half });
-        let attributes =
-            Attributes { place: DAffine3::IDENTITY, material, glow: None, is_reversed: false, inside: String::new() };
+        let attributes = Attributes {
+            place: DAffine3::IDENTITY,
+            material,
+            glow: None,
+            is_reversed: false,
+            inside: String::new(),
+            outside: String::new(),
+        };
         Self {
             builder,
             metres_per_unit,
@@ -170,7 +181,7 @@ impl<'c> Reader<'c> {
             object: None,
             covered: HashMap::new(),
             media: HashMap::new(),
-            filled: HashMap::new(),
+            eye: None,
             curves: None,
             cancel,
         }
@@ -307,7 +318,11 @@ impl<'c> Reader<'c> {
         match directive {
             "Camera" => {
                 self.camera.set_camera(kind, &params, self.attributes.place);
-                self.places.insert("camera".to_owned(), self.attributes.place.inverse());
+                let world_from_camera = self.attributes.place.inverse();
+                self.places.insert("camera".to_owned(), world_from_camera);
+                if world_from_camera.is_finite() {
+                    self.eye = Some((world_from_camera.translation, self.attributes.outside.clone()));
+                }
             }
             "Film" => {
                 if !matches!(kind, "rgb" | "gbuffer" | "spectral" | "image") {
@@ -333,15 +348,7 @@ impl<'c> Reader<'c> {
             "ColorSpace" if kind != "srgb" => {
                 self.builder.note(format!("ColorSpace \"{kind}\": colors are taken as sRGB"));
             }
-            "MakeNamedMedium" => {
-                let absorption = self.absorption(&params)?;
-                let is_clear = absorption.is_none();
-                self.media.insert(kind.to_owned(), absorption);
-                if is_clear {
-                    self.builder.note_of("media that scatter light or glow, left out: space is clear", kind);
-                    return Ok(());
-                }
-            }
+            "MakeNamedMedium" if !self.named_medium(kind, &params)? => return Ok(()),
             "Volume" | "Attribute" => {
                 self.builder.note_of(&format!("{directive}: not supported, left out"), kind);
                 return Ok(());
@@ -389,7 +396,8 @@ impl<'c> Reader<'c> {
         let Some((attributes, material, mesh)) = self.curves.take() else { return };
         let place = DAffine3::from_scale(DVec3::splat(self.metres_per_unit)) * attributes.place;
         let group = self.object.unwrap_or(GroupId::ROOT);
-        self.builder.add_shape_to(group, Shape::Mesh(mesh), place, material, None);
+        let id = self.builder.add_shape_to(group, Shape::Mesh(mesh), place, material, None);
+        self.set_interface(id, [&attributes.inside, &attributes.outside]);
     }
 
     fn include(&mut self, name: &str, depth: usize) -> Result<(), Fault> {

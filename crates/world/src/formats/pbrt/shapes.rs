@@ -80,12 +80,13 @@ impl Reader<'_> {
             glow.of_faces(&faces.per_square_unit(self.metres_per_unit))
         });
         let material = self.material_of_shape(params, emission.is_some())?;
-        let material = self.filled(material);
         let group = self.object.unwrap_or(GroupId::ROOT);
         let id = self.builder.add_shape_to(group, shape, place, material, emission);
         if self.attributes.is_reversed {
             self.builder.reverse(id);
         }
+        let [inside, outside] = [self.attributes.inside.clone(), self.attributes.outside.clone()];
+        self.set_interface(id, [&inside, &outside]);
         Ok(())
     }
 }
