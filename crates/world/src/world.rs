@@ -826,12 +826,13 @@ impl WorldBuilder {
         let Self { shapes, n_groups, instances, surfaces, textures, lights, cameras, .. } = self;
         let (notes, sources) = (self.notes.sentences(), self.sources);
         let mut placed: Vec<PlacedShape> = shapes.into_iter().map(NewShape::placed).collect();
-        for shape in &mut placed {
-            let filling = surfaces[shape.material.0 as usize].filling;
-            shape.interface = filling.map(|filling| Interface { inside: Some(filling), outside: None });
-        }
         for (shape, interface) in self.interfaces {
-            placed[shape.0 as usize].interface = (interface.inside != interface.outside).then_some(interface);
+            placed[shape.0 as usize].interface = Some(interface);
+        }
+        for shape in &mut placed {
+            let Interface { inside, outside } = shape.interface.unwrap_or(Interface { inside: None, outside: None });
+            let inside = surfaces[shape.material.0 as usize].filling.or(inside);
+            shape.interface = (inside != outside).then_some(Interface { inside, outside });
         }
         let instances: Vec<Instance> = instances
             .into_iter()

@@ -131,6 +131,39 @@ fn media_are_even_or_in_grids() {
     );
 }
 
+/// What is below a surface fills its shapes: by coefficients in the file's unit, by a substance, or so that it sends back the color told.
+#[test]
+fn what_is_below_a_surface_scatters_light() {
+    let below = |params: &str| {
+        let text = format!("WorldBegin\nMaterial {params}\nShape \"sphere\"\n");
+        let world = read_text(&text).unwrap();
+        assert!(world.notes().is_empty(), "{:?}", world.notes());
+        let inside = Ray { origin: Vec3::ZERO, direction: Vec3::Z };
+        let outside = Ray { origin: Vec3::new(0.0, 0.0, -3.0), direction: Vec3::Z };
+        assert!(world.medium_along(&outside).is_none() && world.intersect(&outside, 9.0).is_some());
+        let medium = world.medium(world.medium_along(&inside).expect("a medium"));
+        (medium.at(Vec3::ZERO, &[450.0, 550.0, 650.0]), medium.asymmetry)
+    };
+    let (own, g) = below(
+        "\"subsurface\" \"spectrum sigma_a\" [400 1 700 1] \"spectrum sigma_s\" [400 9 700 9] \"float scale\" 10 \"float g\" .8",
+    );
+    assert_eq!((own.absorption, own.scattering, g), ([10.0; 3], [90.0; 3], 0.8));
+    let (skin, _) = below("\"subsurface\" \"string name\" \"Skin1\" \"float scale\" 1000");
+    // The mean of 0.17 and what is beside it, per mm.
+    assert!((skin.absorption[1] - 170.0).abs() < 60.0 && skin.absorption[0] > 2.0 * skin.absorption[2], "{skin:?}");
+    // Light that is sent back more is absorbed less, whatever way it is scattered.
+    let albedo = |kd: f64, g: f64| {
+        let kd = format!("\"kdsubsurface\" \"spectrum Kd\" [400 {kd} 700 {kd}] \"float mfp\" .01 \"float g\" {g}");
+        let of = below(&kd).0;
+        assert!((of.absorption[0] + of.scattering[0] - 100.0).abs() < 1e-3, "{of:?}");
+        of.scattering[0] / 100.0
+    };
+    let albedos = [0.1, 0.4, 0.8, 0.99].map(|kd| albedo(kd, 0.0));
+    assert!(albedos.is_sorted() && albedos[0] > 0.5 && albedos[3] > 0.999 && albedos[3] < 1.0, "{albedos:?}");
+    let of_forward = albedo(0.4, 0.7);
+    assert!((of_forward * 0.3 / (1.0 - 0.7 * of_forward) - albedos[1]).abs() < 1e-4, "{of_forward}");
+}
+
 /// Curves of one material are one mesh, met where they are; hair has the color of its pigment.
 #[test]
 fn curves_are_met_and_hair_is_brown() {

@@ -13,6 +13,7 @@ impl Reader<'_> {
     pub(super) fn material(&mut self, name: &str, kind: &str, params: &Params<'_>) -> Result<MaterialId, Fault> {
         let color = |reader: &mut Self, names: &[&str], default: f32| reader.part(params, names, false, default);
         let is_fourth = self.version == Version::Four;
+        let mut filling = None;
         let material = match kind {
             "matte" | "diffuse" => {
                 let reflectance = color(self, &["Kd", "reflectance"], 0.5)?;
@@ -37,13 +38,7 @@ impl Reader<'_> {
             "uber" => return self.uber(name, params),
             "glass" | "dielectric" => {
                 let (index, roughness) = (self.index(params, 1.5)?, self.roughness(params, 0.0, true)?);
-                match (self.part_if_any(params, &["Kr"], false)?, self.part_if_any(params, &["Kt"], false)?) {
-                    (None, None) => Material::Dielectric { index, roughness },
-                    (kr, kt) => {
-                        let [reflectance, transmittance] = [kr, kt].map(|k| k.unwrap_or_else(|| self.even(1.0)));
-                        Material::Glass { reflectance, transmittance, index, roughness }
-                    }
-                }
+                self.glass(params, index, roughness)?
             }
             "thindielectric" => Material::Pane { index: self.index(params, 1.5)? },
             "mirror" => Material::Mirror { reflectance: color(self, &["Kr"], 0.9)?, roughness: None },
@@ -58,6 +53,11 @@ impl Reader<'_> {
                 let [reflectance, transmittance] = [reflectance?, transmittance?]
                     .map(|part| self.builder.add_texture(Texture::Product([part, scale])));
                 Material::Translucent { reflectance, transmittance }
+            }
+            "subsurface" | "kdsubsurface" => {
+                let (index, roughness) = (self.index(params, 1.33)?, self.roughness(params, 0.0, true)?);
+                filling = Some(self.below_surface(name, params, &index)?);
+                self.glass(params, index, roughness)?
             }
             "mix" => self.mix(params)?,
             "hair" => {
@@ -79,7 +79,22 @@ impl Reader<'_> {
             self.builder.note_of(&sentence, name);
         }
         let relief = self.relief(params)?;
-        Ok(self.builder.add_material_with(name, material, relief))
+        let id = self.builder.add_material_with(name, material, relief);
+        if let Some(filling) = filling {
+            self.builder.set_filling(id, filling);
+        }
+        Ok(id)
+    }
+
+    /// A boundary, whose light is colored where that is told.
+    fn glass(&mut self, params: &Params<'_>, index: SpectralCurve, roughness: Roughness) -> Result<Material, Fault> {
+        Ok(match (self.part_if_any(params, &["Kr"], false)?, self.part_if_any(params, &["Kt"], false)?) {
+            (None, None) => Material::Dielectric { index, roughness },
+            (kr, kt) => {
+                let [reflectance, transmittance] = [kr, kt].map(|k| k.unwrap_or_else(|| self.even(1.0)));
+                Material::Glass { reflectance, transmittance, index, roughness }
+            }
+        })
     }
 
     fn even(&mut self, value: f32) -> TextureId {

@@ -5,7 +5,9 @@ use std::sync::Arc;
 use glam::{DAffine3, DVec3};
 
 use super::{Fault, Reader, params::Params, spectra::SpectrumUse, substances::substance};
-use crate::{Density, Field, FilledBox, Filling, Glow, Interface, Medium, MediumId, ShapeId, SpectralCurve};
+use dioptric_spectrum::Spectrum;
+
+use crate::{Beyond, Density, Field, FilledBox, Filling, Glow, Interface, Medium, MediumId, ShapeId, SpectralCurve};
 
 /// Kinds of media that are known.
 const KINDS: [&str; 5] = ["homogeneous", "heterogeneous", "uniformgrid", "rgbgrid", "cloud"];
@@ -142,7 +144,7 @@ impl Reader<'_> {
     /// Says which media are on both sides of a shape.
     pub(super) fn set_interface(&mut self, shape: ShapeId, [inside, outside]: [&str; 2]) {
         let interface = Interface { inside: self.medium_of(inside), outside: self.medium_of(outside) };
-        if interface.inside != interface.outside {
+        if interface != (Interface { inside: None, outside: None }) {
             self.builder.set_interface(shape, interface);
         }
     }
@@ -155,6 +157,88 @@ impl Reader<'_> {
             self.builder.set_medium_at(self.metres_per_unit * place, medium);
         }
     }
+}
+
+impl Reader<'_> {
+    /// Returns what is below the surface of a material of pbrt's subsurface scattering: the medium of its coefficients, of a substance,
+    /// or of a diffuse reflectance and a mean free path.
+    pub(super) fn below_surface(
+        &mut self,
+        name: &str,
+        params: &Params<'_>,
+        index: &SpectralCurve,
+    ) -> Result<MediumId, Fault> {
+        let scale = params.within("scale", [0.0, f64::MAX]).unwrap_or(1.0) as f32;
+        let asymmetry = params.within("g", [-1.0, 1.0]).unwrap_or(0.0) as f32;
+        let substance_name = params.text("name").filter(|name| !name.is_empty());
+        let known = substance_name.and_then(substance);
+        if let (Some(of), None) = (substance_name, known) {
+            self.builder.note_of("substances that aren't known, milk in their place", of);
+        }
+        let of = |reader: &mut Self, names: &[&str], is_scattered: bool| match params.find_any(names) {
+            Some(param) if param.kind == "texture" => {
+                reader.builder.note_of("textures of what is below a surface: their defaults stand", name);
+                Ok(None)
+            }
+            Some(param) => match (param.kind, param.numbers.as_slice()) {
+                ("rgb" | "color", &[r, g, b]) => Ok(Some(coefficient_of_rgb([r, g, b], is_scattered))),
+                _ => reader.curve(param, SpectrumUse::Index),
+            },
+            None => Ok::<_, Fault>(None),
+        };
+        let reflectance = of(self, &["Kd", "reflectance"], true)?;
+        let free_path = of(self, &["mfp", "meanfreepath"], true)?;
+        let absorption = of(self, &["sigma_a"], false)?;
+        let scattering = of(self, &["sigma_s", "sigma_prime_s"], true)?;
+        let is_told = known.is_some() || absorption.is_some() || scattering.is_some();
+        let per_unit = 1.0 / self.metres_per_unit as f32;
+        let [absorption, scattering] = match (reflectance, is_told) {
+            (Some(reflectance), false) => {
+                let index = index.at(&[550.0])[0];
+                let path = free_path.unwrap_or_else(|| SpectralCurve::constant(1.0)).scaled(scale);
+                let [mut scattering, mut absorption] = [Vec::new(), Vec::new()];
+                for nm in (300..=1100).step_by(5) {
+                    let (albedo, per_path) = (
+                        albedo_below(reflectance.at(&[nm as f32])[0], index, asymmetry),
+                        1.0 / path.at(&[nm as f32])[0].max(1e-9),
+                    );
+                    scattering.push(f64::from(albedo * per_path));
+                    absorption.push(f64::from((1.0 - albedo) * per_path));
+                }
+                let nms = || (300..=1100).step_by(5).map(f64::from).collect::<Vec<f64>>();
+                let curve = |values| Spectrum::new(nms(), values).map(|s| SpectralCurve::new(&s, Beyond::Held));
+                let wrong = |e: dioptric_spectrum::SpectrumError| Fault::Here(e.to_string());
+                [curve(absorption).map_err(wrong)?, curve(scattering).map_err(wrong)?].map(|c| c.scaled(per_unit))
+            }
+            _ => {
+                let default = known.unwrap_or(DEFAULT);
+                let or_default = |given: Option<SpectralCurve>, i: usize| {
+                    given.filter(|_| known.is_none()).unwrap_or_else(|| coefficient_of_rgb(default[i], i == 1))
+                };
+                [or_default(absorption, 0), or_default(scattering, 1)].map(|c| c.scaled(scale * per_unit))
+            }
+        };
+        Ok(self.builder.add_medium(Medium::even(absorption, scattering, asymmetry)))
+    }
+}
+
+/// Returns the single-scattering albedo of a deep medium below a smooth boundary which sends back this share of light that has entered
+/// it, all angles together: the inverse of the diffusion theory of Jensen & al. (2001), equation 15 in the notes of 2002.
+fn albedo_below(reflectance: f32, index: f32, asymmetry: f32) -> f32 {
+    let inside = crate::fresnel::diffuse_reflectance(1.0 / index);
+    let a = (1.0 + inside) / (1.0 - inside);
+    let sent_back = |albedo: f32| {
+        let root = (3.0 * (1.0 - albedo)).sqrt();
+        0.5 * albedo * (1.0 + (-4.0 / 3.0 * a * root).exp()) * (-root).exp()
+    };
+    let (mut low, mut high) = (0.0, 1.0);
+    for _ in 0..32 {
+        let middle = 0.5 * (low + high);
+        if sent_back(middle) < reflectance { low = middle } else { high = middle }
+    }
+    // That was of a medium which scatters alike in all directions.
+    let reduced = 0.5 * (low + high);
+    reduced / (1.0 - asymmetry + asymmetry * reduced)
 }
 
 /// What is told of a medium place by place.
