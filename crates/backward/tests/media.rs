@@ -341,3 +341,29 @@ fn lamp_in_fog_has_its_glow() {
     });
     assert_means("lamp in fog", &picture, expected, 0.02);
 }
+
+/// Hair that absorbs nothing can't be seen under an even sky, one before another; brown hair is darker the more there is of it.
+#[test]
+fn white_hair_cannot_be_seen_in_a_furnace() {
+    let hairs = |color: f32, n_rows: i32| {
+        let mut builder = WorldBuilder::new();
+        let color = builder.add_texture(Texture::Curve(SpectralCurve::constant(color)));
+        let material = Material::Hair { color, roughness: [0.3; 2], tilt_deg: 2.0, index: 1.55 };
+        let hair = builder.add_material("hair", material);
+        // Cylinders have u about them.
+        builder.set_turn(hair, 0.5 * std::f32::consts::PI);
+        for row in 0..n_rows {
+            for column in -12..12 {
+                let at = DVec3::new(0.1 * f64::from(column) + 0.03 * f64::from(row), 0.0, 3.0 + 0.12 * f64::from(row));
+                let place = DAffine3::from_translation(at) * DAffine3::from_rotation_x(0.5 * PI + 0.1 * f64::from(row));
+                let shape = Shape::Cylinder { radius_m: 0.04, z_min_m: -3.0, z_max_m: 3.0 };
+                builder.add_shape(shape, place, hair, None);
+            }
+        }
+        builder.add_light(Light::Sky { radiance: SpectralCurve::constant(1.0) });
+        render(&builder.build().unwrap(), Placement::IDENTITY, (12, 0.2), LightPaths::Full)
+    };
+    assert_means("white hair", &hairs(1.0, 4), [1.0; 3], 0.004);
+    let [one, four] = [1, 4].map(|n_rows| means(&hairs(0.3, n_rows))[0].0);
+    assert!(four < 0.8 * one && four > 0.1, "{one} {four}");
+}

@@ -20,6 +20,7 @@ mod error;
 mod formats;
 mod fresnel;
 mod group;
+mod hair;
 mod ids;
 mod image_texture;
 mod lathe;

@@ -6,6 +6,7 @@ use crate::{
     Beyond, Bsdf, Hit, MaterialId, MediumId, SpectralCurve, TextureId, WorldError,
     bsdf::{Lobe, MAX_LOBES},
     fresnel,
+    hair::Hair,
     microfacet::Ggx,
     sampling::Frame,
     texture::Textures,
@@ -143,6 +144,17 @@ pub enum Material {
         /// The square root of their α, 0–1.
         roughness: TextureId,
     },
+    /// A hair (Chiang & al. 2016), along u of a tube that is met from outside alone.
+    Hair {
+        /// The color of much of it, 0–1.
+        color: TextureId,
+        /// How rough it is along and around, 0–1: β_m and β_n.
+        roughness: [f32; 2],
+        /// How far the scales on it are tilted towards its root, degrees.
+        tilt_deg: f32,
+        /// Index of refraction.
+        index: f32,
+    },
     /// The light of two materials together.
     Sum {
         /// The two.
@@ -239,7 +251,7 @@ impl Surface {
             Material::Coated { index, .. } => Some(index.mapped(|n| fresnel::diffuse_reflectance(1.0 / n))),
             _ => None,
         };
-        let has_gaps = material == Material::Open;
+        let has_gaps = matches!(material, Material::Open | Material::Hair { .. });
         Self { name, material, relief, inside, coverage: None, glow: None, filling: None, turn_rad: 0.0, has_gaps }
     }
 }
@@ -250,6 +262,7 @@ impl Material {
         let rough = |roughness: &Roughness| roughness.iter().flatten().copied().collect::<Vec<_>>();
         match self {
             Self::Matte { reflectance } => vec![*reflectance],
+            Self::Hair { color, .. } => vec![*color],
             Self::Translucent { reflectance, transmittance } => vec![*reflectance, *transmittance],
             Self::RoughMatte { reflectance, sigma_deg } => vec![*reflectance, *sigma_deg],
             Self::Mirror { reflectance, roughness } | Self::Glossy { reflectance, roughness, .. } => {
@@ -302,7 +315,10 @@ impl Surfaces<'_> {
     /// Whether a material may mirror light or let it through without any spread, wherever it is met.
     pub(crate) fn may_mirror(self, material: MaterialId) -> bool {
         match &self.surfaces[material.0 as usize].material {
-            Material::Matte { .. } | Material::RoughMatte { .. } | Material::Translucent { .. } => false,
+            Material::Matte { .. }
+            | Material::RoughMatte { .. }
+            | Material::Translucent { .. }
+            | Material::Hair { .. } => false,
             Material::Sum { of } | Material::Blend { of, .. } => of.iter().any(|&part| self.may_mirror(part)),
             Material::Sheen { base, .. } => self.may_mirror(*base),
             _ => true,
@@ -426,6 +442,9 @@ impl Surfaces<'_> {
                 let variance = self.textures.number(*sigma_deg, at).to_radians().powi(2);
                 let constants = [1.0 - variance / (2.0 * (variance + 0.33)), 0.45 * variance / (variance + 0.09)];
                 Lobe::RoughDiffuse { reflectance: share_of(*reflectance), constants }
+            }
+            Material::Hair { color, roughness, tilt_deg, index } => {
+                Lobe::Hair(Hair::new(share_of(*color), *roughness, *tilt_deg, *index))
             }
             Material::Glossy { reflectance, index, roughness } => Lobe::Glossy {
                 reflectance: share_of(*reflectance),

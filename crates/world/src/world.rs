@@ -149,6 +149,10 @@ impl World {
         if surface.material == Material::Open && surface.coverage.is_none() {
             return self.geometry.shapes[hit.shape.0 as usize].emission.is_some();
         }
+        if matches!(surface.material, Material::Hair { .. }) && hit.geometric_normal.dot(ray.direction) > 0.0 {
+            // What goes through a hair has left it where it came in.
+            return false;
+        }
         let share = self.asked().coverage(hit.material, &self.point_of(hit));
         share >= 1.0 || share > 0.0 && number_of(ray) < share
     }
@@ -664,8 +668,14 @@ impl WorldBuilder {
         MediumId(self.media.len() as u32 - 1)
     }
 
-    /// Says what fills shapes of a material, unless their own [`Interface`] says it. Shapes must be closed, and their material let
-    /// light in.
+    /// Whether a material is hair, which is met from outside alone.
+    pub(crate) fn is_hair(&self, material: MaterialId) -> bool {
+        let surface = self.surfaces.get(material.0 as usize);
+        surface.is_some_and(|surface| matches!(surface.material, Material::Hair { .. }))
+    }
+
+    /// Says what fills shapes of a material, whatever their own [`Interface`] says of their inside. Shapes must be closed, and their
+    /// material let light in.
     pub fn set_filling(&mut self, material: MaterialId, medium: MediumId) {
         if let Some(surface) = self.surfaces.get_mut(material.0 as usize) {
             surface.filling = Some(medium);

@@ -61,6 +61,7 @@ impl<const N: usize> Bsdf<N> {
                     Lobe::Diffuse { reflectance: [0.0; N], transmittance }
                 }
                 Lobe::Velvet { .. }
+                | Lobe::Hair(_)
                 | Lobe::Mirror { rough: Some(_), .. }
                 | Lobe::Glossy { rough: Some(_), .. }
                 | Lobe::Metal { rough: Some(_), .. }
@@ -132,6 +133,7 @@ impl<const N: usize> Bsdf<N> {
                 | Lobe::Dielectric { .. }
                 | Lobe::Coated { .. }
                 | Lobe::Layered { .. }
+                | Lobe::Hair(_)
                 | Lobe::Substrate { .. } => {}
             }
         }
@@ -167,6 +169,7 @@ impl<const N: usize> Lobe<N> {
             | Self::Pane { .. }
             | Self::Dielectric { .. }
             | Self::Velvet { .. }
+            | Self::Hair(_)
             | Self::Open => [0.0; N],
         }
     }

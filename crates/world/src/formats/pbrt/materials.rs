@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::{Fault, Reader, Version, params::Params, spectra::SpectrumUse};
 use crate::{
     Encoding, ImageTexture, Material, MaterialId, MetalKind, Relief, Roughness, RoughnessLaw, SpectralCurve, Texture,
-    TextureId, UvMapping, Wrap,
+    TextureId, UvMapping, Wrap, hair::color_factor,
 };
 
 impl Reader<'_> {
@@ -61,8 +61,14 @@ impl Reader<'_> {
             }
             "mix" => self.mix(params)?,
             "hair" => {
-                self.builder.note_of("materials of kind 'hair': matte of the color that much of it has", name);
-                Material::Matte { reflectance: self.hair_color(params)? }
+                let number =
+                    |name: &str, most: f64, default: f64| params.within(name, [0.0, most]).unwrap_or(default) as f32;
+                Material::Hair {
+                    color: self.hair_color(params)?,
+                    roughness: [number("beta_m", 1.0, 0.3), number("beta_n", 1.0, 0.3)],
+                    tilt_deg: params.within("alpha", [-90.0, 90.0]).unwrap_or(2.0) as f32,
+                    index: params.within("eta", [1.0, 10.0]).unwrap_or(1.55) as f32,
+                }
             }
             "" | "none" | "interface" => Material::Open,
             _ => {
@@ -255,8 +261,8 @@ impl Reader<'_> {
     /// Returns the color of light that many hairs have scattered, by Chiang & al. (2016), whose inverse is how pbrt makes a hair's absorption of it.
     fn hair_color(&mut self, params: &Params<'_>) -> Result<TextureId, Fault> {
         let rough = params.within("beta_n", [0.0, 1.0]).unwrap_or(0.3);
-        let factor = 5.969 + rough * (-0.215 + rough * (2.532 + rough * (-10.73 + rough * (5.574 + rough * 0.245))));
-        let left = |per_radius: f32| (-per_radius.max(0.0).sqrt() * factor as f32).exp();
+        let factor = color_factor(rough as f32);
+        let left = |per_radius: f32| (-per_radius.max(0.0).sqrt() * factor).exp();
         if let Some(param) = params.find("sigma_a") {
             let curve = match (param.kind, param.numbers.as_slice()) {
                 ("rgb" | "color", &[r, g, b]) => {

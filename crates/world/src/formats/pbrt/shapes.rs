@@ -104,7 +104,7 @@ impl Reader<'_> {
         }
         let attributes = &self.attributes;
         let (_, _, mesh) = self.curves.get_or_insert_with(|| (attributes.clone(), material, TriangleMesh::default()));
-        if let Err(reason) = curves::add(mesh, params) {
+        if let Err(reason) = curves::add(mesh, params, self.builder.is_hair(material)) {
             self.builder.note_of("curves that are none, left out", &reason);
         }
         Ok(())
