@@ -4,7 +4,12 @@ use std::sync::Arc;
 
 use glam::{DAffine3, DVec3};
 
-use super::{Fault, Reader, params::Params, spectra::SpectrumUse, substances::substance};
+use super::{
+    Fault, Reader,
+    params::{Param, Params},
+    spectra::SpectrumUse,
+    substances::substance,
+};
 use dioptric_spectrum::Spectrum;
 
 use crate::{Beyond, Density, Field, FilledBox, Filling, Glow, Interface, Medium, MediumId, ShapeId, SpectralCurve};
@@ -35,19 +40,22 @@ impl Reader<'_> {
         };
         let Grids { density, of_glow, temperature } = grids;
         let [absorption, scattering] = self.coefficients(kind, params)?;
-        let glow = match (params.find("Le"), temperature) {
-            (_, Some(temperature)) => {
+        let (field, factor) = of_glow;
+        let glow = match (temperature, field) {
+            (Some(temperature), field) => {
                 let number = |name: &str, default: f64| params.number(name).unwrap_or(default) as f32;
                 let offset = number("temperatureoffset", 0.0) + number("temperaturecutoff", 0.0);
-                let factor = (of_glow.1, of_glow.0);
+                let factor = (factor, field);
                 Some(Glow::Hot { temperature, offset, scale: number("temperaturescale", 1.0), factor })
             }
-            (Some(param), None) if kind != "rgbgrid" => {
-                let (field, factor) = of_glow;
-                let curve = self.light_curve(Some(param), f64::from(factor))?;
-                (curve.mean_visible() > 0.0).then_some(Glow::Spectrum(curve, field))
-            }
-            _ => of_glow.0.map(|field| Glow::Colors(field, of_glow.1)),
+            (None, field) if kind == "rgbgrid" => field.map(|field| Glow::Colors(field, factor)),
+            (None, field) => match params.find("Le") {
+                Some(param) => {
+                    let curve = self.light_curve(Some(param), f64::from(factor))?;
+                    (curve.mean_visible() > 0.0).then_some(Glow::Spectrum(curve, field))
+                }
+                None => None,
+            },
         };
         let asymmetry = params.within("g", [-1.0, 1.0]).unwrap_or(0.0) as f32;
         let medium = self.builder.add_medium(Medium { absorption, scattering, asymmetry, glow, density });
@@ -68,22 +76,27 @@ impl Reader<'_> {
         let mut curves = Vec::with_capacity(2);
         for (index, name) in ["sigma_a", "sigma_s"].into_iter().enumerate() {
             let given = match params.find(name).filter(|_| kind != "rgbgrid") {
-                Some(param) => match (param.kind, param.numbers.as_slice()) {
-                    ("rgb" | "color", &[r, g, b]) => Some(coefficient_of_rgb([r, g, b], index == 1)),
-                    _ => self.curve(param, SpectrumUse::Index)?,
-                },
+                Some(param) => self.coefficient(param, index == 1)?,
                 None => None,
             };
             let curve = given.unwrap_or_else(|| match default {
                 Some(rgb) => coefficient_of_rgb(rgb[index], index == 1),
                 None => SpectralCurve::constant(1.0),
             });
-            if curve.mean_visible() < 0.0 {
-                self.builder.note_of("coefficients of media below 0: 0 in their place", name);
-            }
-            curves.push(curve.mapped(|v| v.max(0.0)).scaled(scale as f32));
+            curves.push(curve.scaled(scale as f32));
         }
         <[SpectralCurve; 2]>::try_from(curves).map_err(|_| "a medium has two coefficients".to_owned().into())
+    }
+
+    /// Returns the curve of a coefficient.
+    fn coefficient(&mut self, param: &Param<'_>, is_scattered: bool) -> Result<Option<SpectralCurve>, Fault> {
+        if param.numbers.iter().any(|v| *v < 0.0) {
+            self.builder.note_of("coefficients of media below 0: 0 in their place", param.name);
+        }
+        Ok(match (param.kind, param.numbers.as_slice()) {
+            ("rgb" | "color", &[r, g, b]) => Some(coefficient_of_rgb([r, g, b], is_scattered)),
+            _ => self.curve(param, SpectrumUse::Index)?.map(|curve| curve.mapped(|v| v.max(0.0))),
+        })
     }
 
     /// Returns how dense a medium is where, or why its grid is none.
@@ -124,6 +137,8 @@ impl Reader<'_> {
         let density = Density::Box(Arc::new(FilledBox::new(world_from_unit, filling)));
         let is_colored = kind == "rgbgrid";
         let glows = if is_colored { field("Le", 3)? } else { field("Lescale", 1)? };
+        // One number is either.
+        let of_glow = if glows.is_some() && !is_colored { 1.0 } else { of_glow };
         Ok(Grids { density, of_glow: (glows, of_glow), temperature: field("temperature", 1)? })
     }
 
@@ -180,10 +195,7 @@ impl Reader<'_> {
                 reader.builder.note_of("textures of what is below a surface: their defaults stand", name);
                 Ok(None)
             }
-            Some(param) => match (param.kind, param.numbers.as_slice()) {
-                ("rgb" | "color", &[r, g, b]) => Ok(Some(coefficient_of_rgb([r, g, b], is_scattered))),
-                _ => reader.curve(param, SpectrumUse::Index),
-            },
+            Some(param) => reader.coefficient(param, is_scattered),
             None => Ok::<_, Fault>(None),
         };
         let reflectance = of(self, &["Kd", "reflectance"], true)?;
@@ -223,22 +235,16 @@ impl Reader<'_> {
 }
 
 /// Returns the single-scattering albedo of a deep medium below a smooth boundary which sends back this share of light that has entered
-/// it, all angles together: the inverse of the diffusion theory of Jensen & al. (2001), equation 15 in the notes of 2002.
+/// it, all angles together: from inside the boundary mirrors its share (Saunderson 1942), below it is van de Hulst's fit to the albedo of
+/// a deep medium (1980), by the similarity of what scatters forwards.
 fn albedo_below(reflectance: f32, index: f32, asymmetry: f32) -> f32 {
-    let inside = crate::fresnel::diffuse_reflectance(1.0 / index);
-    let a = (1.0 + inside) / (1.0 - inside);
-    let sent_back = |albedo: f32| {
-        let root = (3.0 * (1.0 - albedo)).sqrt();
-        0.5 * albedo * (1.0 + (-4.0 / 3.0 * a * root).exp()) * (-root).exp()
-    };
-    let (mut low, mut high) = (0.0, 1.0);
-    for _ in 0..32 {
-        let middle = 0.5 * (low + high);
-        if sent_back(middle) < reflectance { low = middle } else { high = middle }
-    }
-    // That was of a medium which scatters alike in all directions.
-    let reduced = 0.5 * (low + high);
-    reduced / (1.0 - asymmetry + asymmetry * reduced)
+    let mirrored = crate::fresnel::diffuse_reflectance(1.0 / index);
+    let bare = reflectance.clamp(0.0, 1.0) / (1.0 - mirrored + mirrored * reflectance.clamp(0.0, 1.0));
+    // Of bare = (1 − s)(1 − 0.139 s)/(1 + 1.17 s).
+    let linear = 1.139 + 1.17 * bare;
+    let s = (linear - (linear * linear - 4.0 * 0.139 * (1.0 - bare)).sqrt()) / (2.0 * 0.139);
+    let reduced = 1.0 - s * s;
+    reduced / (1.0 - asymmetry + asymmetry * reduced).max(f32::MIN_POSITIVE)
 }
 
 /// What is told of a medium place by place.
