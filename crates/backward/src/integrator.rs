@@ -93,43 +93,46 @@ impl<const N: usize> Path<N> {
 /// Where light is scattered.
 enum Place<'a, const N: usize> {
     Surface(&'a Hit, Bsdf<N>),
-    /// A point of a medium, and the way that the path came.
-    Medium(&'a Medium, Ray),
+    /// A point of a medium, and the way that the path came; whether no light is found from there.
+    Medium(&'a Medium, Ray, bool),
 }
 
 impl<const N: usize> Place<'_, N> {
     fn receiver(&self) -> Receiver {
         match self {
             Self::Surface(hit, bsdf) => Receiver { point: hit.point, normal: bsdf.lit_side() },
-            Self::Medium(_, at) => at.origin.into(),
+            Self::Medium(_, at, _) => at.origin.into(),
         }
     }
 
     fn is_delta(&self) -> bool {
-        matches!(self, Self::Surface(_, bsdf) if bsdf.is_delta())
+        match self {
+            Self::Surface(_, bsdf) => bsdf.is_delta(),
+            Self::Medium(_, _, is_closed) => *is_closed,
+        }
     }
 
     fn eval(&self, incident: Vec3) -> [f32; N] {
         match self {
             Self::Surface(_, bsdf) => bsdf.eval(incident),
-            Self::Medium(medium, at) => [medium.phase(at.direction.dot(incident)); N],
+            Self::Medium(medium, at, _) => [medium.phase(at.direction.dot(incident)); N],
         }
     }
 
     fn pdf(&self, incident: Vec3) -> f32 {
         match self {
             Self::Surface(_, bsdf) => bsdf.pdf(incident),
-            Self::Medium(medium, at) => medium.phase(at.direction.dot(incident)),
+            Self::Medium(medium, at, _) => medium.phase(at.direction.dot(incident)),
         }
     }
 
     fn sample(&self, u_lobe: f32, u: [f32; 2]) -> Option<BsdfSample<N>> {
         match self {
             Self::Surface(_, bsdf) => bsdf.sample(u_lobe, u),
-            Self::Medium(medium, at) => {
+            Self::Medium(medium, at, is_closed) => {
                 let incident = medium.sample_phase(at.direction, u);
                 let pdf = medium.phase(at.direction.dot(incident));
-                Some(BsdfSample { incident, weight: [1.0; N], pdf, is_delta: false, is_dispersed: false })
+                Some(BsdfSample { incident, weight: [1.0; N], pdf, is_delta: *is_closed, is_dispersed: false })
             }
         }
     }
@@ -137,7 +140,7 @@ impl<const N: usize> Place<'_, N> {
     fn ray_towards(&self, direction: Vec3) -> Ray {
         match self {
             Self::Surface(hit, _) => hit.ray_towards(direction),
-            Self::Medium(_, at) => Ray { origin: at.origin, direction },
+            Self::Medium(_, at, _) => Ray { origin: at.origin, direction },
         }
     }
 
@@ -190,7 +193,9 @@ impl Integrator<'_> {
                     self.add(&mut sum, n_scatterings, &throughput, &lanes(|i| sky[i] * share));
                     return sum;
                 }
-                Arrival::Medium(medium, at) => Place::Medium(self.world.medium(medium), at),
+                Arrival::Medium(medium, at) => {
+                    Place::Medium(self.world.medium(medium), at, self.world.is_closed(medium))
+                }
                 Arrival::Surface(met) => {
                     // Dispersion takes the packet apart: every wavelength goes on from this surface by itself.
                     let bsdf = self.world.bsdf(&met, -ray.direction, wavelengths_nm);

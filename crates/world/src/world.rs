@@ -41,6 +41,8 @@ pub struct World {
     is_left_handed: bool,
     patterned: Patterned,
     media: Vec<Medium>,
+    /// Of each whether a surface stands between it and all lights.
+    is_closed: Vec<bool>,
     /// What is where no surface tells.
     surroundings: Option<MediumId>,
 }
@@ -197,6 +199,12 @@ impl World {
         &self.media[id.0 as usize]
     }
 
+    /// Whether surfaces stand between a medium and all lights that are no shapes, all around: no light that is looked for from
+    /// within is found.
+    pub fn is_closed(&self, id: MediumId) -> bool {
+        self.is_closed[id.0 as usize]
+    }
+
     /// Returns what a ray first meets nearer than `t_max_m`: a surface as of [`intersect`](Self::intersect), or a boundary
     /// between media.
     pub fn meet(&self, ray: &Ray, t_max_m: f32) -> Option<Met> {
@@ -212,6 +220,15 @@ impl World {
             (from, gone_m) = (next, hit.distance_m);
         }
         None
+    }
+
+    fn find_closed_media(&mut self) {
+        let lamps = self.lights.positions();
+        let of_lamps = lamps.filter_map(|origin| self.medium_along(&Ray { origin, direction: Vec3::Z }));
+        let open_sides = self.geometry.shapes.iter().filter(|shape| self.surfaces[shape.material.0 as usize].has_gaps);
+        let of_sides = open_sides.filter_map(|shape| shape.interface).flat_map(|i| [i.inside, i.outside]).flatten();
+        let open: Vec<MediumId> = of_lamps.chain(of_sides).chain(self.surroundings).collect();
+        open.into_iter().for_each(|id| self.is_closed[id.0 as usize] = false);
     }
 
     fn interface(&self, hit: &Hit) -> Option<&Interface> {
@@ -879,6 +896,7 @@ impl WorldBuilder {
             up,
             is_left_handed,
             patterned,
+            is_closed: vec![true; self.media.len()],
             media: self.media,
             surroundings: None,
         };
@@ -889,6 +907,7 @@ impl WorldBuilder {
             let is_bounded = [Vec3::X, Vec3::Y, Vec3::Z].into_iter().all(|axis| is_held(axis) && is_held(-axis));
             world.surroundings = (!is_bounded).then_some(medium);
         }
+        world.find_closed_media();
         Ok(world)
     }
 
