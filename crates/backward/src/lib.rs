@@ -22,6 +22,7 @@ mod film;
 mod gathered;
 mod integrator;
 mod lens_camera;
+mod media;
 mod micro_array;
 mod output;
 mod packets;

@@ -45,6 +45,31 @@ impl Sampler {
         };
         [number(0), number(1)]
     }
+
+    /// Returns as many numbers as are asked for, of which the first two are [`pair`](Self::pair) and the others as good as random.
+    pub(crate) fn stream(&self, pair: u32) -> Stream {
+        Stream { first: self.pair(pair), key: mix(self.key ^ mix(pair)) ^ mix(self.index ^ 0x68e3_1da4), n_drawn: 0 }
+    }
+}
+
+/// Numbers one after another.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Stream {
+    first: [f32; 2],
+    key: u32,
+    n_drawn: u32,
+}
+
+impl Stream {
+    /// Returns the next number in [0, 1).
+    pub(crate) fn next(&mut self) -> f32 {
+        let number = match self.first.get(self.n_drawn as usize) {
+            Some(first) => *first,
+            None => (mix(self.key ^ mix(self.n_drawn.wrapping_mul(0x9e37_79b9))) >> 8) as f32 * UNIT_F32,
+        };
+        self.n_drawn = self.n_drawn.wrapping_add(1);
+        number
+    }
 }
 
 /// Returns a point of the unit disc, evenly spread, neighbors staying neighbors (Shirley & Chiu 1997).

@@ -359,7 +359,7 @@ fn of_chromaticity(wanted: [f64; 2]) -> Spectrum {
 }
 
 /// Returns the spectral radiance of a black body at one wavelength, W m⁻² sr⁻¹ nm⁻¹ (Planck's law).
-fn planck(wavelength_nm: f64, kelvin: f64) -> f64 {
+pub fn planck(wavelength_nm: f64, kelvin: f64) -> f64 {
     const C1L: f64 = 1.191_042_972e-16; // 2 h c², W m² sr⁻¹
     const C2: f64 = 1.438_776_877e-2;
     let m = wavelength_nm * 1e-9;

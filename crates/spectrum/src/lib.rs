@@ -40,7 +40,9 @@ pub use display::Display;
 pub use error::SpectrumError;
 pub use exr_header::sort_exr_attributes;
 pub use grid::WavelengthGrid;
-pub use illuminant::{ColorTemperature, Illuminant, blackbody, blackbody_peak, color_checker_reflectances, daylight};
+pub use illuminant::{
+    ColorTemperature, Illuminant, blackbody, blackbody_peak, color_checker_reflectances, daylight, planck,
+};
 pub use image::{Bands, DepthMap, Quantity, SpectralImage};
 pub use lanes::lanes;
 pub use smooth_reflectance::SmoothReflectance;

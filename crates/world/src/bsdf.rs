@@ -8,6 +8,7 @@ use std::f32::consts::FRAC_1_PI;
 
 use crate::{
     film, fresnel,
+    hair::Hair,
     microfacet::Ggx,
     sampling::{Frame, ONE_MINUS_EPSILON, cosine_hemisphere},
     velvet,
@@ -27,6 +28,8 @@ pub struct Bsdf<const N: usize> {
     lobes: Vec<(Factor, Lobe<N>)>,
     /// The sum of the chances.
     chances: f32,
+    /// Whether it is a thin round body whose light leaves on any side.
+    is_round: bool,
 }
 
 /// What a kind of scattering counts in a sum, and how often it is drawn.
@@ -115,6 +118,7 @@ pub(crate) enum Lobe<const N: usize> {
         color: [f32; N],
         alpha: f32,
     },
+    Hair(Hair<N>),
     Open,
 }
 
@@ -143,7 +147,7 @@ struct Mirrored<const N: usize> {
 
 impl<const N: usize> Bsdf<N> {
     pub(crate) fn new(frame: Frame, geometric_normal: Vec3, outgoing: Vec3) -> Self {
-        Self { frame, geometric_normal, outgoing, lobes: Vec::new(), chances: 0.0 }
+        Self { frame, geometric_normal, outgoing, lobes: Vec::new(), chances: 0.0, is_round: false }
     }
 
     /// Adds a kind of scattering of a share of the surface, which is drawn as often.
@@ -172,6 +176,7 @@ impl<const N: usize> Bsdf<N> {
                 // Most surfaces have one.
                 self.lobes.reserve_exact(1);
             }
+            self.is_round |= matches!(lobe, Lobe::Hair(_));
             self.lobes.push((factor, lobe));
             self.chances += factor.chance;
         }
@@ -253,6 +258,7 @@ impl<const N: usize> Bsdf<N> {
             | Lobe::Coated { .. }
             | Lobe::Layered { .. }
             | Lobe::Filmed { .. }
+            | Lobe::Hair(_)
             | Lobe::Substrate { .. } => false,
             Lobe::Mirror { rough, .. }
             | Lobe::Glossy { rough, .. }
@@ -300,7 +306,7 @@ impl<const N: usize> Bsdf<N> {
             | Lobe::Layered { .. }
             | Lobe::Filmed { .. }
             | Lobe::Substrate { .. } => true,
-            Lobe::Dielectric { .. } | Lobe::Pane { .. } | Lobe::Open => false,
+            Lobe::Dielectric { .. } | Lobe::Pane { .. } | Lobe::Hair(_) | Lobe::Open => false,
         };
         let n = self.geometric_normal;
         let towards = if n.dot(self.outgoing) < 0.0 { -n } else { n };
@@ -316,7 +322,7 @@ impl<const N: usize> Bsdf<N> {
     fn local(&self, incident: Vec3) -> Option<(Vec3, Vec3)> {
         let (o, i) = (self.frame.to_local(self.outgoing), self.frame.to_local(incident));
         let flat = self.geometric_normal.dot(incident) * self.geometric_normal.dot(self.outgoing);
-        (flat * o.z * i.z > 0.0).then_some((o, i))
+        (self.is_round || flat * o.z * i.z > 0.0).then_some((o, i))
     }
 }
 
@@ -341,6 +347,7 @@ impl<const N: usize> Lobe<N> {
                 let shape = a + b * along.max(0.0) * sin_o * sin_i / steeper;
                 lanes(|lane| reflectance[lane] * shape * FRAC_1_PI * i.z.abs())
             }
+            Self::Hair(hair) => hair.value(o, i),
             Self::Velvet { color, alpha } if is_reflection => {
                 let value = velvet::value(*alpha, o, i);
                 color.map(|c| c * value)
@@ -418,6 +425,7 @@ impl<const N: usize> Lobe<N> {
                 let p = self.diffuse_reflection_probability();
                 (if is_reflection { p } else { 1.0 - p }) * FRAC_1_PI * i.z.abs()
             }
+            Self::Hair(hair) => hair.pdf(o, i),
             Self::RoughDiffuse { .. } | Self::Velvet { .. } if is_reflection => FRAC_1_PI * i.z.abs(),
             Self::Mirror { rough: Some(ggx), .. }
             | Self::Glossy { rough: Some(ggx), .. }
@@ -454,7 +462,7 @@ impl<const N: usize> Lobe<N> {
     /// Whether the number means a mirror direction.
     fn is_delta_for(&self, u_lobe: f32, o: Vec3) -> bool {
         match self {
-            Self::Diffuse { .. } | Self::RoughDiffuse { .. } | Self::Velvet { .. } => false,
+            Self::Diffuse { .. } | Self::RoughDiffuse { .. } | Self::Velvet { .. } | Self::Hair(_) => false,
             Self::Mirror { rough, .. }
             | Self::Glossy { rough, .. }
             | Self::Metal { rough, .. }
@@ -484,6 +492,7 @@ impl<const N: usize> Lobe<N> {
             Self::Diffuse { .. } => {
                 Some(diffuse(if u_lobe < self.diffuse_reflection_probability() { side } else { -side }))
             }
+            Self::Hair(hair) => Some(hair.draw(o, u_lobe, u)),
             Self::RoughDiffuse { .. } | Self::Velvet { .. } => Some(diffuse(side)),
             Self::Mirror { rough, .. } | Self::Glossy { rough, .. } | Self::Metal { rough, .. } => {
                 mirrored(rough.as_ref()?)
@@ -569,7 +578,7 @@ impl<const N: usize> Lobe<N> {
                 Some(Mirrored { incident, value, probability: 1.0 - probability, is_dispersed })
             }
             Self::Open => Some(Mirrored { incident: -o, value: [1.0; N], probability: 1.0, is_dispersed: false }),
-            Self::Diffuse { .. } | Self::RoughDiffuse { .. } | Self::Velvet { .. } => None,
+            Self::Diffuse { .. } | Self::RoughDiffuse { .. } | Self::Velvet { .. } | Self::Hair(_) => None,
         }
     }
 
@@ -610,6 +619,8 @@ impl<const N: usize> Lobe<N> {
                 let albedo = velvet::albedo(*alpha, cos);
                 color.map(|c| c * albedo)
             }
+            // From the middle of the hair, at right angles.
+            Self::Hair(hair) => hair.albedo(Vec3::Z),
             Self::Open => [1.0; N],
             Self::Coated { diffuse, index, inside, .. } => {
                 let mirrored = fresnel::dielectrics(cos, index);

@@ -6,7 +6,8 @@ use dioptric_spectrum::{Observer, WavelengthGrid};
 use glam::{DAffine3, DMat3, DVec3};
 
 use crate::{
-    Emission, GroupId, Light, MaterialId, Shape, ShapeId, SpectralCurve, WorldBuilder, WorldCamera, WorldError,
+    Emission, GroupId, Interface, Light, MaterialId, MediumId, Shape, ShapeId, SpectralCurve, WorldBuilder,
+    WorldCamera, WorldError,
     shape::{Quadric, placed_bounds},
     world::{NewLight, NewShape},
 };
@@ -512,6 +513,19 @@ impl WorldBuilder {
     }
 
     pub(crate) fn transform_picked(&mut self, picked: &[bool], by: &DAffine3) {
+        // What fills a shape from place to place goes with it.
+        let mut moved: HashMap<MediumId, MediumId> = HashMap::new();
+        let is_picked = |shape: &NewShape| shape.group == GroupId::ROOT && picked[shape.object as usize];
+        for shape in self.shapes.iter_mut().filter(|shape| is_picked(shape)) {
+            let Some(inside) = shape.interface.and_then(|interface| interface.inside) else { continue };
+            if self.media.get(inside.0 as usize).is_some_and(|medium| !medium.is_even()) {
+                let number = *moved.entry(inside).or_insert_with(|| {
+                    self.media.push(self.media[inside.0 as usize].moved(by));
+                    MediumId(self.media.len() as u32 - 1)
+                });
+                shape.interface = shape.interface.map(|interface| Interface { inside: Some(number), ..interface });
+            }
+        }
         for shape in self.shapes.iter_mut().filter(|shape| shape.group == GroupId::ROOT) {
             if picked[shape.object as usize] {
                 shape.place = *by * shape.place;

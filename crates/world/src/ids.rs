@@ -20,7 +20,9 @@ ids! {
     /// A group of shapes that can be placed more than once, by number.
     GroupId,
     /// One placing of a group, by number.
-    InstanceId
+    InstanceId,
+    /// A medium of a world, by number.
+    MediumId
 }
 
 impl GroupId {

@@ -112,6 +112,16 @@ impl Lights {
         self.lights.len()
     }
 
+    /// Where those are that are points.
+    pub(crate) fn positions(&self) -> impl Iterator<Item = Vec3> {
+        self.lights.iter().filter_map(|source| match source {
+            Source::Alone(
+                Light::Point { position, .. } | Light::Spot { position, .. } | Light::Pictured { position, .. },
+            ) => Some(position.as_vec3()),
+            Source::Alone(_) | Source::Sky(_) | Source::Area(_) => None,
+        })
+    }
+
     /// Draws light; of a shape that glows, with its number and that of the triangle of a mesh.
     pub(crate) fn sample<const N: usize>(
         &self,
@@ -344,6 +354,7 @@ mod tests {
                 }),
                 is_reversed: false,
                 light: None,
+                interface: None,
             }
         };
         (0..1000).map(pane).collect()

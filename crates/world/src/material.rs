@@ -4,9 +4,10 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    Beyond, Bsdf, Film, Hit, MaterialId, SpectralCurve, TextureId, WorldError,
+    Beyond, Bsdf, Film, Hit, MaterialId, MediumId, SpectralCurve, TextureId, WorldError,
     bsdf::{Lobe, MAX_LOBES},
     film, fresnel,
+    hair::Hair,
     microfacet::Ggx,
     sampling::Frame,
     texture::Textures,
@@ -144,6 +145,17 @@ pub enum Material {
         /// The square root of their α, 0–1.
         roughness: TextureId,
     },
+    /// A hair (Chiang & al. 2016), along u of a tube that is met from outside alone.
+    Hair {
+        /// The color of much of it, 0–1.
+        color: TextureId,
+        /// How rough it is along and around, 0–1: β_m and β_n.
+        roughness: [f32; 2],
+        /// How far the scales on it are tilted towards its root, degrees.
+        tilt_deg: f32,
+        /// Index of refraction.
+        index: f32,
+    },
     /// The light of two materials together.
     Sum {
         /// The two.
@@ -226,8 +238,8 @@ pub(crate) struct Surface {
     pub(crate) coverage: Option<TextureId>,
     /// What the radiance of shapes that glow is multiplied by.
     pub(crate) glow: Option<TextureId>,
-    /// What a medium that fills the shape takes from light, 1/m.
-    pub(crate) absorption: Option<SpectralCurve>,
+    /// What fills shapes that it lets light into.
+    pub(crate) filling: Option<MediumId>,
     /// How far what is brushed is turned from u, counterclockwise, rad.
     pub(crate) turn_rad: f32,
     /// A picture of directions besides: red and green 0–1 stand for −1 to 1 along u and v.
@@ -246,23 +258,10 @@ impl Surface {
             Material::Coated { index, .. } => Some(index.mapped(|n| fresnel::diffuse_reflectance(1.0 / n))),
             _ => None,
         };
-        let has_gaps = material == Material::Open;
-        let (coverage, glow, absorption, directions, behind, film) = (None, None, None, None, None, None);
+        let has_gaps = matches!(material, Material::Open | Material::Hair { .. });
+        let (coverage, glow, filling, directions, behind, film) = (None, None, None, None, None, None);
         let turn_rad = 0.0;
-        Self {
-            name,
-            material,
-            relief,
-            inside,
-            coverage,
-            glow,
-            absorption,
-            turn_rad,
-            directions,
-            behind,
-            film,
-            has_gaps,
-        }
+        Self { name, material, relief, inside, coverage, glow, filling, turn_rad, directions, behind, film, has_gaps }
     }
 
     /// How many kinds of scattering it has besides those of its parts.
@@ -283,6 +282,7 @@ impl Material {
         let rough = |roughness: &Roughness| roughness.iter().flatten().copied().collect::<Vec<_>>();
         match self {
             Self::Matte { reflectance } => vec![*reflectance],
+            Self::Hair { color, .. } => vec![*color],
             Self::Translucent { reflectance, transmittance } => vec![*reflectance, *transmittance],
             Self::RoughMatte { reflectance, sigma_deg } => vec![*reflectance, *sigma_deg],
             Self::Mirror { reflectance, roughness } | Self::Glossy { reflectance, roughness, .. } => {
@@ -326,7 +326,10 @@ impl Surfaces<'_> {
     /// Whether a material may mirror light or let it through without any spread, wherever it is met.
     pub(crate) fn may_mirror(self, material: MaterialId) -> bool {
         match &self.surfaces[material.0 as usize].material {
-            Material::Matte { .. } | Material::RoughMatte { .. } | Material::Translucent { .. } => false,
+            Material::Matte { .. }
+            | Material::RoughMatte { .. }
+            | Material::Translucent { .. }
+            | Material::Hair { .. } => false,
             Material::Sum { of } | Material::Blend { of, .. } => of.iter().any(|&part| self.may_mirror(part)),
             Material::Sheen { base, .. } => self.may_mirror(*base),
             _ => true,
@@ -451,6 +454,9 @@ impl Surfaces<'_> {
                 let variance = self.textures.number(*sigma_deg, at).to_radians().powi(2);
                 let constants = [1.0 - variance / (2.0 * (variance + 0.33)), 0.45 * variance / (variance + 0.09)];
                 Lobe::RoughDiffuse { reflectance: share_of(*reflectance), constants }
+            }
+            Material::Hair { color, roughness, tilt_deg, index } => {
+                Lobe::Hair(Hair::new(share_of(*color), *roughness, *tilt_deg, *index))
             }
             Material::Glossy { reflectance, index, roughness } => Lobe::Glossy {
                 reflectance: share_of(*reflectance),

@@ -3,7 +3,7 @@
 use glam::{Affine3A, DAffine3, DMat3, DVec3};
 
 use crate::{
-    Coordinates, GroupId, Material, MaterialId, Procedural, Relief, ShapeId, Texture, TextureId, UvMapping,
+    Coordinates, GroupId, Material, MaterialId, MediumId, Procedural, Relief, ShapeId, Texture, TextureId, UvMapping,
     WorldBuilder, WorldError,
     world::{NewInstance, NewLight, NewShape, front_of},
 };
@@ -30,9 +30,14 @@ impl WorldBuilder {
             groups: self.n_groups - 1,
             objects: self.objects.take_in(&other.objects, Some(object)),
             shapes: self.shapes.len() as u32,
+            media: self.media.len() as u32,
             own_from_world: place.inverse(),
         };
-        let Self { shapes, n_groups, instances, surfaces, textures, lights, sources, things, .. } = other;
+        if other.eye.is_some() {
+            self.note(format!("{name}: the medium around its camera is left out with that"));
+        }
+        let Self { shapes, n_groups, instances, surfaces, textures, lights, sources, things, media, .. } = other;
+        self.media.extend(media.iter().map(|medium| medium.moved(&place)));
         self.textures.extend(textures.into_iter().map(|mut texture| {
             numbers.texture(&mut texture);
             texture
@@ -42,8 +47,9 @@ impl WorldBuilder {
             surface.relief.iter_mut().for_each(|relief| numbers.grow(relief_texture(relief)));
             let more =
                 surface.behind.iter_mut().flatten().chain(surface.film.iter_mut().map(|film| &mut film.thickness_nm));
-            let more = more.chain(&mut surface.coverage).chain(&mut surface.glow);
+            let more = more.chain(&mut surface.coverage).chain(&mut surface.glow).chain(&mut surface.directions);
             more.for_each(|texture| numbers.grow(texture));
+            surface.filling = surface.filling.map(|medium| numbers.medium(medium));
             surface
         }));
         let group_of = |group: GroupId| if group == GroupId::ROOT { group } else { GroupId(group.0 + numbers.groups) };
@@ -52,6 +58,7 @@ impl WorldBuilder {
             group: group_of(shape.group),
             material: MaterialId(shape.material.0 + numbers.materials),
             object: shape.object + numbers.objects,
+            interface: shape.interface.map(|interface| interface.renumbered(|medium| numbers.medium(medium))),
             ..shape
         }));
         self.n_groups += n_groups - 1;
@@ -88,9 +95,13 @@ impl WorldBuilder {
         }
         self.transform_picked(&vec![true; self.objects.len()], &by);
         let own_from_world = by.inverse();
-        let numbers = Numbers { textures: 0, materials: 0, groups: 0, objects: 0, shapes: 0, own_from_world };
+        let numbers = Numbers { textures: 0, materials: 0, groups: 0, objects: 0, shapes: 0, media: 0, own_from_world };
         self.textures.iter_mut().for_each(|texture| numbers.texture(texture));
         self.cameras.iter_mut().for_each(|camera| camera.world_from_camera = by * camera.world_from_camera);
+        if let Some((place, medium)) = self.eye {
+            self.media.push(self.media[medium.0 as usize].moved(&by));
+            self.eye = Some((by.transform_point3(place), MediumId(self.media.len() as u32 - 1)));
+        }
         self.set_up(up, is_left_handed);
         self
     }
@@ -114,6 +125,7 @@ struct Numbers {
     groups: u32,
     objects: u32,
     shapes: u32,
+    media: u32,
     /// Of textures that are asked in the frame of the world.
     own_from_world: DAffine3,
 }
@@ -125,6 +137,10 @@ fn relief_texture(relief: &mut Relief) -> &mut TextureId {
 }
 
 impl Numbers {
+    fn medium(&self, medium: MediumId) -> MediumId {
+        MediumId(medium.0 + self.media)
+    }
+
     fn grow(&self, texture: &mut TextureId) {
         texture.0 += self.textures;
     }
@@ -171,6 +187,7 @@ impl Numbers {
                 of_material(base);
                 self.all([color, roughness]);
             }
+            M::Hair { color, .. } => self.grow(color),
             M::Sum { of } => of.iter_mut().for_each(of_material),
             M::Blend { of, amount } => {
                 of.iter_mut().for_each(of_material);

@@ -1,6 +1,6 @@
 //! Shapes where they stand.
 
-use crate::{Emission, LightId, MaterialId, TriangleMesh, group::GroupParts, shape::Quadric};
+use crate::{Emission, Interface, LightId, MaterialId, TriangleMesh, group::GroupParts, shape::Quadric};
 
 /// A shape in the frame of its group.
 #[derive(Debug)]
@@ -11,6 +11,8 @@ pub(crate) struct PlacedShape {
     pub(crate) emission: Option<Emission>,
     pub(crate) is_reversed: bool,
     pub(crate) light: Option<LightId>,
+    /// The media on both sides; none where it is the same.
+    pub(crate) interface: Option<Interface>,
 }
 
 #[derive(Debug)]

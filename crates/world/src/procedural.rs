@@ -178,7 +178,7 @@ fn turbulence(p: Vec3, roughness: f32, octaves: u32) -> f32 {
 }
 
 /// Returns Perlin's noise (2002), from −1 to 1 and 0 at whole coordinates.
-fn noise(p: Vec3) -> f32 {
+pub(crate) fn noise(p: Vec3) -> f32 {
     if !(p.is_finite() && p.abs().max_element() < 1e9) {
         return 0.0;
     }
@@ -200,6 +200,13 @@ fn noise(p: Vec3) -> f32 {
     let along_x = |dy, dz| mix(hash(0, dy, dz), hash(1, dy, dz), w.x);
     let along_y = |dz| mix(along_x(0, dz), along_x(1, dz), w.y);
     mix(along_y(0), along_y(1), w.z)
+}
+
+/// Returns how fast the noise changes along x, y and z, by differences as pbrt takes them.
+pub(crate) fn noise_vector(p: Vec3) -> Vec3 {
+    const STEP: f32 = 0.01;
+    let here = noise(p);
+    Vec3::from_array(Vec3::AXES.map(|axis| (noise(p + STEP * axis) - here) / STEP))
 }
 
 /// Perlin's permutation of 0 to 255 (2002).

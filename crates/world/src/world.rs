@@ -9,8 +9,9 @@ use dioptric_spectrum::{SmoothReflectance, lanes};
 use glam::{DAffine3, DVec3, Vec2, Vec3};
 
 use crate::{
-    Bsdf, Choices, Emission, Film, GroupId, Hit, InstanceId, Light, LightSample, Material, MaterialId, Ray, Receiver,
-    Relief, Shape, ShapeId, SpectralCurve, Texture, TextureId, TriangleMesh, WorldCamera, WorldError,
+    Bsdf, Choices, Emission, Film, GroupId, Hit, InstanceId, Interface, Light, LightSample, Material, MaterialId,
+    Medium, MediumId, Ray, Receiver, Relief, Shape, ShapeId, SpectralCurve, Texture, TextureId, TriangleMesh,
+    WorldCamera, WorldError,
     group::{Crossing, Group, GroupParts, Instance, Parts, Primitive},
     lights::Lights,
     material::{Surface, Surfaces},
@@ -48,6 +49,20 @@ pub struct World {
     objects: ObjectTable,
     /// What all light is multiplied by.
     gain: f32,
+    media: Vec<Medium>,
+    /// Of each whether a surface stands between it and all lights.
+    is_closed: Vec<bool>,
+    /// What is where no surface tells.
+    surroundings: Option<MediumId>,
+}
+
+/// What a ray meets in a world with media: a surface, or a boundary between media without one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Met {
+    /// Where.
+    pub hit: Hit,
+    /// Whether there is a surface; rays go on straight through a boundary without one.
+    pub is_surface: bool,
 }
 
 pub(crate) fn front_of(up: DVec3, is_left_handed: bool) -> DVec3 {
@@ -145,6 +160,10 @@ impl World {
         if surface.material == Material::Open && surface.coverage.is_none() {
             return self.geometry.shapes[hit.shape.0 as usize].emission.is_some();
         }
+        if matches!(surface.material, Material::Hair { .. }) && hit.geometric_normal.dot(ray.direction) > 0.0 {
+            // What goes through a hair has left it where it came in.
+            return false;
+        }
         let share = self.asked().coverage(hit.material, &self.point_of(hit));
         share >= 1.0 || share > 0.0 && number_of(ray) < share
     }
@@ -179,12 +198,78 @@ impl World {
         self.asked().may_mirror(hit.material)
     }
 
-    /// Returns the share of light that is left after the way along a ray to this hit, where the shape that it lies on is
-    /// filled with an absorbing medium and was met from within; `None` for all of it.
-    pub fn transmittance<const N: usize>(&self, hit: &Hit, ray: &Ray, wavelengths_nm: &[f32; N]) -> Option<[f32; N]> {
-        let absorption = self.surfaces[hit.material.0 as usize].absorption.as_ref()?;
-        let is_within = hit.geometric_normal.dot(ray.direction) > 0.0;
-        is_within.then(|| absorption.at(wavelengths_nm).map(|per_m| (-per_m * hit.distance_m).exp()))
+    /// Whether there is anything else in space than surfaces.
+    pub fn has_media(&self) -> bool {
+        !self.media.is_empty()
+    }
+
+    /// Returns a medium.
+    pub fn medium(&self, id: MediumId) -> &Medium {
+        &self.media[id.0 as usize]
+    }
+
+    /// Whether surfaces stand between a medium and all lights that are no shapes, all around: no light that is looked for from
+    /// within is found.
+    pub fn is_closed(&self, id: MediumId) -> bool {
+        self.is_closed[id.0 as usize]
+    }
+
+    /// Returns what a ray first meets nearer than `t_max_m`: a surface as of [`intersect`](Self::intersect), or a boundary
+    /// between media.
+    pub fn meet(&self, ray: &Ray, t_max_m: f32) -> Option<Met> {
+        let (mut from, mut gone_m) = (*ray, 0.0);
+        for _ in 0..MOST_PASSED {
+            let mut hit = self.first_crossing(&from, t_max_m - gone_m)?;
+            let is_surface = self.is_there(&hit, &from);
+            let next = hit.ray_towards(ray.direction);
+            hit.distance_m += gone_m;
+            if is_surface || self.is_boundary(&hit) {
+                return Some(Met { hit, is_surface });
+            }
+            (from, gone_m) = (next, hit.distance_m);
+        }
+        None
+    }
+
+    fn find_closed_media(&mut self) {
+        let lamps = self.lights.positions();
+        let of_lamps = lamps.filter_map(|origin| self.medium_along(&Ray { origin, direction: Vec3::Z }));
+        let open_sides = self.geometry.shapes.iter().filter(|shape| self.surfaces[shape.material.0 as usize].has_gaps);
+        let of_sides = open_sides.filter_map(|shape| shape.interface).flat_map(|i| [i.inside, i.outside]).flatten();
+        let open: Vec<MediumId> = of_lamps.chain(of_sides).chain(self.surroundings).collect();
+        open.into_iter().for_each(|id| self.is_closed[id.0 as usize] = false);
+    }
+
+    fn interface(&self, hit: &Hit) -> Option<&Interface> {
+        self.geometry.shapes[hit.shape.0 as usize].interface.as_ref()
+    }
+
+    /// Whether a hit without a surface parts two media; holes of surfaces do not.
+    fn is_boundary(&self, hit: &Hit) -> bool {
+        let surface = &self.surfaces[hit.material.0 as usize];
+        surface.material == Material::Open && surface.coverage.is_none() && self.interface(hit).is_some()
+    }
+
+    /// Returns the medium that light which leaves a hit in a direction goes through, where it came through `before`.
+    pub fn medium_towards(&self, hit: &Hit, direction: Vec3, before: Option<MediumId>) -> Option<MediumId> {
+        self.interface(hit).map_or(before, |interface| interface.towards(direction, hit.geometric_normal))
+    }
+
+    /// Returns the medium that a ray begins in: by the first surface between media that it meets, whatever lies before that, or
+    /// what is around everything.
+    pub fn medium_along(&self, ray: &Ray) -> Option<MediumId> {
+        if self.media.is_empty() {
+            return None;
+        }
+        let mut from = *ray;
+        for _ in 0..MOST_PASSED {
+            let Some(hit) = self.first_crossing(&from, f32::INFINITY) else { break };
+            if let Some(interface) = self.interface(&hit) {
+                return interface.towards(-ray.direction, hit.geometric_normal);
+            }
+            from = hit.ray_towards(ray.direction);
+        }
+        self.surroundings
     }
 
     /// Returns the radiance, W m⁻² sr⁻¹ nm⁻¹, that the surface at a hit gives of itself towards `outgoing`.
@@ -539,6 +624,9 @@ pub struct WorldBuilder {
     is_up_known: bool,
     pub(crate) things: Vec<Vec<ShapeId>>,
     pub(crate) objects: Objects,
+    pub(crate) media: Vec<Medium>,
+    /// A place, and the medium that a file says is there.
+    pub(crate) eye: Option<(DVec3, MediumId)>,
 }
 
 /// A shape to be placed.
@@ -552,6 +640,8 @@ pub(crate) struct NewShape {
     pub(crate) is_reversed: bool,
     /// The object that it is part of, by number; of no account within a group.
     pub(crate) object: u32,
+    /// The media on both sides of it, where they are told.
+    pub(crate) interface: Option<Interface>,
 }
 
 /// A group to be placed.
@@ -594,6 +684,8 @@ impl WorldBuilder {
             is_up_known: false,
             things: Vec::new(),
             objects: Objects::default(),
+            media: Vec::new(),
+            eye: None,
         }
     }
 
@@ -667,22 +759,42 @@ impl WorldBuilder {
         }
     }
 
-    /// Says what the medium that fills shapes of a material takes from light, 1/m. Shapes must be closed, and their material
-    /// let light in.
-    pub fn set_absorption(&mut self, material: MaterialId, per_m: SpectralCurve) {
+    /// Adds a medium.
+    pub fn add_medium(&mut self, medium: Medium) -> MediumId {
+        self.media.push(medium);
+        MediumId(self.media.len() as u32 - 1)
+    }
+
+    /// Whether a material is hair, which is met from outside alone.
+    pub(crate) fn is_hair(&self, material: MaterialId) -> bool {
+        let surface = self.surfaces.get(material.0 as usize);
+        surface.is_some_and(|surface| matches!(surface.material, Material::Hair { .. }))
+    }
+
+    /// Says what fills shapes of a material, whatever their own [`Interface`] says of their inside. Shapes must be closed, and their
+    /// material let light in.
+    pub fn set_filling(&mut self, material: MaterialId, medium: MediumId) {
         if let Some(surface) = self.surfaces.get_mut(material.0 as usize) {
-            surface.absorption = Some(per_m);
+            surface.filling = Some(medium);
         }
     }
 
-    /// Adds a material that is another, of shapes filled with a medium that takes so much from light, 1/m; none where it lets no light in.
-    pub(crate) fn add_filled(&mut self, of: MaterialId, per_m: SpectralCurve) -> Option<MaterialId> {
-        let surface = self.surfaces.get(of.0 as usize).cloned()?;
-        if !matches!(surface.material, Material::Dielectric { .. } | Material::Glass { .. }) {
-            return None;
+    /// Says the same of a medium that takes so much from light, 1/m, and scatters none.
+    pub fn set_absorption(&mut self, material: MaterialId, per_m: SpectralCurve) {
+        let medium = self.add_medium(Medium::even(per_m, SpectralCurve::constant(0.0), 0.0));
+        self.set_filling(material, medium);
+    }
+
+    /// Says which media are on both sides of a shape.
+    pub fn set_interface(&mut self, shape: ShapeId, interface: Interface) {
+        if let Some(shape) = self.shapes.get_mut(shape.0 as usize) {
+            shape.interface = Some(interface);
         }
-        self.surfaces.push(Surface { absorption: Some(per_m), ..surface });
-        Some(MaterialId(self.surfaces.len() as u32 - 1))
+    }
+
+    /// Says which medium is around a place, such as a camera's: where no shape holds it, it is that around everything.
+    pub fn set_medium_at(&mut self, place: DVec3, medium: MediumId) {
+        self.eye = Some((place, medium));
     }
 
     /// Stands a shape in the world.
@@ -707,7 +819,16 @@ impl WorldBuilder {
     ) -> ShapeId {
         let object = if group == GroupId::ROOT { self.objects.of_next(shape.word()) } else { 0 };
         let shape = Arc::new(shape);
-        self.shapes.push(NewShape { shape, place, group, material, emission, is_reversed: false, object });
+        self.shapes.push(NewShape {
+            shape,
+            place,
+            group,
+            material,
+            emission,
+            is_reversed: false,
+            object,
+            interface: None,
+        });
         ShapeId(self.shapes.len() as u32 - 1)
     }
 
@@ -853,6 +974,11 @@ impl WorldBuilder {
         let objects = ObjectTable::new(objects, of_shapes, instances.iter().map(|instance| instance.object));
         let (notes, sources) = (self.notes.sentences(), self.sources);
         let mut placed: Vec<PlacedShape> = shapes.into_iter().map(NewShape::placed).collect();
+        for shape in &mut placed {
+            let Interface { inside, outside } = shape.interface.unwrap_or(Interface { inside: None, outside: None });
+            let inside = surfaces[shape.material.0 as usize].filling.or(inside);
+            shape.interface = (inside != outside).then_some(Interface { inside, outside });
+        }
         let instances: Vec<Instance> = instances
             .into_iter()
             .map(|NewInstance { group, place, .. }| Instance { group: group.0, place, inverse: place.inverse() })
@@ -876,7 +1002,7 @@ impl WorldBuilder {
         let lights = Lights::new(lights.into_iter().map(|new| new.light).collect(), &mut placed);
         let geometry = Geometry { shapes: placed, instances, groups };
         let has_gaps = geometry.shapes.iter().any(|shape| surfaces[shape.material.0 as usize].has_gaps);
-        Ok(World {
+        let mut world = World {
             geometry,
             surfaces,
             textures,
@@ -891,7 +1017,19 @@ impl WorldBuilder {
             patterned,
             objects,
             gain: 1.0,
-        })
+            is_closed: vec![true; self.media.len()],
+            media: self.media,
+            surroundings: None,
+        };
+        if let Some((place, medium)) = self.eye {
+            // What a closed shape holds ends there.
+            let ray = |direction: Vec3| Ray { origin: place.as_vec3(), direction };
+            let is_held = |direction: Vec3| world.medium_along(&ray(direction)) == Some(medium);
+            let is_bounded = [Vec3::X, Vec3::Y, Vec3::Z].into_iter().all(|axis| is_held(axis) && is_held(-axis));
+            world.surroundings = (!is_bounded).then_some(medium);
+        }
+        world.find_closed_media();
+        Ok(world)
     }
 
     fn check(&mut self) -> Result<(), WorldError> {
@@ -938,6 +1076,12 @@ impl WorldBuilder {
         for shape in self.things.iter().flatten() {
             named("a thing", "shape", shape.0, self.shapes.len())?;
         }
+        self.media.iter().try_for_each(Medium::check)?;
+        let sides = self.shapes.iter().filter_map(|shape| shape.interface).flat_map(Interface::sides);
+        let fillings = self.surfaces.iter().filter_map(|surface| surface.filling);
+        for medium in sides.chain(fillings).chain(self.eye.map(|(_, medium)| medium)) {
+            named("a shape", "medium", medium.0, self.media.len())?;
+        }
         // Textures are made of earlier ones, so that none is made of itself, and aren't nested too deep for a stack.
         let mut depths = vec![0; self.textures.len()];
         for (index, texture) in self.textures.iter().enumerate() {
@@ -974,6 +1118,7 @@ impl NewShape {
             emission: self.emission,
             is_reversed: self.is_reversed,
             light: None,
+            interface: self.interface,
         }
     }
 }

@@ -63,32 +63,105 @@ fn small_world_is_what_it_says() {
 }
 
 /// A part of a picture and words of cameras that are not known are reported; the whole as a part, and names of files, are not.
-/// A ball of glass filled with a dye: a ray through its middle is left exp(−σ d), by the file's unit; milk and open shells are noted.
+/// A ball of glass filled with a dye: a ray through its middle is left exp(−σ d), by the file's unit.
 #[test]
-fn media_that_absorb_alone_fill_glass() {
+fn media_fill_what_they_are_in() {
     let text = "WorldBegin\nMakeNamedMedium \"dye\" \"string type\" \"homogeneous\" \"spectrum sigma_a\" [400 3 700 3] \"rgb sigma_s\" [0 0 0] \"float scale\" 2\n\
                 MakeNamedMedium \"ink\" \"string type\" \"homogeneous\" \"rgb sigma_a\" [1 4 4] \"rgb sigma_s\" [0 0 0]\n\
-                MakeNamedMedium \"milk\" \"string type\" \"homogeneous\" \"rgb sigma_a\" [1 1 1]\n\
                 Material \"dielectric\"\nMediumInterface \"dye\" \"\"\nShape \"sphere\" \"float radius\" .1\n\
-                AttributeBegin\nMediumInterface \"ink\" \"\"\nTranslate 1 0 0\nShape \"sphere\" \"float radius\" .1\nAttributeEnd\n\
-                Material \"diffuse\"\nTranslate 3 0 0\nShape \"sphere\"\n";
+                AttributeBegin\nMediumInterface \"ink\" \"\"\nTranslate 1 0 0\nShape \"sphere\" \"float radius\" .1\nAttributeEnd\n";
     let world = read_text(text).unwrap();
     let left = |x: f32, nm: f32| {
         let ray = Ray { origin: Vec3::new(x, 0.0, 0.0), direction: Vec3::Z };
         let wall = world.intersect(&ray, f32::INFINITY).unwrap();
-        world.transmittance(&wall, &ray, &[nm]).map_or(1.0, |left| left[0])
+        let of = |medium| world.medium(medium).absorption.at(&[nm])[0];
+        (-world.medium_along(&ray).map_or(0.0, of) * wall.distance_m).exp()
     };
     assert!((left(0.0, 550.0) - (-6.0_f32 * 0.1).exp()).abs() < 1e-5, "{}", left(0.0, 550.0));
     // A color says but roughly what is left of each wavelength.
     let [red, blue] = [left(1.0, 650.0), left(1.0, 450.0)];
     assert!((red - (-0.1_f32).exp()).abs() < 0.03 && (blue - (-0.4_f32).exp()).abs() < 0.03, "{red} {blue}");
-    assert_eq!(left(3.0, 550.0), 1.0);
+    assert!(world.notes().is_empty(), "{:?}", world.notes());
+}
+
+/// Coefficients, presets and grids of media are those that the file says, in metres; what is none is left out by name.
+#[test]
+fn media_are_even_or_in_grids() {
+    let grid = "\"integer nx\" 2 \"float density\" [1 3] \"point3 p0\" [-1 -1 -1] \"point3 p1\" [1 1 1]";
+    let text = format!(
+        "MakeNamedMedium \"fog\" \"string type\" \"homogeneous\" \"rgb sigma_a\" [0 0 0] \"float sigma_s\" 2 \"float g\" .5\n\
+         MakeNamedMedium \"milk\" \"string type\" \"homogeneous\" \"string preset\" \"Wholemilk\" \"float scale\" 1000\n\
+         MakeNamedMedium \"smoke\" \"string type\" \"uniformgrid\" {grid} \"spectrum sigma_s\" [400 5 700 5]\n\
+         MakeNamedMedium \"old\" \"string type\" \"heterogeneous\" {grid} \"rgb sigma_s\" [4 4 4]\n\
+         MakeNamedMedium \"short\" \"string type\" \"uniformgrid\" \"integer nx\" 3 \"float density\" [1 3]\n\
+         MakeNamedMedium \"vdb\" \"string type\" \"nanovdb\" \"string filename\" \"a.nvdb\"\n\
+         MediumInterface \"\" \"fog\"\nCamera \"perspective\"\nWorldBegin\nMaterial \"interface\"\n\
+         MediumInterface \"milk\" \"fog\"\nShape \"sphere\" \"float radius\" 1\nTranslate 5 0 0\n\
+         MediumInterface \"smoke\" \"fog\"\nShape \"sphere\" \"float radius\" 1\nTranslate 5 0 0\n\
+         MediumInterface \"old\" \"fog\"\nShape \"sphere\" \"float radius\" 1\n"
+    );
+    let world = read_text(&text).unwrap();
+    let ray = |x: f32| Ray { origin: Vec3::new(x, 0.0, 0.0), direction: Vec3::Z };
+    let at = |x: f32| {
+        let medium = world.medium(world.medium_along(&ray(x)).expect("a medium"));
+        (medium.at(Vec3::new(x, 0.0, 0.0), &[450.0, 650.0]), medium.asymmetry)
+    };
+    // Around everything, and in view of what it is around.
+    for x in [-30.0, 3.0] {
+        let (fog, g) = at(x);
+        assert_eq!((fog.absorption, fog.scattering, g), ([0.0; 2], [2.0; 2], 0.5));
+    }
+    let (milk, _) = at(0.0);
+    // Smooth spectra of the three numbers.
+    assert!((milk.scattering[0] - 3770.0).abs() < 200.0 && (2550.0..3210.0).contains(&milk.scattering[1]), "{milk:?}");
+    assert!(milk.absorption[0] > 5.0 * milk.absorption[1] && milk.absorption[1] > 0.0, "{milk:?}");
+    // Its box is the file's where it is named, whatever it fills.
+    assert_eq!(at(5.0).0.scattering, [0.0; 2]);
+    let smoke = world.medium(world.medium_along(&ray(5.0)).unwrap());
+    let densities = [-0.5, 0.0, 0.5].map(|x| smoke.at(Vec3::new(x, 0.0, 0.0), &[550.0]).scattering[0]);
+    assert_eq!(densities, [5.0, 10.0, 15.0]);
+    let old = world.medium(world.medium_along(&ray(10.0)).unwrap()).at(Vec3::ZERO, &[550.0]);
+    assert!((old.scattering[0] - 8.0).abs() < 1e-3, "{old:?}");
+    // Nothing is met where there is no surface.
+    assert!(world.intersect(&ray(0.0), f32::INFINITY).is_none() && !world.is_occluded(&ray(0.0), 9.0));
     let notes = world.notes().join("\n");
     assert!(
-        notes.contains("glow, left out: space is clear: milk")
-            && notes.contains("aren't of glass; they are clear: dye"),
+        notes.contains("grid is none, left out: space is clear: short (") && notes.contains("vdb (nanovdb)"),
         "{notes}"
     );
+}
+
+/// What is below a surface fills its shapes: by coefficients in the file's unit, by a substance, or so that it sends back the color told.
+#[test]
+fn what_is_below_a_surface_scatters_light() {
+    let below = |params: &str| {
+        let text = format!("WorldBegin\nMaterial {params}\nShape \"sphere\"\n");
+        let world = read_text(&text).unwrap();
+        assert!(world.notes().is_empty(), "{:?}", world.notes());
+        let inside = Ray { origin: Vec3::ZERO, direction: Vec3::Z };
+        let outside = Ray { origin: Vec3::new(0.0, 0.0, -3.0), direction: Vec3::Z };
+        assert!(world.medium_along(&outside).is_none() && world.intersect(&outside, 9.0).is_some());
+        let medium = world.medium(world.medium_along(&inside).expect("a medium"));
+        (medium.at(Vec3::ZERO, &[450.0, 550.0, 650.0]), medium.asymmetry)
+    };
+    let (own, g) = below(
+        "\"subsurface\" \"spectrum sigma_a\" [400 1 700 1] \"spectrum sigma_s\" [400 9 700 9] \"float scale\" 10 \"float g\" .8",
+    );
+    assert_eq!((own.absorption, own.scattering, g), ([10.0; 3], [90.0; 3], 0.8));
+    let (skin, _) = below("\"subsurface\" \"string name\" \"Skin1\" \"float scale\" 1000");
+    // The mean of 0.17 and what is beside it, per mm.
+    assert!((skin.absorption[1] - 170.0).abs() < 60.0 && skin.absorption[0] > 2.0 * skin.absorption[2], "{skin:?}");
+    // Light that is sent back more is absorbed less, whatever way it is scattered.
+    let albedo = |kd: f64, g: f64| {
+        let kd = format!("\"kdsubsurface\" \"spectrum Kd\" [400 {kd} 700 {kd}] \"float mfp\" .01 \"float g\" {g}");
+        let of = below(&kd).0;
+        assert!((of.absorption[0] + of.scattering[0] - 100.0).abs() < 1e-3, "{of:?}");
+        of.scattering[0] / 100.0
+    };
+    let albedos = [0.1, 0.4, 0.8, 0.99].map(|kd| albedo(kd, 0.0));
+    assert!(albedos.is_sorted() && albedos[0] > 0.5 && albedos[3] > 0.999 && albedos[3] < 1.0, "{albedos:?}");
+    let of_forward = albedo(0.4, 0.7);
+    assert!((of_forward * 0.3 / (1.0 - 0.7 * of_forward) - albedos[1]).abs() < 1e-4, "{of_forward}");
 }
 
 /// Curves of one material are one mesh, met where they are; hair has the color of its pigment.
@@ -101,7 +174,7 @@ fn curves_are_met_and_hair_is_brown() {
     let world = read_text(text).unwrap();
     assert_eq!(world.n_primitives(), 24);
     let notes = world.notes().join("\n");
-    assert!(notes.contains("hair") && notes.contains("a curve of 3 points"), "{notes}");
+    assert!(notes.contains("a curve of 3 points") && !notes.contains("hair"), "{notes}");
     for x in [0.0, 2.0] {
         let found = hit(&world, [x, 0.0, -5.0], [0.0, 0.0, 1.0]).unwrap();
         assert!((found.distance_m - 4.9).abs() < 0.015, "{}", found.distance_m);

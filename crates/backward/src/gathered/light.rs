@@ -150,12 +150,7 @@ impl<const N: usize> Gatherer<'_, N> {
                 let ([u_lobe, _], u) = (random.pair(GLOSS_LOBE_PAIR), random.pair(GLOSS_PAIR));
                 let Some(drawn) = gloss.sample(u_lobe, u) else { continue };
                 let density = drawn.pdf * n_gloss as f32 / n_lights.max(1) as f32;
-                let path = Path {
-                    ray: hit.ray_towards(drawn.incident),
-                    throughput: [1.0; N],
-                    scattered: Some((receiver, density)),
-                    n_scatterings: 1,
-                };
+                let path = Path::new(self.world, hit.ray_towards(drawn.incident), Some((receiver, density)), 1);
                 let found = self.integrator().follow(path, self.wavelengths_nm, &random);
                 let share = 1.0 / n_gloss as f32;
                 (0..N).for_each(|lane| sum.gloss[lane] += share * drawn.weight[lane] * found[lane].min(self.most));
@@ -183,12 +178,7 @@ impl<const N: usize> Gatherer<'_, N> {
                 continue;
             }
             // Lights have been looked for: what glows does not count again.
-            let path = Path {
-                ray: hit.ray_towards(direction),
-                throughput: [1.0; N],
-                scattered: Some((receiver, HARDLY)),
-                n_scatterings: 1,
-            };
+            let path = Path::new(self.world, hit.ray_towards(direction), Some((receiver, HARDLY)), 1);
             let found = self.integrator().follow(path, self.wavelengths_nm, &random);
             let share = PI * bsdf.diffuse_weight(direction) / rays.n_bounces as f32;
             (0..N).for_each(|lane| sum[lane] += share * found[lane].min(self.most));

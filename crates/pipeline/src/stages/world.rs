@@ -148,7 +148,8 @@ pub(super) fn view(
         layer: 0,
     };
     let is_rough = !is_forward || geometry.quality != Quality::Full || spec.is_still_life();
-    let mut layers = match is_rough && spec.paths == LightPaths::Full {
+    let is_gathered = is_rough && spec.paths == LightPaths::Full;
+    let mut layers = match is_gathered {
         true => {
             let is_fine = is_forward && geometry.quality >= Quality::Draft;
             let picture = GatheredPicture {
@@ -174,7 +175,9 @@ pub(super) fn view(
     };
     let (first_nm, last_nm) = first.radiance.grid().range_nm();
     let of_level = world.notes().last().filter(|_| world.gain() != 1.0).cloned();
-    let notes = world.note_on_bands(first_nm, last_nm).into_iter().chain(of_level);
+    let without_media = "media are left out of quick views: glass is clear, and fog and smoke are away";
+    let of_media = (is_gathered && world.has_media()).then(|| without_media.to_owned());
+    let notes = world.note_on_bands(first_nm, last_nm).into_iter().chain(of_level).chain(of_media);
     let notes = notes.map(|note| format!("{name}: {note}")).collect();
     let scene =
         Scene { depth: Some(first.depth), view: Some(view), hidden, light, notes, ..Scene::new(name, first.radiance) };

@@ -66,6 +66,7 @@ impl<const N: usize> Bsdf<N> {
                     Lobe::Diffuse { reflectance: [0.0; N], transmittance }
                 }
                 Lobe::Velvet { .. }
+                | Lobe::Hair(_)
                 | Lobe::Mirror { rough: Some(_), .. }
                 | Lobe::Glossy { rough: Some(_), .. }
                 | Lobe::Metal { rough: Some(_), .. }
@@ -140,6 +141,7 @@ impl<const N: usize> Bsdf<N> {
                 | Lobe::Coated { .. }
                 | Lobe::Layered { .. }
                 | Lobe::Filmed { .. }
+                | Lobe::Hair(_)
                 | Lobe::Substrate { .. } => {}
             }
         }
@@ -180,6 +182,7 @@ impl<const N: usize> Lobe<N> {
             | Self::Pane { .. }
             | Self::Dielectric { .. }
             | Self::Velvet { .. }
+            | Self::Hair(_)
             | Self::Open => [0.0; N],
         }
     }

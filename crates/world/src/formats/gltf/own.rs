@@ -12,7 +12,7 @@ use super::{
     local,
 };
 use crate::{
-    Emission, Encoding, Film, ImageTexture, Light, Material, MaterialId, Relief, Shape, SpectralCurve, Texture,
+    Emission, Encoding, Film, ImageTexture, Light, Material, MaterialId, Medium, Relief, Shape, SpectralCurve, Texture,
     TextureId, WorldCamera, WorldError, Wrap,
 };
 
@@ -27,8 +27,9 @@ struct Surface {
     relief: Option<Relief>,
     coverage: Option<TextureId>,
     glow: Option<TextureId>,
-    absorption: Option<SpectralCurve>,
+    filling: Option<(SpectralCurve, SpectralCurve, f32)>,
     turn_rad: f32,
+    directions: Option<TextureId>,
     behind: Option<[TextureId; 2]>,
     film: Option<Film>,
 }
@@ -68,7 +69,8 @@ impl Reader<'_> {
         }
         let surfaces: Vec<Surface> = self.parsed(own, "materials")?;
         for surface in surfaces {
-            let Surface { name, material, relief, coverage, glow, absorption, turn_rad, behind, film } = surface;
+            let Surface { name, material, relief, coverage, glow, filling, turn_rad, directions, behind, film } =
+                surface;
             let id = self.builder.add_material_with(&name, material, relief);
             if let Some(coverage) = coverage {
                 self.builder.set_coverage(id, coverage);
@@ -76,8 +78,12 @@ impl Reader<'_> {
             if let Some(glow) = glow {
                 self.builder.set_glow(id, glow);
             }
-            if let Some(absorption) = absorption {
-                self.builder.set_absorption(id, absorption);
+            if let Some((absorption, scattering, asymmetry)) = filling {
+                let medium = self.builder.add_medium(Medium::even(absorption, scattering, asymmetry));
+                self.builder.set_filling(id, medium);
+            }
+            if let Some(directions) = directions {
+                self.builder.set_directions(id, directions);
             }
             if let Some([share, color]) = behind {
                 self.builder.set_behind(id, share, color);

@@ -17,10 +17,11 @@ const MOST_POINTS: usize = 1 << 20;
 
 /// Adds a curve to a mesh: a tube whose perimeter is that of the round one, so that its area, and the width at which it is seen on
 /// average, are those of the curve; of the type `ribbon` a band across its normals.
-pub(super) fn add(mesh: &mut TriangleMesh, params: &Params<'_>) -> Result<(), String> {
+pub(super) fn add(mesh: &mut TriangleMesh, params: &Params<'_>, is_hair: bool) -> Result<(), String> {
     let is_spline = params.choice("basis", &["bezier", "bspline"]) == Some(1);
     let degree = params.within("degree", [2.0, 3.0]).map_or(3, |degree| degree as usize);
-    let is_ribbon = params.choice("type", &["flat", "cylinder", "ribbon"]) == Some(2);
+    // Hair is round, whichever way it is turned.
+    let is_ribbon = params.choice("type", &["flat", "cylinder", "ribbon"]) == Some(2) && !is_hair;
     // How finely the ray tracer of pbrt cuts it.
     params.find("splitdepth");
     let width = params.within("width", [0.0, f64::MAX]).unwrap_or(1.0);
@@ -132,7 +133,7 @@ mod tests {
 
     fn mesh(text: &str) -> Result<TriangleMesh, String> {
         let mut mesh = TriangleMesh::default();
-        add(&mut mesh, &Params::read(&mut Tokens::new(text))?)?;
+        add(&mut mesh, &Params::read(&mut Tokens::new(text))?, false)?;
         mesh.check().unwrap();
         Ok(mesh)
     }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::{Fault, Reader, Version, params::Params, spectra::SpectrumUse};
 use crate::{
     Encoding, ImageTexture, Material, MaterialId, MetalKind, Relief, Roughness, RoughnessLaw, SpectralCurve, Texture,
-    TextureId, UvMapping, Wrap,
+    TextureId, UvMapping, Wrap, hair::color_factor,
 };
 
 impl Reader<'_> {
@@ -13,6 +13,7 @@ impl Reader<'_> {
     pub(super) fn material(&mut self, name: &str, kind: &str, params: &Params<'_>) -> Result<MaterialId, Fault> {
         let color = |reader: &mut Self, names: &[&str], default: f32| reader.part(params, names, false, default);
         let is_fourth = self.version == Version::Four;
+        let mut filling = None;
         let material = match kind {
             "matte" | "diffuse" => {
                 let reflectance = color(self, &["Kd", "reflectance"], 0.5)?;
@@ -37,13 +38,7 @@ impl Reader<'_> {
             "uber" => return self.uber(name, params),
             "glass" | "dielectric" => {
                 let (index, roughness) = (self.index(params, 1.5)?, self.roughness(params, 0.0, true)?);
-                match (self.part_if_any(params, &["Kr"], false)?, self.part_if_any(params, &["Kt"], false)?) {
-                    (None, None) => Material::Dielectric { index, roughness },
-                    (kr, kt) => {
-                        let [reflectance, transmittance] = [kr, kt].map(|k| k.unwrap_or_else(|| self.even(1.0)));
-                        Material::Glass { reflectance, transmittance, index, roughness }
-                    }
-                }
+                self.glass(params, index, roughness)?
             }
             "thindielectric" => Material::Pane { index: self.index(params, 1.5)? },
             "mirror" => Material::Mirror { reflectance: color(self, &["Kr"], 0.9)?, roughness: None },
@@ -59,10 +54,21 @@ impl Reader<'_> {
                     .map(|part| self.builder.add_texture(Texture::Product([part, scale])));
                 Material::Translucent { reflectance, transmittance }
             }
+            "subsurface" | "kdsubsurface" => {
+                let (index, roughness) = (self.index(params, 1.33)?, self.roughness(params, 0.0, true)?);
+                filling = Some(self.below_surface(name, params, &index)?);
+                self.glass(params, index, roughness)?
+            }
             "mix" => self.mix(params)?,
             "hair" => {
-                self.builder.note_of("materials of kind 'hair': matte of the color that much of it has", name);
-                Material::Matte { reflectance: self.hair_color(params)? }
+                let number =
+                    |name: &str, most: f64, default: f64| params.within(name, [0.0, most]).unwrap_or(default) as f32;
+                Material::Hair {
+                    color: self.hair_color(params)?,
+                    roughness: [number("beta_m", 1.0, 0.3), number("beta_n", 1.0, 0.3)],
+                    tilt_deg: params.within("alpha", [-90.0, 90.0]).unwrap_or(2.0) as f32,
+                    index: params.within("eta", [1.0, 10.0]).unwrap_or(1.55) as f32,
+                }
             }
             "" | "none" | "interface" => Material::Open,
             _ => {
@@ -79,7 +85,22 @@ impl Reader<'_> {
             self.builder.note_of(&sentence, name);
         }
         let relief = self.relief(params)?;
-        Ok(self.builder.add_material_with(name, material, relief))
+        let id = self.builder.add_material_with(name, material, relief);
+        if let Some(filling) = filling {
+            self.builder.set_filling(id, filling);
+        }
+        Ok(id)
+    }
+
+    /// A boundary, whose light is colored where that is told.
+    fn glass(&mut self, params: &Params<'_>, index: SpectralCurve, roughness: Roughness) -> Result<Material, Fault> {
+        Ok(match (self.part_if_any(params, &["Kr"], false)?, self.part_if_any(params, &["Kt"], false)?) {
+            (None, None) => Material::Dielectric { index, roughness },
+            (kr, kt) => {
+                let [reflectance, transmittance] = [kr, kt].map(|k| k.unwrap_or_else(|| self.even(1.0)));
+                Material::Glass { reflectance, transmittance, index, roughness }
+            }
+        })
     }
 
     fn even(&mut self, value: f32) -> TextureId {
@@ -240,8 +261,8 @@ impl Reader<'_> {
     /// Returns the color of light that many hairs have scattered, by Chiang & al. (2016), whose inverse is how pbrt makes a hair's absorption of it.
     fn hair_color(&mut self, params: &Params<'_>) -> Result<TextureId, Fault> {
         let rough = params.within("beta_n", [0.0, 1.0]).unwrap_or(0.3);
-        let factor = 5.969 + rough * (-0.215 + rough * (2.532 + rough * (-10.73 + rough * (5.574 + rough * 0.245))));
-        let left = |per_radius: f32| (-per_radius.max(0.0).sqrt() * factor as f32).exp();
+        let factor = color_factor(rough as f32);
+        let left = |per_radius: f32| (-per_radius.max(0.0).sqrt() * factor).exp();
         if let Some(param) = params.find("sigma_a") {
             let curve = match (param.kind, param.numbers.as_slice()) {
                 ("rgb" | "color", &[r, g, b]) => {

@@ -11,6 +11,7 @@ mod media;
 mod params;
 mod shapes;
 mod spectra;
+mod substances;
 mod surfaces;
 mod textures;
 mod tokens;
@@ -33,7 +34,8 @@ use self::{
 };
 use super::read_bytes;
 use crate::{
-    GroupId, Material, MaterialId, Shape, SpectralCurve, Texture, TextureId, TriangleMesh, WorldBuilder, WorldError,
+    GroupId, Material, MaterialId, MediumId, Shape, SpectralCurve, Texture, TextureId, TriangleMesh, WorldBuilder,
+    WorldError,
 };
 
 /// The most bytes that a file and all that it includes may have.
@@ -70,6 +72,7 @@ pub(super) fn read(path: &Path, metres_per_unit: f64, cancel: &Cancel) -> Result
     let mut reader = Reader::new(path, metres_per_unit, cancel);
     reader.read_file(path, 0)?;
     reader.end_curves();
+    reader.set_medium_of_eye();
     Ok(reader.builder)
 }
 
@@ -106,11 +109,12 @@ struct Attributes {
     material: MaterialId,
     glow: Option<lights::Glow>,
     is_reversed: bool,
-    /// The medium that fills shapes.
+    /// The media that fill shapes, and that are around them.
     inside: String,
     /// What a comment of ISET's calls the shapes, and the name of their material.
     name: Option<Arc<str>>,
     material_name: Option<Arc<str>>,
+    outside: String,
 }
 
 struct Reader<'c> {
@@ -133,9 +137,10 @@ struct Reader<'c> {
     object: Option<GroupId>,
     /// Materials of which a part is there, by the bits of a number or the number of a texture.
     covered: HashMap<(MaterialId, Coverage), MaterialId>,
-    /// What media that absorb alone take from light, 1/m, none of others; and materials that are filled with one.
-    media: HashMap<String, Option<SpectralCurve>>,
-    filled: HashMap<(MaterialId, String), MaterialId>,
+    /// Media by their names; none where it is left out.
+    media: HashMap<String, Option<MediumId>>,
+    /// Where the camera is, in units of the file, and the name of the medium around it.
+    eye: Option<(DVec3, String)>,
     /// Curves of one material and place, which are one mesh.
     curves: Option<(Attributes, MaterialId, TriangleMesh)>,
     cancel: &'c Cancel,
@@ -162,6 +167,7 @@ impl<'c> Reader<'c> {
             inside: String::new(),
             name: None,
             material_name: None,
+            outside: String::new(),
         };
         Self {
             builder,
@@ -182,7 +188,7 @@ impl<'c> Reader<'c> {
             object: None,
             covered: HashMap::new(),
             media: HashMap::new(),
-            filled: HashMap::new(),
+            eye: None,
             curves: None,
             cancel,
         }
@@ -326,7 +332,11 @@ impl<'c> Reader<'c> {
         match directive {
             "Camera" => {
                 self.camera.set_camera(kind, &params, self.attributes.place);
-                self.places.insert("camera".to_owned(), self.attributes.place.inverse());
+                let world_from_camera = self.attributes.place.inverse();
+                self.places.insert("camera".to_owned(), world_from_camera);
+                if world_from_camera.is_finite() {
+                    self.eye = Some((world_from_camera.translation, self.attributes.outside.clone()));
+                }
             }
             "Film" => {
                 if !matches!(kind, "rgb" | "gbuffer" | "spectral" | "image") {
@@ -353,15 +363,7 @@ impl<'c> Reader<'c> {
             "ColorSpace" if kind != "srgb" => {
                 self.builder.note(format!("ColorSpace \"{kind}\": colors are taken as sRGB"));
             }
-            "MakeNamedMedium" => {
-                let absorption = self.absorption(&params)?;
-                let is_clear = absorption.is_none();
-                self.media.insert(kind.to_owned(), absorption);
-                if is_clear {
-                    self.builder.note_of("media that scatter light or glow, left out: space is clear", kind);
-                    return Ok(());
-                }
-            }
+            "MakeNamedMedium" if !self.named_medium(kind, &params)? => return Ok(()),
             "Volume" | "Attribute" => {
                 self.builder.note_of(&format!("{directive}: not supported, left out"), kind);
                 return Ok(());
@@ -409,7 +411,8 @@ impl<'c> Reader<'c> {
         let Some((attributes, material, mesh)) = self.curves.take() else { return };
         let place = DAffine3::from_scale(DVec3::splat(self.metres_per_unit)) * attributes.place;
         let group = self.object.unwrap_or(GroupId::ROOT);
-        self.builder.add_shape_to(group, Shape::Mesh(mesh), place, material, None);
+        let id = self.builder.add_shape_to(group, Shape::Mesh(mesh), place, material, None);
+        self.set_interface(id, [&attributes.inside, &attributes.outside]);
     }
 
     fn include(&mut self, name: &str, depth: usize) -> Result<(), Fault> {

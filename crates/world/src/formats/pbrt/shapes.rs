@@ -80,7 +80,6 @@ impl Reader<'_> {
             glow.of_faces(&faces.per_square_unit(self.metres_per_unit))
         });
         let material = self.material_of_shape(params, emission.is_some())?;
-        let material = self.filled(material);
         let group = self.object.unwrap_or(GroupId::ROOT);
         let stem =
             |file: &'_ str| std::path::Path::new(file).file_stem().map(|stem| stem.to_string_lossy().into_owned());
@@ -93,6 +92,8 @@ impl Reader<'_> {
         if self.attributes.is_reversed {
             self.builder.reverse(id);
         }
+        let [inside, outside] = [self.attributes.inside.clone(), self.attributes.outside.clone()];
+        self.set_interface(id, [&inside, &outside]);
         Ok(())
     }
 }
@@ -110,7 +111,7 @@ impl Reader<'_> {
         }
         let attributes = &self.attributes;
         let (_, _, mesh) = self.curves.get_or_insert_with(|| (attributes.clone(), material, TriangleMesh::default()));
-        if let Err(reason) = curves::add(mesh, params) {
+        if let Err(reason) = curves::add(mesh, params, self.builder.is_hair(material)) {
             self.builder.note_of("curves that are none, left out", &reason);
         }
         Ok(())

@@ -16,7 +16,7 @@ use serde_json::{Map, Value, json};
 
 use super::Written;
 use crate::{
-    CameraKind, Coordinates, Emission, GroupId, ImageTexture, Light, Material, MaterialId, Relief, Shape,
+    CameraKind, Coordinates, Emission, GroupId, ImageTexture, Light, Material, MaterialId, MediumId, Relief, Shape,
     SpectralCurve, Texture, TextureId, TriangleMesh, UvMapping, WorldBuilder, WorldCamera, WorldError, Wrap,
     formats::gltf::{GENERATOR, LUMENS_PER_WATT},
     world::NewShape,
@@ -125,12 +125,28 @@ impl<'a> Writer<'a> {
         }
     }
 
+    /// Returns what an even medium takes and scatters, 1/m, and its asymmetry.
+    fn filling(&mut self, medium: MediumId) -> Option<(SpectralCurve, SpectralCurve, f32)> {
+        let medium = &self.builder.media[medium.0 as usize];
+        match medium.is_even() && medium.glow.is_none() {
+            true => Some((medium.absorption.clone(), medium.scattering.clone(), medium.asymmetry)),
+            false => {
+                self.losses.insert("media that glow or differ from place to place: left out".to_owned());
+                None
+            }
+        }
+    }
+
     fn root(&mut self, scene: Vec<usize>) -> Result<Value, String> {
         let mut root = json!({
             "asset": { "version": "2.0", "generator": GENERATOR },
             "scene": 0,
             "scenes": [{ "nodes": scene }],
         });
+        if self.builder.shapes.iter().any(|shape| shape.interface.is_some()) {
+            self.losses
+                .insert("media that shapes part, but for what fills them by their material: left out".to_owned());
+        }
         if self.has_extras {
             let textures =
                 self.builder.textures.iter().map(|texture| self.own_texture(texture)).collect::<Result<Vec<_>, _>>()?;
@@ -142,8 +158,9 @@ impl<'a> Writer<'a> {
                     "relief": own(&surface.relief)?,
                     "coverage": own(&surface.coverage)?,
                     "glow": own(&surface.glow)?,
-                    "absorption": own(&surface.absorption)?,
+                    "filling": own(&surface.filling.and_then(|medium| self.filling(medium)))?,
                     "turn_rad": surface.turn_rad,
+                    "directions": own(&surface.directions)?,
                     "behind": own(&surface.behind)?,
                     "film": own(&surface.film)?,
                 }));
@@ -662,6 +679,11 @@ impl<'a> Writer<'a> {
                 put(color, 0.0, 1.0);
                 self.extensions.insert("KHR_materials_specular");
                 words["extensions"]["KHR_materials_specular"] = json!({ "specularFactor": 0.0 });
+            }
+            M::Hair { color, .. } => {
+                other(self, "hair");
+                let color = self.color(*color);
+                put(color, 0.0, 1.0);
             }
             M::Translucent { reflectance, .. } => {
                 other(self, "translucent");

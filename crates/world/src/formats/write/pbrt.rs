@@ -1,7 +1,7 @@
 //! Worlds as files of pbrt's 4th version.
 
 use std::{
-    collections::{BTreeSet, HashMap},
+    collections::{BTreeSet, HashMap, HashSet},
     fmt::Write,
     path::{Path, PathBuf},
     sync::Arc,
@@ -12,9 +12,10 @@ use image::ImageFormat;
 
 use super::Written;
 use crate::{
-    Beyond, CameraKind, Coordinates, Emission, Encoding, FallOff, GroupId, ImageTexture, Layout, Light, Material,
-    MaterialId, NoiseKind, Procedural, Relief, Roughness, RoughnessLaw, Shape, SkyImage, SkyMapping, SpectralCurve,
-    Texture, TextureId, TriangleMesh, UvMapping, WorldBuilder, WorldCamera, WorldError, Wrap, world::NewShape,
+    Beyond, CameraKind, Coordinates, Emission, Encoding, FallOff, GroupId, ImageTexture, Interface, Layout, Light,
+    Material, MaterialId, MediumId, NoiseKind, Procedural, Relief, Roughness, RoughnessLaw, Shape, SkyImage,
+    SkyMapping, SpectralCurve, Texture, TextureId, TriangleMesh, UvMapping, WorldBuilder, WorldCamera, WorldError,
+    Wrap, world::NewShape,
 };
 
 /// Meshes of more triangles are files of their own.
@@ -32,6 +33,7 @@ pub(super) fn written(builder: &WorldBuilder, path: &Path) -> Result<Written, Wo
         beside: format!("{stem}_files"),
         files: Vec::new(),
         losses: BTreeSet::new(),
+        media: HashSet::new(),
         pictures: HashMap::new(),
         meshes: HashMap::new(),
         textures: HashMap::new(),
@@ -55,6 +57,8 @@ struct Writer<'a> {
     beside: String,
     files: Vec<(PathBuf, Vec<u8>)>,
     losses: BTreeSet<String>,
+    /// Media that have been written.
+    media: HashSet<MediumId>,
     /// Pictures by where they are in memory, with their names.
     pictures: HashMap<usize, (String, Encoding)>,
     meshes: HashMap<usize, String>,
@@ -161,8 +165,12 @@ impl Writer<'_> {
         }
         let surface = &self.builder.surfaces[shape.material.0 as usize];
         self.line(&format!("NamedMaterial \"{material}\""));
-        if surface.absorption.is_some() {
-            self.line(&format!("MediumInterface \"{material}\" \"\""));
+        let told = shape.interface.unwrap_or(Interface { inside: None, outside: None });
+        let inside = surface.filling.or(told.inside);
+        let [inside, outside] =
+            [inside, told.outside].map(|medium| medium.map(|id| self.medium(id)).unwrap_or_default());
+        if inside != outside {
+            self.line(&format!("MediumInterface \"{inside}\" \"{outside}\""));
         }
         let coverage = surface.coverage.map(|coverage| match self.value(coverage, true) {
             Value::Curve(curve) => format!(" \"float alpha\" {}", curve.mean_visible()),
@@ -354,14 +362,26 @@ impl Writer<'_> {
                 String::new()
             }
         };
-        if let Some(per_m) = &surface.absorption {
-            let words = points(per_m);
-            self.line(&format!(
-                "MakeNamedMedium \"{name}\" \"string type\" \"homogeneous\" \"spectrum sigma_a\" [ {words} ] \"spectrum sigma_s\" [ 300 0 1100 0 ]"
-            ));
-        }
         let words = self.words_of(&surface.material.clone(), &surface.name);
         self.line(&format!("MakeNamedMaterial \"{name}\" \"string type\" {words}{relief}"));
+        name
+    }
+
+    /// Returns the name of an even medium, written where it isn't yet; empty for one that can't be written.
+    fn medium(&mut self, id: MediumId) -> String {
+        let medium = self.builder.media[id.0 as usize].clone();
+        if !medium.is_even() || medium.glow.is_some() {
+            self.lose("media that glow or differ from place to place: left out");
+            return String::new();
+        }
+        let name = format!("medium {}", id.0 + 1);
+        if self.media.insert(id) {
+            let [absorbed, scattered] = [&medium.absorption, &medium.scattering].map(points);
+            self.line(&format!(
+                "MakeNamedMedium \"{name}\" \"string type\" \"homogeneous\" \"spectrum sigma_a\" [ {absorbed} ] \"spectrum sigma_s\" [ {scattered} ] \"float g\" {}",
+                medium.asymmetry
+            ));
+        }
         name
     }
 
@@ -444,6 +464,10 @@ impl Writer<'_> {
                 };
                 format!("\"mix\" \"string materials\" [ \"{a}\" \"{b}\" ] {amount}")
             }
+            M::Hair { color, roughness: [along, around], tilt_deg, index } => format!(
+                "\"hair\"{} \"float beta_m\" {along} \"float beta_n\" {around} \"float alpha\" {tilt_deg} \"float eta\" {index}",
+                self.param("reflectance", *color)
+            ),
             M::Open => "\"interface\"".to_owned(),
         }
     }
