@@ -43,6 +43,8 @@ pub(crate) enum Arrival {
 
 /// Surfaces without matter that a ray passes one after another.
 const MOST_BOUNDARIES: u32 = 1 << 16;
+/// Steps through a grid, of which few end where something in it is denser than light could ever cross: it is lost there.
+const MOST_STEPS: u32 = 1 << 20;
 
 /// Follows a ray through media to what scatters it next; `glow` is what shines on the way.
 pub(crate) fn fly<const N: usize>(
@@ -223,6 +225,7 @@ impl<'a, const N: usize> Local<'a, N> {
             *light = lanes(|i| light[i] * left[i]);
             return Crossing::Through;
         }
+        let mut n_steps = 0;
         for piece in self.medium.pieces(ray, length_m) {
             let at_most: [f32; N] = self.at_most.map(|per_m| piece.density * per_m);
             let mut at_m = piece.from_m;
@@ -234,6 +237,11 @@ impl<'a, const N: usize> Local<'a, N> {
                     break;
                 }
                 at_m += step_m;
+                n_steps += 1;
+                if n_steps > MOST_STEPS {
+                    *light = [0.0; N];
+                    return Crossing::Through;
+                }
                 let left = left(&at_most, step_m);
                 let local = self.medium.at(ray.origin + at_m * ray.direction, self.wavelengths_nm);
                 let taken: [f32; N] = lanes(|i| left[i] * (local.absorption[i] + local.scattering[i]).min(at_most[i]));

@@ -279,6 +279,23 @@ mod tests {
         }
     }
 
+    /// Values of the `hair` of Mitsuba 3.9, whose fibers run along y, to the four digits of the directions.
+    #[test]
+    fn values_are_mitsubas() {
+        let cases = [
+            (0.05, [0.6, 0.8], 0.0, [-0.0759, 0.9555, 0.285], [0.5071, 0.8335, -0.2195], 0.070_908),
+            (0.05, [0.6, 0.8], 0.0, [0.5086, -0.7099, 0.4872], [-0.804, 0.477, -0.3551], 0.178_761),
+            (0.2, [0.3, 0.3], 2.0, [0.0213, -0.9439, 0.3295], [-0.6761, -0.6988, 0.2336], 0.055_824),
+            (0.2, [0.3, 0.3], 2.0, [0.0893, 0.9584, 0.271], [0.4817, 0.8513, 0.208], 0.058_638),
+        ];
+        for (absorption, betas, tilt_deg, o, i, expected) in cases {
+            let color = (-f32::sqrt(absorption) * color_factor(betas[1])).exp();
+            let [o, i] = [o, i].map(|v| Vec3::from_array(v).normalize());
+            let value = Hair::<1>::new([color], betas, tilt_deg, 1.55).value(o, i)[0];
+            assert!((value / expected - 1.0).abs() < 0.005, "{betas:?}: {value} {expected}");
+        }
+    }
+
     /// A smooth hair mirrors light about its normal, and lets it through on the other side.
     #[test]
     fn light_goes_where_a_cylinder_sends_it() {

@@ -149,7 +149,7 @@ pub enum Material {
     Hair {
         /// The color of much of it, 0–1.
         color: TextureId,
-        /// How rough it is along and around, 0–1: β_m and β_n.
+        /// How rough it is along and around, 0–1.
         roughness: [f32; 2],
         /// How far the scales on it are tilted towards its root, degrees.
         tilt_deg: f32,

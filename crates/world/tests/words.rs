@@ -19,7 +19,7 @@ fn folder() -> tempfile::TempDir {
 }
 
 /// Directives of pbrt, and parameters with their values.
-const LINES: [(&str, &[[&str; 2]]); 19] = [
+const LINES: [(&str, &[[&str; 2]]); 22] = [
     ("Shape \"sphere\"", &[["float radius", "1"], ["float zmin", "-1"], ["float phimax", "360"], ["float alpha", "1"]]),
     ("Shape \"disk\"", &[["float radius", "1"], ["float height", "0"], ["float innerradius", ".1"]]),
     ("Shape \"cylinder\"", &[["float radius", "1"], ["float zmin", "-1"], ["float zmax", "1"]]),
@@ -45,6 +45,15 @@ const LINES: [(&str, &[[&str; 2]]); 19] = [
         &[["spectrum eta", "\"metal-Cu-eta\""], ["float roughness", ".1"], ["bool remaproughness", "true"]],
     ),
     ("Material \"dielectric\"", &[["float eta", "1.5"], ["float roughness", ".1"]]),
+    (
+        "Material \"subsurface\"",
+        &[["rgb sigma_a", "[1 2 3]"], ["rgb sigma_s", "[3 2 1]"], ["float scale", "9"], ["float g", ".5"]],
+    ),
+    ("Material \"kdsubsurface\"", &[["rgb Kd", "[.5 .5 .5]"], ["float mfp", ".1"], ["float eta", "1.4"]]),
+    (
+        "Material \"hair\"",
+        &[["float eumelanin", "1"], ["float beta_m", ".2"], ["float alpha", "3"], ["float eta", "1.5"]],
+    ),
     (
         "Texture \"t\" \"spectrum\" \"imagemap\"",
         &[["string filename", "\"picture.png\""], ["string wrap", "\"clamp\""], ["string encoding", "\"linear\""]],

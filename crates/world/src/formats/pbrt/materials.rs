@@ -56,7 +56,7 @@ impl Reader<'_> {
             }
             "subsurface" | "kdsubsurface" => {
                 let (index, roughness) = (self.index(params, 1.33)?, self.roughness(params, 0.0, true)?);
-                filling = Some(self.below_surface(name, params, &index)?);
+                filling = Some(self.below_surface(params, &index)?);
                 self.glass(params, index, roughness)?
             }
             "mix" => self.mix(params)?,

@@ -177,12 +177,7 @@ impl Reader<'_> {
 impl Reader<'_> {
     /// Returns what is below the surface of a material of pbrt's subsurface scattering: the medium of its coefficients, of a substance,
     /// or of a diffuse reflectance and a mean free path.
-    pub(super) fn below_surface(
-        &mut self,
-        name: &str,
-        params: &Params<'_>,
-        index: &SpectralCurve,
-    ) -> Result<MediumId, Fault> {
+    pub(super) fn below_surface(&mut self, params: &Params<'_>, index: &SpectralCurve) -> Result<MediumId, Fault> {
         let scale = params.within("scale", [0.0, f64::MAX]).unwrap_or(1.0) as f32;
         let asymmetry = params.within("g", [-1.0, 1.0]).unwrap_or(0.0) as f32;
         let substance_name = params.text("name").filter(|name| !name.is_empty());
@@ -192,7 +187,7 @@ impl Reader<'_> {
         }
         let of = |reader: &mut Self, names: &[&str], is_scattered: bool| match params.find_any(names) {
             Some(param) if param.kind == "texture" => {
-                reader.builder.note_of("textures of what is below a surface: their defaults stand", name);
+                reader.builder.note_of("textures of what is below a surface, whose defaults stand", param.name);
                 Ok(None)
             }
             Some(param) => reader.coefficient(param, is_scattered),
