@@ -375,15 +375,7 @@ impl<const N: usize> Lobe<N> {
                 let below = FRAC_1_PI * i.z.abs() * (1.0 - fresnel::between(lost[0], lost[1], tail));
                 lanes(|lane| diffuse[lane] * below + common * fresnel::between(mirrored[lane], *edge, tail))
             }
-            Self::Filmed { diffuse, rough, .. } if is_reflection => {
-                let (common, cos) = match rough {
-                    Some(ggx) => facet_reflection(ggx, o, i),
-                    None => (0.0, half_cosine(o, i)),
-                };
-                let mirrored = self.filmed(cos);
-                let below = FRAC_1_PI * i.z.abs();
-                lanes(|lane| diffuse[lane] * below * (1.0 - mirrored[lane]) + common * mirrored[lane])
-            }
+            Self::Filmed { .. } if is_reflection => self.filmed_value(o, i),
             Self::Substrate { diffuse, mirrored, rough } if is_reflection => {
                 let base = substrate_base(o.z.abs(), i.z.abs()) * i.z.abs();
                 let (gloss, tail) = substrate_gloss(rough.as_ref(), o, i);
@@ -632,7 +624,21 @@ impl<const N: usize> Lobe<N> {
         }
     }
 
+    /// The value of a film and what is below it, apart from the other kinds, which are met more often.
+    #[inline(never)]
+    fn filmed_value(&self, o: Vec3, i: Vec3) -> [f32; N] {
+        let Self::Filmed { diffuse, rough, .. } = self else { return [0.0; N] };
+        let (common, cos) = match rough {
+            Some(ggx) => facet_reflection(ggx, o, i),
+            None => (0.0, half_cosine(o, i)),
+        };
+        let mirrored = self.filmed(cos);
+        let below = FRAC_1_PI * i.z.abs();
+        lanes(|lane| diffuse[lane] * below * (1.0 - mirrored[lane]) + common * mirrored[lane])
+    }
+
     /// What a film mirrors at this cosine; of others nothing.
+    #[inline(never)]
     fn filmed(&self, cos: f32) -> [f32; N] {
         let Self::Filmed { base, waves, index, .. } = self else { return [0.0; N] };
         lanes(|lane| film::reflectance(cos.abs(), *index, base[lane], waves[lane]))

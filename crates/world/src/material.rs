@@ -344,12 +344,14 @@ impl Surfaces<'_> {
         outgoing: Vec3,
         wavelengths_nm: &[f32; N],
     ) -> Bsdf<N> {
-        let frame = self.frame(hit, at);
-        let frame = frame.turned(self.turn_rad(hit, at, frame));
+        let surface = &self.surfaces[hit.material.0 as usize];
+        let mut frame = self.frame(hit, at);
+        if surface.turn_rad != 0.0 || surface.directions.is_some() {
+            frame = frame.turned(self.turn_rad(hit, at, frame));
+        }
         let mut bsdf = Bsdf::new(frame, hit.geometric_normal, outgoing);
         self.add_lobes(&mut bsdf, hit.material, at, (1.0, false), wavelengths_nm);
         // Where a part of a mixture is open, the hit is one of the rest.
-        let surface = &self.surfaces[hit.material.0 as usize];
         if surface.has_gaps && surface.material != Material::Open {
             let share = self.share_of_parts(&surface.material, at);
             if share > 0.0 {
@@ -472,37 +474,16 @@ impl Surfaces<'_> {
                 let through = transmission.map_or(0.0, number);
                 let strength = brushed.map_or(0.0, number);
                 let rough = Ggx::new(alpha + (1.0 - alpha) * strength * strength, alpha);
-                let (behind, behind_color) =
-                    surface.behind.map_or((0.0, [0.0; N]), |[share, color]| (number(share), share_of(color)));
-                let below = (1.0 - metallic) * (1.0 - through);
-                let diffuse = lanes(|lane| color[lane] * below * (1.0 - behind));
                 let straight = lanes(|lane| mirrored[lane] + metallic * (color[lane] - mirrored[lane]));
                 let lost = [mirrored.iter().copied().fold(0.0, f32::max), edge];
-                let cos = bsdf.cosine();
-                // The layer, and what it lets through to the base.
-                let (layer, let_through): (Lobe<N>, [f32; N]) = match surface.film {
-                    None => {
-                        let edge = edge + metallic * (1.0 - edge);
-                        let mirrored = fresnel::between(lost[0], lost[1], fresnel::schlick_tail(cos));
-                        (Lobe::Layered { diffuse, mirrored: straight, edge, lost, rough }, [1.0 - mirrored; N])
-                    }
-                    Some(Film { index, thickness_nm }) => {
-                        let thickness_nm = self.textures.number(thickness_nm, at).max(0.0);
-                        let waves = wavelengths_nm.map(|nm| 2.0 * index * thickness_nm / nm);
-                        let let_through =
-                            lanes(|lane| 1.0 - film::reflectance(cos, index, straight[lane], waves[lane]));
-                        (Lobe::Filmed { diffuse, base: straight, waves, index, rough }, let_through)
-                    }
-                };
-                let (clear, behind) = ((1.0 - metallic) * through, below * behind);
-                if clear <= 0.0 && behind <= 0.0 {
-                    layer
+                let (clear, below) = ((1.0 - metallic) * through, (1.0 - metallic) * (1.0 - through));
+                let diffuse = lanes(|lane| color[lane] * below);
+                let edge = edge + metallic * (1.0 - edge);
+                let layered = Lobe::Layered { diffuse, mirrored: straight, edge, lost, rough };
+                if clear <= 0.0 && surface.film.is_none() && surface.behind.is_none() {
+                    layered
                 } else {
-                    bsdf.push_term(share, layer);
-                    let transmittance = lanes(|lane| color[lane] * (clear * let_through[lane]));
-                    bsdf.push_term(share, Lobe::Pane { reflectance: [0.0; N], transmittance, rough });
-                    let transmittance = lanes(|lane| behind_color[lane] * behind * let_through[lane]);
-                    bsdf.push_term(share, Lobe::Diffuse { reflectance: [0.0; N], transmittance });
+                    self.add_based(bsdf, (share, layered), (color, clear, below), (surface, at), wavelengths_nm);
                     return;
                 }
             }
@@ -549,6 +530,7 @@ impl Surfaces<'_> {
     }
 
     /// Returns how far what is brushed is turned from u about the normal.
+    #[inline(never)]
     fn turn_rad(self, hit: &Hit, at: &TexturePoint<'_>, frame: Frame) -> f32 {
         let surface = &self.surfaces[hit.material.0 as usize];
         let of_picture = surface.directions.map_or(0.0, |picture| {
@@ -558,6 +540,45 @@ impl Surfaces<'_> {
         let turn_rad = surface.turn_rad + of_picture;
         // Pictures may be laid mirrored.
         if frame.y.dot(hit.dp_dv) < 0.0 { -turn_rad } else { turn_rad }
+    }
+
+    /// Adds glTF's material where its layer bears a film, or its base lets light through: `clear` of it straight, and of what is `below` as
+    /// much as the surface says by Lambert's law.
+    #[inline(never)]
+    fn add_based<const N: usize>(
+        self,
+        bsdf: &mut Bsdf<N>,
+        (share, layered): (f32, Lobe<N>),
+        (color, clear, below): ([f32; N], f32, f32),
+        (surface, at): (&Surface, &TexturePoint<'_>),
+        wavelengths_nm: &[f32; N],
+    ) {
+        let Lobe::Layered { mut diffuse, mirrored, edge, lost, rough } = layered else { return };
+        let mut behind = [0.0; N];
+        if let Some([amount, color]) = surface.behind {
+            let amount = self.textures.number(amount, at).clamp(0.0, 1.0);
+            let behind_color: [f32; N] = self.textures.spectral(color, at, wavelengths_nm);
+            behind = behind_color.map(|c| c.clamp(0.0, 1.0) * amount * below);
+            diffuse = diffuse.map(|d| d * (1.0 - amount));
+        }
+        let cos = bsdf.cosine();
+        let (layer, let_through): (Lobe<N>, [f32; N]) = match surface.film {
+            None => {
+                let let_through = 1.0 - fresnel::between(lost[0], lost[1], fresnel::schlick_tail(cos));
+                (Lobe::Layered { diffuse, mirrored, edge, lost, rough }, [let_through; N])
+            }
+            Some(Film { index, thickness_nm }) => {
+                let thickness_nm = self.textures.number(thickness_nm, at).max(0.0);
+                let waves = wavelengths_nm.map(|nm| 2.0 * index * thickness_nm / nm);
+                let let_through = lanes(|lane| 1.0 - film::reflectance(cos, index, mirrored[lane], waves[lane]));
+                (Lobe::Filmed { diffuse, base: mirrored, waves, index, rough }, let_through)
+            }
+        };
+        bsdf.push_term(share, layer);
+        let transmittance = lanes(|lane| color[lane] * (clear * let_through[lane]));
+        bsdf.push_term(share, Lobe::Pane { reflectance: [0.0; N], transmittance, rough });
+        let transmittance = lanes(|lane| behind[lane] * let_through[lane]);
+        bsdf.push_term(share, Lobe::Diffuse { reflectance: [0.0; N], transmittance });
     }
 
     /// Returns the shading frame at a hit, with relief: x runs along u.

@@ -54,9 +54,6 @@ impl Frame {
 
     /// Returns it turned about its z axis, counterclockwise.
     pub(crate) fn turned(self, rad: f32) -> Self {
-        if rad == 0.0 {
-            return self;
-        }
         let (sin, cos) = rad.sin_cos();
         Self { x: cos * self.x + sin * self.y, y: cos * self.y - sin * self.x, z: self.z }
     }
