@@ -105,6 +105,11 @@ impl _World {
             .collect()
     }
 
+    /// Returns the names of the objects that a name means.
+    fn find(&self, name: &str) -> PyResult<Vec<String>> {
+        self.held().builder.find_objects(name).map_err(exception)
+    }
+
     /// Returns the corners of an upright box around objects, or around everything.
     fn bounds_m(&self, name: Option<&str>) -> PyResult<Option<[(f64, f64, f64); 2]>> {
         let held = self.held();

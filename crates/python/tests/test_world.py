@@ -124,6 +124,7 @@ def test_worlds_are_kept_written_and_sent(tmp_path: Path, cam: dp.Camera) -> Non
     assert {"sheet", "again", "red", "red.2"} <= set(world.names)
     parents = {row["name"]: row["parent"] for row in world.objects}
     assert parents["red.2"] == "again"
+    assert world.find("re?*") == ["red", "red.2"] and "red.2" in world.find("again")
     sent = pickle.loads(pickle.dumps(world))
     apart = copy.deepcopy(world)
     world.remove("again")
@@ -133,7 +134,7 @@ def test_worlds_are_kept_written_and_sent(tmp_path: Path, cam: dp.Camera) -> Non
     assert dp.Camera.read(tmp_path / "kept.ron").to_ron() == kept.to_ron()
     pickle.loads(pickle.dumps(kept.scene))
     assert world.write(tmp_path / "room.pbrt") == []
-    assert dp.World(tmp_path / "room.pbrt").names.sort() == world.names.sort()
+    assert sorted(dp.World(tmp_path / "room.pbrt").names) == sorted(world.names)
 
 
 def test_wrong_words_are_told() -> None:

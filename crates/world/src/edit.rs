@@ -239,6 +239,16 @@ impl WorldBuilder {
         self.objects.there().map(|object| infos[object as usize].clone()).collect()
     }
 
+    /// Returns the names of the objects that a name means, parts of them included.
+    ///
+    /// # Errors
+    /// When no object is called so.
+    pub fn find_objects(&self, name: &str) -> Result<Vec<String>, WorldError> {
+        let picked = self.picked(name)?;
+        let names = self.objects.there().filter(|&object| picked[object as usize]);
+        Ok(names.map(|object| self.objects.name(object).to_owned()).collect())
+    }
+
     /// Returns the corners of an upright box around objects and their parts, m; none where they have no place.
     ///
     /// # Errors

@@ -68,6 +68,7 @@ fn parts_go_with_what_they_are_parts_of() {
     builder.scale_object("balls", DVec3::splat(2.0), Some(DVec3::NEG_Y * 0.5)).unwrap();
     let [low, high] = builder.bounds_of_object("balls").unwrap().unwrap();
     assert!(low.abs_diff_eq(DVec3::new(2.0, -0.5, -4.0), 1e-12) && high.y == 1.5, "{low} {high}");
+    assert_eq!(builder.find_objects("b*").unwrap(), ["balls", "left", "right"]);
     builder.remove_object("balls").unwrap();
     let names: Vec<String> = builder.objects().into_iter().map(|object| object.name).collect();
     assert_eq!(names, ["floor", "point light"]);

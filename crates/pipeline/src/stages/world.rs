@@ -60,12 +60,10 @@ pub(super) fn read(inputs: &WorldInputs, watch: &Watch<'_>) -> Result<World, Pip
     if inputs.file.as_os_str() == WorldSpec::STILL_LIFE {
         return leveled(World::still_life(), inputs, watch);
     }
-    let is_file = inputs.file.as_os_str() != WorldSpec::EMPTY;
-    let mut builder = match is_file {
-        true => open_world(&inputs.file, &inputs.reading, watch.cancel)?,
-        false => WorldBuilder::new(),
+    let mut builder = match inputs.file.as_os_str() == WorldSpec::EMPTY {
+        true => WorldBuilder::new(),
+        false => open_world(&inputs.file, &inputs.reading, watch.cancel)?,
     };
-    let extent_m = builder.extent_m();
     inputs.changes.iter().try_for_each(|change| change_world(&mut builder, change, watch.cancel))?;
     for WorldLamp { at_m: (x, y, z), lumens } in &inputs.lamps {
         let intensity = Flux::Lumens(*lumens).spectrum(&Illuminant::D65.spectrum(), 4.0 * std::f64::consts::PI)?;
@@ -82,17 +80,6 @@ pub(super) fn read(inputs: &WorldInputs, watch: &Watch<'_>) -> Result<World, Pip
         }
         None => {}
     }
-    let kind = inputs.file.extension().map(|kind| kind.to_ascii_lowercase());
-    let most_likely_m = match kind.as_ref().and_then(|kind| kind.to_str()) {
-        Some("gltf" | "glb") => f64::INFINITY,
-        Some("stl") => MOST_LIKELY_OF_STL_M,
-        _ => MOST_LIKELY_M,
-    };
-    if is_file && inputs.reading.metres_per_unit == 1.0 && extent_m > most_likely_m {
-        builder.note(format!(
-            "the file says no unit: in metres, as it is taken, all of it is {extent_m:.0} m wide; --unit-m 0.001 takes millimetres"
-        ));
-    }
     leveled(builder.build()?, inputs, watch)
 }
 
@@ -102,10 +89,6 @@ fn leveled(world: World, inputs: &WorldInputs, watch: &Watch<'_>) -> Result<Worl
         None => Ok(world),
     }
 }
-
-/// Worlds wider than this are seldom in metres, and what is made for printers.
-const MOST_LIKELY_M: f64 = 1000.0;
-const MOST_LIKELY_OF_STL_M: f64 = 10.0;
 
 /// The most columns of a view of the still life that is no more than the summary of a picture.
 const SUMMARY_COLUMNS: usize = 270;

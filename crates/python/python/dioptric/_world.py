@@ -174,6 +174,10 @@ class World:
         """What of the files isn't understood, a sentence each."""
         return self._native.notes()
 
+    def find(self, name: str) -> list[str]:
+        """Returns the names of the objects that a name means, their parts included."""
+        return self._native.find(name)
+
     def bounds_m(self, name: str | None = None) -> tuple[tuple[float, ...], tuple[float, ...]] | None:
         """Returns the corners of an upright box around objects, or around everything; None where nothing has a place."""
         corners = self._native.bounds_m(name)

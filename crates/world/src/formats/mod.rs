@@ -110,11 +110,26 @@ pub fn open_world(path: &Path, options: &ReadOptions, cancel: &Cancel) -> Result
     };
     cancel.check()?;
     options.check_against(path, &mut builder)?;
+    let most_likely_m = match name.rsplit_once('.').map(|(_, kind)| kind) {
+        Some("gltf" | "glb") => f64::INFINITY,
+        Some("stl") => MOST_LIKELY_OF_STL_M,
+        _ => MOST_LIKELY_M,
+    };
+    let extent_m = builder.extent_m();
+    if unit == 1.0 && extent_m > most_likely_m {
+        builder.note(format!(
+            "the file says no unit: in metres, as it is taken, all of it is {extent_m:.0} m wide; --unit-m 0.001 takes millimetres"
+        ));
+    }
     if builder.is_empty() {
         builder.note("nothing in the file has an area: no faces and no other shapes");
     }
     Ok(builder)
 }
+
+/// Worlds wider than this are seldom in metres, and what is made for printers.
+const MOST_LIKELY_M: f64 = 1000.0;
+const MOST_LIKELY_OF_STL_M: f64 = 10.0;
 
 /// A mesh without a material: of the picture that it names, gray or of its own colors; with what of its file isn't read.
 fn bare(
