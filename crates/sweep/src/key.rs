@@ -9,7 +9,7 @@ use crate::{SweepError, inputs::Inputs, plan::Keep};
 
 /// Counts the changes of results that no camera file shows: raised whenever an equal camera and equal files make another
 /// picture, report or file, so that items made before are not taken for those made now.
-pub const RESULTS_EPOCH: u32 = 42;
+pub const RESULTS_EPOCH: u32 = 43;
 
 /// The name of an item: the BLAKE3 hash of its camera, of the content of the files that it is made from, and of
 /// [`RESULTS_EPOCH`].
