@@ -1,11 +1,11 @@
 //! Any mosaic: colors by the ratios of neighboring pixels behind different filters.
 //!
-//! On a logarithmic scale a pixel is x = y + r_c, y the light that all colors share and r_c the color, which changes less from place to
-//! place. Two neighbors p, q behind filters a, b differ by x_p − x_q = (y_p − y_q) + (r_a − r_b): about a place the mean of such
-//! differences is that of the colors, since the light rises as often as it falls. Each pair of filters has the mean of nine windows about
+//! On a logarithmic scale a pixel is x = y + r, y the light that all colors share and r that of its filter's color, which changes less from
+//! place to place. Two neighbors behind other filters differ by the light and by the color: about a place the mean of such differences is that
+//! of the colors, since the light rises as often as it falls. Each pair of filters has the mean of nine windows about
 //! the pixel, those in which differences agree before others (Kuwahara et al., 1976), and the colors are what fits all pairs best.
-//! Further rounds weigh each two neighbors by how alike their light y = x − r_c was found. So every pixel tells the light,
-//! and each color is y + r_c: exactly, wherever the color does not change within the windows.
+//! Further rounds weigh each two neighbors by how alike their light x − r was found. So every pixel tells the light,
+//! and each color is y + r of its filter: exactly, wherever the color does not change within the windows.
 //!
 //! Where windows disagree, the color does change, and the plane of a tent with each pixel's own detail takes over.
 
@@ -207,7 +207,7 @@ impl Mosaic<'_> {
                     if total > 0.0 {
                         let mean = sum / total;
                         spread += (square / total - mean * mean).max(0.0);
-                        // Least squares of r_a − r_b = mean.
+                        // Least squares of the difference of the two colors to the mean.
                         let mut add = |row: usize, column: usize, value: f32| {
                             system[row * (n_channels + 1) + column] += value;
                         };
