@@ -50,6 +50,7 @@ const EXAMPLES: &[(&str, &[&str])] = &[
     ("scene info", &["dioptric scene info cube.mat --axes yxb"]),
     ("scene convert", &["dioptric scene convert photo.png scene.exr --depth depth.png --depth-unit mm"]),
     ("world info", &["dioptric world info world.glb"]),
+    ("world convert", &["dioptric world convert world.pbrt world.glb"]),
     ("cache info", &["dioptric cache info"]),
     ("cache clear", &["dioptric cache clear"]),
     ("compare", &["dioptric compare camera.ron --samples 64 --out both/"]),
