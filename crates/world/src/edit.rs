@@ -8,8 +8,8 @@ use glam::{DAffine3, DMat3, DVec3};
 use crate::{
     Emission, GroupId, Interface, Light, MaterialId, MediumId, Shape, ShapeId, SpectralCurve, WorldBuilder,
     WorldCamera, WorldError,
-    shape::{Quadric, placed_bounds},
-    world::{NewLight, NewShape},
+    shape::placed_bounds,
+    world::{NewLight, NewShape, bounds_of},
 };
 
 /// What stands in a world under one name.
@@ -140,25 +140,6 @@ fn turn_of(place: &DAffine3) -> DMat3 {
     let y = (m.y_axis - x * x.dot(m.y_axis)).normalize_or(x.any_orthonormal_vector());
     let z = x.cross(y);
     DMat3::from_cols(x, y, if m.determinant() < 0.0 { -z } else { z })
-}
-
-/// Returns the corners of an upright box around shapes where they stand in their group; reversed for none.
-pub(crate) fn bounds_of<'a>(shapes: impl Iterator<Item = &'a NewShape>) -> (DVec3, DVec3) {
-    let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-    for shape in shapes {
-        let (a, b) = match &*shape.shape {
-            Shape::Mesh(mesh) => mesh
-                .positions
-                .iter()
-                .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(a, b), p| (a.min(p.as_dvec3()), b.max(p.as_dvec3()))),
-            other => Quadric::new(other.clone(), DAffine3::IDENTITY).bounds(),
-        };
-        if a.cmple(b).all() {
-            let (a, b) = placed_bounds(&shape.place, a, b);
-            (low, high) = (low.min(a), high.max(b));
-        }
-    }
-    (low, high)
 }
 
 /// Objects of one world are named by their names in all that changes them; `*` in a name stands for any letters and `?` for one, and what

@@ -21,7 +21,7 @@ use crate::{
     pattern::MOST_SHARES,
     patterned::{Frames, Patterned},
     placed::{PlacedKind, PlacedShape},
-    shape::Quadric,
+    shape::{Quadric, placed_bounds},
     texture::{MAX_DEPTH, Textures},
     uv::TexturePoint,
 };
@@ -946,7 +946,7 @@ impl WorldBuilder {
 
     /// Returns the greatest extent along an axis of the shapes that belong to no group, m; 0 where there are none.
     pub fn extent_m(&self) -> f64 {
-        let (low, high) = crate::edit::bounds_of(self.shapes.iter().filter(|shape| shape.group == GroupId::ROOT));
+        let (low, high) = bounds_of(self.shapes.iter().filter(|shape| shape.group == GroupId::ROOT));
         if low.cmple(high).all() { (high - low).max_element() } else { 0.0 }
     }
 
@@ -1100,6 +1100,25 @@ impl WorldBuilder {
         }
         Ok(())
     }
+}
+
+/// Returns the corners of an upright box around shapes where they stand in their group; reversed for none.
+pub(crate) fn bounds_of<'a>(shapes: impl Iterator<Item = &'a NewShape>) -> (DVec3, DVec3) {
+    let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    for shape in shapes {
+        let (a, b) = match &*shape.shape {
+            Shape::Mesh(mesh) => mesh
+                .positions
+                .iter()
+                .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(a, b), p| (a.min(p.as_dvec3()), b.max(p.as_dvec3()))),
+            other => Quadric::new(other.clone(), DAffine3::IDENTITY).bounds(),
+        };
+        if a.cmple(b).all() {
+            let (a, b) = placed_bounds(&shape.place, a, b);
+            (low, high) = (low.min(a), high.max(b));
+        }
+    }
+    (low, high)
 }
 
 impl NewShape {

@@ -1,13 +1,13 @@
 //! Worlds changed by name before they are built.
 
-use std::fs;
+use std::{fs, sync::Arc};
 
 use dioptric_spectrum::Cancel;
 use dioptric_world::{
-    Emission, Light, Material, MaterialId, Ray, ReadOptions, Shape, SpectralCurve, Texture, TriangleMesh, World,
-    WorldBuilder,
+    Density, Emission, Field, FilledBox, Filling, Interface, Light, Material, MaterialId, Medium, Ray, ReadOptions,
+    Shape, SpectralCurve, Texture, TriangleMesh, World, WorldBuilder,
     glam::{DAffine3, DVec3, Vec3},
-    open_world,
+    open_world, write_world,
 };
 
 fn matte(builder: &mut WorldBuilder, reflectance: f32) -> MaterialId {
@@ -218,4 +218,72 @@ fn files_name_their_objects() {
         "nodes": [{"name": "car", "children": [1, 2]}, {"name": "lamp", "extensions": {"KHR_lights_punctual": {"light": 0}}}, {}],
         "extensions": {"KHR_lights_punctual": {"lights": [{"type": "point"}]}}}"#;
     assert_eq!(names("d.gltf", gltf), ["car", "lamp", "node 2"]);
+}
+
+/// A ball of 0.5 m at the origin that a grid fills, by the name "smoke", and another that milk fills.
+fn smoke_and_milk() -> WorldBuilder {
+    let mut builder = WorldBuilder::new();
+    let open = builder.add_material("nothing", Material::Open);
+    let curve = SpectralCurve::constant;
+    let place = DAffine3::from_translation(DVec3::splat(-0.5));
+    let field = Field::new([2, 1, 1], 1, vec![1.0, 3.0]).unwrap();
+    let density = Density::Box(Arc::new(FilledBox::new(place, Filling::Numbers(field))));
+    let smoke = builder.add_medium(Medium { density, ..Medium::even(curve(0.0), curve(2.0), 0.3) });
+    let milk = builder.add_medium(Medium::even(curve(0.25), curve(4.0), 0.75));
+    for (name, x, medium) in [("smoke", 0.0, smoke), ("milk", 3.0, milk)] {
+        builder.name_next(name);
+        let place = DAffine3::from_translation(DVec3::X * x);
+        let ball = builder.add_shape(Shape::Sphere { radius_m: 0.5 }, place, open, None);
+        builder.set_interface(ball, Interface { inside: Some(medium), outside: None });
+    }
+    builder
+}
+
+/// What is scattered and absorbed at a point, 1/m, by what a ray towards it is in there.
+fn at(world: &World, point: Vec3) -> Option<[f32; 2]> {
+    let ray = Ray { origin: point - 2.0 * Vec3::Z, direction: Vec3::Z };
+    let met = world.meet(&ray, 2.0)?;
+    let medium = world.medium(world.medium_towards(&met.hit, ray.direction, None)?);
+    let found = medium.at(point, &[550.0]);
+    Some([found.scattering[0], found.absorption[0]])
+}
+
+/// What fills a shape goes with it, and into a world that it is put into.
+#[test]
+fn media_go_with_their_shapes() {
+    let own = smoke_and_milk().build().unwrap();
+    // Linear between the middles of the two cells.
+    let expected = [0.0, 0.2].map(|x| at(&own, Vec3::new(x, 0.0, 0.0)).unwrap());
+    assert!((expected[0][0] - 4.0).abs() < 1e-5 && expected[1][0] > 5.0, "{expected:?}");
+    let mut builder = smoke_and_milk();
+    let copies = builder.copy_object("smoke", "copy").unwrap();
+    builder.move_object(&copies[0], DVec3::new(0.0, 4.0, 0.0)).unwrap();
+    builder.remove_object("smoke").unwrap();
+    let moved = builder.clone().build().unwrap();
+    assert_eq!(at(&moved, Vec3::ZERO), None);
+    for (x, expected) in [0.0, 0.2].into_iter().zip(expected) {
+        let found = at(&moved, Vec3::new(x, 4.0, 0.0)).unwrap();
+        assert!((found[0] - expected[0]).abs() < 1e-5, "{found:?} {expected:?}");
+    }
+    assert_eq!(at(&moved, Vec3::X * 3.0), Some([4.0, 0.25]));
+    let mut whole = smoke_and_milk();
+    whole.add_world(builder, "more", DAffine3::from_translation(DVec3::Z * -6.0)).unwrap();
+    let whole = whole.build().unwrap();
+    assert_eq!(at(&whole, Vec3::ZERO), Some(expected[0]));
+    let found = at(&whole, Vec3::new(0.2, 4.0, -6.0)).unwrap();
+    assert!((found[0] - expected[1][0]).abs() < 1e-5, "{found:?}");
+    assert_eq!(at(&whole, Vec3::new(3.0, 0.0, -6.0)), Some([4.0, 0.25]));
+}
+
+/// pbrt's files hold even media; what differs from place to place is named.
+#[test]
+fn even_media_are_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("media.pbrt");
+    let losses = write_world(&smoke_and_milk(), &file, false).unwrap();
+    assert!(losses.iter().any(|loss| loss.contains("differ from place to place")), "{losses:?}");
+    let read = open_world(&file, &ReadOptions::default(), &Cancel::new()).unwrap().build().unwrap();
+    let found = at(&read, Vec3::X * 3.0).unwrap();
+    assert!((found[0] - 4.0).abs() < 1e-4 && (found[1] - 0.25).abs() < 1e-5, "{found:?}");
+    assert_eq!(at(&read, Vec3::ZERO), None);
 }

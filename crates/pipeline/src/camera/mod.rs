@@ -20,6 +20,7 @@ mod syntax;
 mod video;
 mod world;
 mod world_change;
+mod world_sky;
 
 use std::path::{Path, PathBuf};
 
@@ -51,8 +52,9 @@ pub use scene::{FlatSize, SceneSource, SceneSpec};
 pub use sensor_options::SensorOptions;
 pub use syntax::CAMERA_SCHEMA;
 pub use video::{CameraTurn, TurnPath, VideoSpec};
-pub use world::{RenderEffort, RenderMethod, WorldLamp, WorldSky, WorldSpec, WorldView};
+pub use world::{RenderEffort, RenderMethod, WorldLamp, WorldSpec, WorldView};
 pub use world_change::{LightAmount, WorldChange, WorldColor, WorldLight, WorldMaterial, WorldShape};
+pub use world_sky::WorldSky;
 
 use self::check::Checker;
 use crate::{Outputs, PipelineError};

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use dioptric_spectrum::{Illuminant, Spectrum};
 use serde::{Deserialize, Serialize};
 
-use super::world::WorldSky;
+use super::world_sky::WorldSky;
 
 /// A point or a direction: x, y and z.
 type Triple = (f64, f64, f64);

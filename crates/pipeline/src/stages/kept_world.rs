@@ -13,7 +13,8 @@ use super::{
     kept::KeptCamera,
     lens::check_glasses,
     spec::{GeometryInputs, IrradianceInputs, SceneInputs},
-    world::{self, WorldRender},
+    world::WorldRender,
+    world_level,
 };
 use crate::{PipelineError, Progress};
 
@@ -97,7 +98,7 @@ impl Chain<'_> {
             let reason = "it is no world, expected 'source: World((file: ...))'".to_owned();
             return Err(PipelineError::Unsuitable { what: "scene", reason });
         };
-        self.kept.world.get_or_make(inputs, |inputs| world::read(inputs, &self.watch))
+        self.kept.world.get_or_make(inputs, |inputs| world_level::read_at_level(inputs, &self.watch))
     }
 
     pub(super) fn world_render(&self, inputs: &IrradianceInputs) -> Result<WorldRender, PipelineError> {

@@ -20,7 +20,6 @@ use super::{
     scene::ResolvedScene,
     spec::{IrradianceInputs, SceneInputs, WorldInputs},
     world_change::change_world,
-    world_level,
     world_light::light_on,
     world_sky::add_sky,
     world_view::{horizontal_fov_deg, placement, world_camera},
@@ -58,7 +57,7 @@ pub struct WorldRender {
 pub(super) fn read(inputs: &WorldInputs, watch: &Watch<'_>) -> Result<World, PipelineError> {
     watch.progress.at(Stage::Scene, 0.0);
     if inputs.file.as_os_str() == WorldSpec::STILL_LIFE {
-        return leveled(World::still_life(), inputs, watch);
+        return Ok(World::still_life());
     }
     let mut builder = match inputs.file.as_os_str() == WorldSpec::EMPTY {
         true => WorldBuilder::new(),
@@ -80,14 +79,7 @@ pub(super) fn read(inputs: &WorldInputs, watch: &Watch<'_>) -> Result<World, Pip
         }
         None => {}
     }
-    leveled(builder.build()?, inputs, watch)
-}
-
-fn leveled(world: World, inputs: &WorldInputs, watch: &Watch<'_>) -> Result<World, PipelineError> {
-    match &inputs.level {
-        Some(level) => world_level::bring_to(world, level, watch),
-        None => Ok(world),
-    }
+    Ok(builder.build()?)
 }
 
 /// The most columns of a view of the still life that is no more than the summary of a picture.

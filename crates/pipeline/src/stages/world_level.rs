@@ -10,8 +10,8 @@ use dioptric_world::{CameraKind, World};
 
 use super::{
     Watch,
-    spec::LevelInputs,
-    world::WorldRender,
+    spec::{LevelInputs, WorldInputs},
+    world::{self, WorldRender},
     world_view::{horizontal_fov_deg, placement, world_camera},
 };
 use crate::PipelineError;
@@ -23,6 +23,15 @@ const RELATIVE_ERROR: f64 = 0.003;
 const MOST_PASSES: u32 = 256;
 const SAMPLES_PER_PASS: u32 = 8;
 
+/// Returns a world as it is read, with what is seen brought to the mean luminance that is asked for.
+pub(super) fn read_at_level(inputs: &WorldInputs, watch: &Watch<'_>) -> Result<World, PipelineError> {
+    let world = world::read(inputs, watch)?;
+    match &inputs.level {
+        Some(level) => bring_to(world, level, watch),
+        None => Ok(world),
+    }
+}
+
 /// Makes all light of a world so many times as strong that the mean luminance of what is seen of it is what is asked for.
 ///
 /// The mean is that over the view from the middle of the entrance pupil, from 400 to 700 nm, to three thousandths; the samples that it is
@@ -30,7 +39,7 @@ const SAMPLES_PER_PASS: u32 = 8;
 ///
 /// # Errors
 /// When nothing that is seen gives light, or the view has no angle.
-pub(super) fn bring_to(world: World, inputs: &LevelInputs, watch: &Watch<'_>) -> Result<World, PipelineError> {
+fn bring_to(world: World, inputs: &LevelInputs, watch: &Watch<'_>) -> Result<World, PipelineError> {
     let world = Arc::new(world);
     let own_cd_m2 = mean_luminance_cd_m2(&world, inputs, watch)?;
     let mut world = Arc::try_unwrap(world).expect("the rendering is over");

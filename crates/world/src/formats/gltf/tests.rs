@@ -381,7 +381,7 @@ fn volumes_are_kept_below_coats_and_sheens() {
         // From behind, and so from within, 4 m on.
         let ray = Ray { origin: Vec3::new(0.2, 0.2, -7.0), direction: Vec3::Z };
         let hit = world.intersect(&ray, f32::INFINITY).unwrap();
-        let medium = world.medium(world.medium_along(&hit.ray_towards(-Vec3::Z)).expect("a volume that absorbs"));
+        let medium = world.medium(world.medium_towards(&hit, -Vec3::Z, None).expect("a volume that absorbs"));
         let left = (-medium.absorption.at(&[550.0])[0] * hit.distance_m).exp();
         assert!((left - 0.25).abs() < 1e-4, "{more}: {left}");
     }
