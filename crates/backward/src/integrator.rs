@@ -187,10 +187,13 @@ impl Integrator<'_> {
                 Arrival::Lost => return sum,
                 // Beyond everything lies the sky.
                 Arrival::Sky => {
-                    let share =
-                        scattered.map_or(1.0, |(from, pdf)| share(pdf, self.world.sky_pdf(from, ray.direction)));
-                    let sky = self.world.sky(ray.direction, wavelengths_nm);
-                    self.add(&mut sum, n_scatterings, &throughput, &lanes(|i| sky[i] * share));
+                    let sky = match scattered {
+                        None => self.world.sky(ray.direction, wavelengths_nm),
+                        Some((from, pdf)) => {
+                            self.world.shared_sky(from, ray.direction, wavelengths_nm, |other| share(pdf, other))
+                        }
+                    };
+                    self.add(&mut sum, n_scatterings, &throughput, &sky);
                     return sum;
                 }
                 Arrival::Medium(medium, at) => {

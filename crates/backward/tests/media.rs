@@ -367,3 +367,46 @@ fn white_hair_cannot_be_seen_in_a_furnace() {
     let [one, four] = [1, 4].map(|n_rows| means(&hairs(0.3, n_rows))[0].0);
     assert!(four < 0.8 * one && four > 0.1, "{one} {four}");
 }
+
+/// Several skies light a matte ball as one that is their sum does: each counts once, whichever way it is found.
+#[test]
+fn skies_add_up_on_surfaces() {
+    let lit_by = |radiances: &[f32]| {
+        let mut builder = WorldBuilder::new();
+        let gray = builder.add_texture(Texture::Curve(SpectralCurve::constant(0.5)));
+        let matte = builder.add_material("gray", Material::Matte { reflectance: gray });
+        let place = DAffine3::from_translation(DVec3::Z * 3.0);
+        builder.add_shape(Shape::Sphere { radius_m: 1.0 }, place, matte, None);
+        for &radiance in radiances {
+            builder.add_light(Light::Sky { radiance: SpectralCurve::constant(radiance) });
+        }
+        let world = builder.build().unwrap();
+        render(&world, Placement::look_at(DVec3::ZERO, DVec3::Z, DVec3::Y).unwrap(), (8, 0.2), LightPaths::default())
+    };
+    for radiances in [&[1.0][..], &[0.6, 0.4], &[0.2, 0.3, 0.5]] {
+        assert_means(&format!("{radiances:?}"), &lit_by(radiances), [0.5; 3], 2e-3);
+    }
+}
+
+/// Light that goes on nearly straight is scattered by finite numbers, whose integral over all directions is 1.
+#[test]
+fn the_most_forward_phase_is_finite() {
+    for asymmetry in [1.0, -1.0, 0.99] {
+        let medium = even([0.0; 3], [1.0; 3], asymmetry);
+        // Over t = (1 − cos)^¼, in which the peak is wide enough for a sum.
+        let n = 200_000;
+        let top = 2.0_f64.powf(0.25);
+        let sum: f64 = (0..n)
+            .map(|i| {
+                let t = top * (f64::from(i) + 0.5) / f64::from(n);
+                let from_peak = t.powi(4);
+                let cosine = (1.0 - from_peak) as f32 * asymmetry.signum();
+                let value = f64::from(medium.phase(cosine));
+                assert!(value.is_finite() && value >= 0.0, "{asymmetry} {cosine}: {value}");
+                2.0 * std::f64::consts::PI * value * 4.0 * t.powi(3) * top / f64::from(n)
+            })
+            .sum();
+        // Cosines near 1 are 6e-8 apart, an eighth of the peak's width.
+        assert!((sum - 1.0).abs() < 0.05, "{asymmetry}: {sum}");
+    }
+}

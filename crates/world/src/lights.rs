@@ -182,28 +182,53 @@ impl Lights {
     pub(crate) fn sky<const N: usize>(&self, direction: Vec3, wavelengths_nm: &[f32; N]) -> [f32; N] {
         let mut sum = [0.0; N];
         for &index in &self.skies {
-            let radiance = match &self.lights[index as usize] {
-                Source::Alone(Light::Sky { radiance }) => radiance.at(wavelengths_nm),
-                Source::Sky(sky) => sky.radiance(direction, wavelengths_nm),
-                Source::Alone(_) | Source::Area(_) => continue,
-            };
+            let radiance = self.of_sky(index, direction, wavelengths_nm);
             sum = lanes(|i| sum[i] + radiance[i]);
+        }
+        sum
+    }
+
+    fn of_sky<const N: usize>(&self, index: u32, direction: Vec3, wavelengths_nm: &[f32; N]) -> [f32; N] {
+        match &self.lights[index as usize] {
+            Source::Alone(Light::Sky { radiance }) => radiance.at(wavelengths_nm),
+            Source::Sky(sky) => sky.radiance(direction, wavelengths_nm),
+            Source::Alone(_) | Source::Area(_) => [0.0; N],
+        }
+    }
+
+    /// Returns what each sky gives from a direction, multiplied by a share of the density with which `sample` draws the direction of that
+    /// sky for this point.
+    pub(crate) fn shared_sky<const N: usize>(
+        &self,
+        at: &Receiver,
+        direction: Vec3,
+        wavelengths_nm: &[f32; N],
+        share: impl Fn(f32) -> f32,
+    ) -> [f32; N] {
+        let mut sum = [0.0; N];
+        for &index in &self.skies {
+            let radiance = self.of_sky(index, direction, wavelengths_nm);
+            let share = share(self.pdf_of_sky(index, at, direction));
+            sum = lanes(|i| sum[i] + share * radiance[i]);
         }
         sum
     }
 
     /// The density with which `sample` draws a direction of the sky for this point.
     pub(crate) fn sky_pdf(&self, at: &Receiver, direction: Vec3) -> f32 {
+        self.skies.iter().map(|&index| self.pdf_of_sky(index, at, direction)).sum()
+    }
+
+    fn pdf_of_sky(&self, index: u32, at: &Receiver, direction: Vec3) -> f32 {
         let probability = |index: usize| match &self.choice {
             Choice::Fixed(pick) => pick.probability(index),
             Choice::Tree(many) => many.probability_of_far(at, index),
         };
-        let of_sky = |&index: &u32| match &self.lights[index as usize] {
+        match &self.lights[index as usize] {
             Source::Alone(Light::Sky { .. }) => probability(index as usize) / (2.0 * TAU),
             Source::Sky(sky) => probability(index as usize) * sky.pdf(direction),
             Source::Alone(_) | Source::Area(_) => 0.0,
-        };
-        self.skies.iter().map(of_sky).sum()
+        }
     }
 
     fn choose(&self, at: &Receiver, u_light: f32, u: [f32; 2]) -> Option<Chosen> {

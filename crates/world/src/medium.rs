@@ -165,7 +165,7 @@ const MOST_CELLS: usize = 64;
 /// Values of a field along each side of a cell of its bounds.
 const PER_CELL: usize = 4;
 /// Scattering in one direction alone would not end.
-const GREATEST_ASYMMETRY: f32 = 0.9999;
+const GREATEST_ASYMMETRY: f32 = 0.999;
 
 impl Field {
     /// Returns a field of so many values along x, y and z, of one or three channels each.
@@ -397,7 +397,8 @@ impl Medium {
     /// Returns the density, 1/sr, with which light is scattered by an angle, and drawn there.
     pub fn phase(&self, cosine: f32) -> f32 {
         let g = self.asymmetry();
-        let root = 1.0 + g * g - 2.0 * g * cosine;
+        // 1 + g² − 2 g cos without its cancellation where light goes on nearly straight.
+        let root = (1.0 - g.abs()).powi(2) + 2.0 * g.abs() * (1.0 - g.signum() * cosine).max(0.0);
         (1.0 - g * g) / (2.0 * TAU * root * root.sqrt())
     }
 

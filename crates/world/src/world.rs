@@ -299,6 +299,18 @@ impl World {
         self.lights.sky(direction, wavelengths_nm).map(|v| self.gain * v)
     }
 
+    /// Returns the same as light that was scattered at a point finds it: of each sky its share, by the density with which
+    /// [`sample_light`](Self::sample_light) draws that direction of it.
+    pub fn shared_sky<const N: usize>(
+        &self,
+        at: impl Into<Receiver>,
+        direction: Vec3,
+        wavelengths_nm: &[f32; N],
+        share: impl Fn(f32) -> f32,
+    ) -> [f32; N] {
+        self.lights.shared_sky(&at.into(), direction, wavelengths_nm, share).map(|v| self.gain * v)
+    }
+
     /// Draws light that falls on a point; `None` where the drawn light doesn't shine there.
     ///
     /// `u_light` and `u` are in [0, 1). Estimators divide by [`LightSample::pdf`], which holds the choice of the light.
@@ -957,7 +969,9 @@ impl WorldBuilder {
 
     /// Whether anything gives light.
     pub fn has_light(&self) -> bool {
-        !self.lights.is_empty() || self.shapes.iter().any(|shape| shape.emission.is_some())
+        !self.lights.is_empty()
+            || self.shapes.iter().any(|shape| shape.emission.is_some())
+            || self.media.iter().any(|medium| medium.glow.is_some())
     }
 
     /// Checks the parts, and builds the world.

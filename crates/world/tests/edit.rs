@@ -275,15 +275,27 @@ fn media_go_with_their_shapes() {
     assert_eq!(at(&whole, Vec3::new(3.0, 0.0, -6.0)), Some([4.0, 0.25]));
 }
 
-/// pbrt's files hold even media; what differs from place to place is named.
+/// pbrt's files hold even media, that around the camera too; what differs from place to place is named.
 #[test]
 fn even_media_are_written() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("media.pbrt");
-    let losses = write_world(&smoke_and_milk(), &file, false).unwrap();
+    let mut builder = smoke_and_milk();
+    let fog = builder.add_medium(Medium::even(SpectralCurve::constant(0.5), SpectralCurve::constant(0.1), 0.0));
+    let camera = r#"LookAt 0 0 -9  0 0 0  0 1 0
+Camera "perspective" "float fov" 40
+WorldBegin
+"#;
+    fs::write(folder.path().join("camera.pbrt"), camera).unwrap();
+    let of_camera = open_world(&folder.path().join("camera.pbrt"), &ReadOptions::default(), &Cancel::new()).unwrap();
+    of_camera.build().unwrap().cameras().iter().for_each(|camera| builder.add_camera(camera.clone()));
+    builder.set_medium_at(DVec3::Z * -9.0, fog);
+    let losses = write_world(&builder, &file, false).unwrap();
     assert!(losses.iter().any(|loss| loss.contains("differ from place to place")), "{losses:?}");
     let read = open_world(&file, &ReadOptions::default(), &Cancel::new()).unwrap().build().unwrap();
     let found = at(&read, Vec3::X * 3.0).unwrap();
     assert!((found[0] - 4.0).abs() < 1e-4 && (found[1] - 0.25).abs() < 1e-5, "{found:?}");
-    assert_eq!(at(&read, Vec3::ZERO), None);
+    let away = Ray { origin: Vec3::new(0.0, 0.0, -9.0), direction: Vec3::Y };
+    let fog = read.medium(read.medium_along(&away).unwrap()).at(Vec3::ZERO, &[550.0]);
+    assert!((fog.absorption[0] - 0.5).abs() < 1e-4 && (fog.scattering[0] - 0.1).abs() < 1e-5, "{fog:?}");
 }

@@ -149,10 +149,11 @@ pub(super) fn view(
         None => light_on(world, &pinhole)?,
     };
     let (first_nm, last_nm) = first.radiance.grid().range_nm();
-    let of_level = world.notes().last().filter(|_| world.gain() != 1.0).cloned();
+    let of_file = world.notes().iter().cloned();
     let without_media = "media are left out of quick views: glass is clear, and fog and smoke are away";
-    let of_media = (is_gathered && world.has_media()).then(|| without_media.to_owned());
-    let notes = world.note_on_bands(first_nm, last_nm).into_iter().chain(of_level).chain(of_media);
+    let of_media =
+        (is_gathered && spec.method == RenderMethod::Forward && world.has_media()).then(|| without_media.to_owned());
+    let notes = of_file.chain(world.note_on_bands(first_nm, last_nm)).chain(of_media);
     let notes = notes.map(|note| format!("{name}: {note}")).collect();
     let scene =
         Scene { depth: Some(first.depth), view: Some(view), hidden, light, notes, ..Scene::new(name, first.radiance) };

@@ -143,6 +143,9 @@ impl<'a> Writer<'a> {
             "scene": 0,
             "scenes": [{ "nodes": scene }],
         });
+        if self.builder.eye.is_some() {
+            self.losses.insert("the medium around the camera: left out".to_owned());
+        }
         if self.builder.shapes.iter().any(|shape| shape.interface.is_some()) {
             self.losses
                 .insert("media that shapes part, but for what fills them by their material: left out".to_owned());

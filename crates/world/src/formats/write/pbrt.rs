@@ -86,6 +86,10 @@ impl Writer<'_> {
 
     fn world(&mut self) {
         let builder = self.builder;
+        let around = builder.eye.map(|(_, medium)| self.medium(medium)).unwrap_or_default();
+        if !around.is_empty() {
+            self.line(&format!("MediumInterface \"\" \"{around}\""));
+        }
         match builder.cameras.first() {
             Some(camera) => self.camera(camera),
             None => self.line("Film \"rgb\" \"integer xresolution\" 720 \"integer yresolution\" 480"),
@@ -95,6 +99,9 @@ impl Writer<'_> {
             self.lose(format!("{more} of {} cameras: pbrt has the first", builder.cameras.len()));
         }
         self.line("WorldBegin");
+        if !around.is_empty() {
+            self.line("MediumInterface \"\" \"\"");
+        }
         if builder.objects.there().any(|object| builder.objects.parent(object).is_some()) {
             self.lose("which objects are parts of others");
         }
