@@ -1,5 +1,7 @@
 //! Worlds changed by name before they are built.
 
+#![expect(clippy::unwrap_used, reason = "a helper of tests fails by panicking")]
+
 use std::{fs, sync::Arc};
 
 use dioptric_spectrum::Cancel;
