@@ -162,6 +162,7 @@ impl SpectralCurve {
     }
 
     /// Whether it is a table, and no number or color.
+    #[cfg(feature = "gltf")]
     pub(crate) fn is_spectrum(&self) -> bool {
         matches!(self.kind, Kind::Knots { .. } | Kind::Table { .. })
     }
