@@ -402,4 +402,10 @@ fn array_needs_a_world_and_rays_from_the_film() {
     });
     let message = coarse.light_field(None, &Silent, &Cancel::new()).unwrap_err().to_string();
     assert!(message.contains("expected at least a pixel"), "{message}");
+    let fine = kept.with(|camera| {
+        let Some(LightFieldSpec::Array(array)) = &mut camera.light_field else { panic!("an array") };
+        array.pitch_mm = 0.005;
+    });
+    let message = fine.light_field(None, &Silent, &Cancel::new()).unwrap_err().to_string();
+    assert!(message.contains("elements lie 5 µm apart"), "{message}");
 }

@@ -192,6 +192,12 @@ impl FramesSpec {
         }
         let refused = |reason: String| Err(PipelineError::Unsuitable { what: "frames: BothGains", reason });
         match (self, &sensor.high_gain, gain_mode) {
+            (Self::BothGains, Some(high), _) if high.conversion_gain_v_per_e <= sensor.conversion_gain_v_per_e => {
+                refused(format!(
+                    "need a high_gain above the other gain, {} states {} of {} V an electron",
+                    sensor.name, high.conversion_gain_v_per_e, sensor.conversion_gain_v_per_e
+                ))
+            }
             (Self::BothGains, None, _) => refused(format!("need high_gain, which {} does not state", sensor.name)),
             (Self::BothGains, Some(_), GainMode::High) => {
                 refused("are read with both, expected gain_mode: Low, for whose saturation they are exposed".to_owned())

@@ -52,20 +52,8 @@ impl Decoding<'_> {
         if planes.iter().any(|plane| plane.dim() != (film.rows, film.columns)) {
             return Err(wrong(format!("the picture is not of the film's {} × {} pixels", film.columns, film.rows)));
         }
-        let share = self.pupil_share()?;
+        let Samples { share, radius_mm, n_views, raster } = self.samples()?;
         let pitch_mm = film.pitch_mm;
-        let radius_mm = 0.5 * self.lens.first_order().exit_pupil_diameter_mm * share;
-        let n_views = self.n_views.unwrap_or((2.0 * radius_mm / pitch_mm).floor() as usize);
-        if n_views == 0 {
-            let reason = format!(
-                "the image of the pupil behind an element is {} µm wide, expected at least a pixel of {} µm",
-                2e3 * radius_mm,
-                1e3 * pitch_mm
-            );
-            return Err(wrong(reason));
-        }
-        let raster = Raster::new(array, film, share, radius_mm)
-            .ok_or_else(|| wrong("the film holds the image of the pupil of no element".to_owned()))?;
         let view = |i: usize| {
             let middle = 0.5 * (n_views as f64 - 1.0);
             let from_middle_mm = pitch_mm * DVec2::new((i % n_views) as f64 - middle, middle - (i / n_views) as f64);
@@ -86,6 +74,35 @@ impl Decoding<'_> {
         LightField::new((n_views, n_views), views, geometry)
     }
 
+    /// Checks what can be known before there is a picture.
+    ///
+    /// # Errors
+    /// As [`light_field`](Self::light_field), but for the picture's size.
+    pub(crate) fn check(&self) -> Result<(), PipelineError> {
+        self.samples().map(|_| ())
+    }
+
+    fn samples(&self) -> Result<Samples<'_>, PipelineError> {
+        let (share, pitch_mm) = (self.pupil_share()?, self.film.pitch_mm);
+        let radius_mm = 0.5 * self.lens.first_order().exit_pupil_diameter_mm * share;
+        let n_views = self.n_views.unwrap_or((2.0 * radius_mm / pitch_mm).floor() as usize);
+        if n_views == 0 {
+            let reason = format!(
+                "the image of the pupil behind an element is {} µm wide, expected at least a pixel of {} µm",
+                2e3 * radius_mm,
+                1e3 * pitch_mm
+            );
+            return Err(wrong(reason));
+        }
+        if self.array.pitch_mm < pitch_mm {
+            let (pitch_um, pixel_um) = (1e3 * self.array.pitch_mm, 1e3 * pitch_mm);
+            return Err(wrong(format!("elements lie {pitch_um} µm apart, expected at least a pixel of {pixel_um} µm")));
+        }
+        let raster = Raster::new(&self.array, self.film, share, radius_mm)
+            .ok_or_else(|| wrong("the film holds the image of the pupil of no element".to_owned()))?;
+        Ok(Samples { share, radius_mm, n_views, raster })
+    }
+
     /// Returns the gap over the distance of the exit pupil from the array.
     pub(crate) fn pupil_share(&self) -> Result<f64, PipelineError> {
         let pupil_distance_mm = self.film.array_distance_mm - self.lens.first_order().exit_pupil_z_mm;
@@ -94,6 +111,17 @@ impl Decoding<'_> {
         }
         Err(wrong(format!("the array lies {pupil_distance_mm} mm behind the exit pupil, expected a length above 0")))
     }
+}
+
+/// Where a picture is sampled.
+struct Samples<'a> {
+    /// The gap over the distance of the exit pupil.
+    share: f64,
+    /// Of the image of the pupil behind an element, mm.
+    radius_mm: f64,
+    /// Views along each side.
+    n_views: usize,
+    raster: Raster<'a>,
 }
 
 fn wrong(reason: String) -> PipelineError {

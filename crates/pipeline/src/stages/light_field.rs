@@ -27,7 +27,9 @@ impl KeptCamera {
     ) -> Result<LightField, PipelineError> {
         match &self.camera().light_field {
             Some(LightFieldSpec::Array(_)) => {
-                self.decoded(&*self.irradiance(progress, cancel)?, n_views, progress, cancel)
+                let rendered =
+                    |_: &mut Decoding<'_>| Ok(self.irradiance(progress, cancel)?.summary.seen.planes.to_vec());
+                self.taken_apart(rendered, n_views, &Watch { progress, cancel })
             }
             Some(LightFieldSpec::Cameras { columns, rows, spacing_mm }) => {
                 self.of_cameras((*rows, *columns), *spacing_mm, progress, cancel)
@@ -97,6 +99,7 @@ impl KeptCamera {
             exit_pupil_axis_mm: [right_mm, -down_mm],
         };
         let mut decoding = Decoding { array, lens: &lens.reference, film: &film, n_views };
+        decoding.check()?;
         let planes = planes_of(&mut decoding)?;
         let inputs = self.irradiance_inputs()?;
         let render = self.chain(watch.progress, watch.cancel).world_render(&inputs)?;

@@ -28,6 +28,7 @@ pub fn change_world(builder: &mut WorldBuilder, change: &WorldChange, cancel: &C
     cancel.check()?;
     match change {
         WorldChange::Add { name, shape, at_m, material } => {
+            tell_of_taken(builder, name);
             let material = material_of(builder, name, material)?;
             let (shape, turn) = shape_of(shape, builder)?;
             shape.check()?;
@@ -36,6 +37,7 @@ pub fn change_world(builder: &mut WorldBuilder, change: &WorldChange, cancel: &C
             builder.add_shape(shape, place, material, None);
         }
         WorldChange::AddFile { name, file, unit_m, at_m } => {
+            tell_of_taken(builder, name);
             let part = open_world(file, &ReadOptions { metres_per_unit: *unit_m, ..ReadOptions::default() }, cancel)?;
             builder.add_world(part, name, DAffine3::from_translation(point(*at_m)?))?;
         }
@@ -62,7 +64,10 @@ pub fn change_world(builder: &mut WorldBuilder, change: &WorldChange, cancel: &C
             let radiance = spectrum_of(spectrum, *level, &[(LightAmount::CandelaPerM2(1.0), 1.0)], "a glow")?;
             builder.set_emission_of(object, &Emission { radiance, is_two_sided: false })?;
         }
-        WorldChange::Light { name, light } => add_light(builder, name, light)?,
+        WorldChange::Light { name, light } => {
+            tell_of_taken(builder, name);
+            add_light(builder, name, light)?;
+        }
         WorldChange::Brighten { object, factor } => builder.brighten_object(object, *factor)?,
         WorldChange::Camera { name, eye_m, look_at_m, up, fov_deg, size } => {
             let (eye_m, up) = (point(*eye_m)?, up.map(point).transpose()?);
@@ -95,6 +100,15 @@ pub fn change_world(builder: &mut WorldBuilder, change: &WorldChange, cancel: &C
         }
     }
     Ok(())
+}
+
+/// Says that what is added under a name is called otherwise, which later changes by that name would not mean.
+fn tell_of_taken(builder: &mut WorldBuilder, name: &str) {
+    if builder.objects().iter().any(|object| object.name == name) {
+        builder.note(format!(
+            "'{name}' is the name of an object already: what is added has a number behind it, as '{name}.2'"
+        ));
+    }
 }
 
 fn point((x, y, z): (f64, f64, f64)) -> Result<DVec3, WorldError> {

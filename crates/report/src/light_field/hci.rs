@@ -23,7 +23,7 @@ pub(super) fn write(field: &LightField, white: f64, folder: &Path) -> Result<Vec
     let (rows, columns) = field.n_views();
     if rows % 2 == 0 || columns % 2 == 0 {
         let reason = format!(
-            "has {columns} × {rows} views, none of them in the middle, which the benchmark's layout needs: expected odd numbers, by --views"
+            "has {columns} × {rows} views, none of them in the middle, which the benchmark's layout needs: expected odd numbers, behind an array by --views"
         );
         return Err(PipelineError::Unsuitable { what: "the light field", reason });
     }
