@@ -221,7 +221,7 @@ fn both_gains_have_the_noise_of_one_and_the_range_of_the_other() {
         let found_e = rates(&merged) * 0.01;
         let (mean_e, deviation_e) = (found_e.mean().unwrap(), found_e.std(1.0));
         let expected_e = (electrons + dark_e + expected_floor_e.powi(2)).sqrt();
-        // 65,536 pixels: .28 % of the deviation at one standard error; the high read's codes are .6 electrons apart.
+        // 65,536 pixels: 0.28 % of the deviation at one standard error; the codes of the high read are 0.6 electrons apart.
         assert_relative_eq!(mean_e, electrons + dark_e, max_relative = 4e-3, epsilon = 0.05);
         assert_relative_eq!(deviation_e, expected_e, max_relative = 0.012);
     }
